@@ -210,6 +210,11 @@ class Coating(OfPlace):
     per_area: Annotated[Number, Field(gt=0)] | None = Field(
         default=None, description="k_A of the coating, above a base that wears per_area, too, with its touching_from"
     )
+    modulus: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None,
+        description="pressure over the share by which what is left of it is compressed, beside the base: E (1 - nu) / "
+        "((1 + nu) (1 - 2 nu)) of a thin coating; by default it gives way no more than its base",
+    )
     friction: Annotated[Number, Field(ge=0)] | None = Field(
         default=None,
         description="mu of the coating, which over its last tenth goes over to contact.friction; by default that",
@@ -342,6 +347,11 @@ class WearLaw(Part):
     @property
     def _exponents(self) -> tuple[float, float]:
         return self.pressure_exponent, self.speed_exponent
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether there is a coating that gives way beside the base."""
+        return self.coating is not None and self.coating.modulus is not None
 
     @property
     def of_coating(self) -> WearLaw | None:

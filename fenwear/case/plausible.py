@@ -64,6 +64,7 @@ RANGES = (
           "diamond-like carbon 1e-11; K of 1 at a hardness of 1 GPa is 1e-3"),
     Range("wear.*.coating.thickness", "thickness of a coating", 1e-3, 2e3, "µm", 1e-3,
           "monolayers 1e-3, sprayed coatings 2,000"),
+    Range("wear.*.coating.modulus", "modulus of a coating", 0.1, 1.5e6, "MPa", 1, "gels 0.1, diamond-like carbon 1e6"),
     Range("wear.*.coating.friction", "friction coefficient", 0.0005, 2.0, "", 1,
           "superlubricity 0.001, clean metals and rubber 1 to 2"),
     Range("materials.*.yield_stress", "yield stress", 1, 2e4, "MPa", 1, "lead 10, silicon carbide 10,000"),

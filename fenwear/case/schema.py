@@ -303,9 +303,10 @@ class Case(Part):
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
-        lies = [name for name in ("third_body", "layer", "hardness") if getattr(self.contact, name) is not None]
+        lies = [f"contact.{name}" for name in ("third_body", "layer", "hardness") if getattr(self.contact, name)]
+        lies += [f"wear.{body}.coating.modulus" for body, law in self.wear.by_body.items() if law and law.gives_way]
         if self.contact.solver == "full" and lies:
-            problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
+            problems.append(f"contact.solver: expected 'condensed' with {lies[0]}")
         passes_on = one_way and self.passes
         problems += creep_problems(self.bodies, self.contact.layer, self.contact.solver, passes_on=passes_on)
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
@@ -479,6 +480,9 @@ class Case(Part):
             ),
             "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
                 law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
+            ),
+            "wear: expected coatings without a modulus, which give way in gross sliding alone,": any(
+                law.gives_way for law in self.wear.laws
             ),
             "grid.across: expected grid.nodes, of a grid that stays,": (
                 self.grid is not None and self.grid.across is not None

@@ -1,14 +1,15 @@
 """What lies between two surfaces, as one: what it adds to the gap of the nodes, and the rows of its state.
 
-    gap = bodies + winkler p + delta(p) - t + D,    p <= hardness
+    gap = bodies + (winkler + sum of c / M) p + delta(p) - t + D,    p <= hardness
 
-with the linear closure, that of a law (`closure`), the thickness of debris (`debris`) and the plastic depth D, which
-grows where the pressure is at the hardness. In one phase that is an upper bound of the inequality, and D grows by what
-the gap would be below zero (0 <= dD, p <= hardness, dD (p - hardness) = 0). Where phases flow together, in jumps, or
-nodes are many, the surface gives way in a solve by SOFT (p / hardness - 1) beyond it; what it has given way by is put
-into the gap, and solved again: the excess falls to a part of itself each time, to nothing (augmented Lagrangians;
-M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is linear in the pressure belongs to
-the compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
+with the linear closure, that of coatings of which c is left, of modulus M, that of a law (`closure`), the thickness of
+debris (`debris`) and the plastic depth D, which grows where the pressure is at the hardness. In one phase that is an
+upper bound of the inequality, and D grows by what the gap would be below zero (0 <= dD, p <= hardness, dD (p -
+hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface gives way in a solve by SOFT (p /
+hardness - 1) beyond it; what it has given way by is put into the gap, and solved again: the excess falls to a part of
+itself each time, to nothing (augmented Lagrangians; M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is
+linear in the pressure belongs to the compliance of the bodies (`fenwear.interface.Interface`), so that every study has
+it.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
+from fenwear.sliding.coating import SoftCoating, soft_coatings
 from fenwear.sliding.wear import NOTHING, WornDepths
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
@@ -60,6 +62,7 @@ class Layers:
         memory: States of laws of one's own; None without.
         begun: These at the start; None without.
         strip_carries: Whether debris lies on the strip's material.
+        soft: Coatings of punch and strip that give way beside their base; None for a body without.
     """
 
     nodes: int
@@ -70,6 +73,7 @@ class Layers:
     memory: Memory | None = None
     begun: Held | None = None
     strip_carries: bool = False
+    soft: tuple[SoftCoating | None, SoftCoating | None] = (None, None)
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
@@ -106,6 +110,27 @@ class Layers:
     def curved(self) -> bool:
         """Whether something gives way by a law that is not linear."""
         return self.closure is not None or self.hardness < np.inf
+
+    @property
+    def softens(self) -> bool:
+        """Whether a coating gives way beside its base."""
+        return self.soft != (None, None)
+
+    def coatings_give(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> Array:
+        """Return by how much a unit of pressure closes what is left of coatings in each phase (m, n), mm/MPa.
+
+        Args:
+            pairs: The surfaces opposite each other in each phase.
+            punch, strip: Depths worn off both bodies at their own nodes, mm.
+        """
+        found = np.zeros((len(pairs), self.nodes))
+        of_punch, of_strip = self.soft
+        if of_punch is not None:
+            found += of_punch.gives(punch)
+        if of_strip is not None:
+            gives = of_strip.gives(strip)
+            found += np.array([pair.wear_interpolation @ gives for pair in pairs])
+        return found
 
     def unworn(self, strip: int) -> WornDepths:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
@@ -311,7 +336,8 @@ def layers_of(
     memory = memory_of(contact.friction, wear, temperature)
     begun = None if memory is None else memory.beginning(pair)
     on_strip = debris is not None and strip_carries
-    return Layers(n, closure, winkler, debris, hardness, memory, begun, on_strip)
+    soft = soft_coatings(pair, (wear[0], wear[1]))
+    return Layers(n, closure, winkler, debris, hardness, memory, begun, on_strip, soft)
 
 
 def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory | None:

@@ -173,6 +173,8 @@ class LayerStep:
         """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
         passing = self.passing
         closed = passing.layers.closing(pressure, capped=self.capped)
+        if passing.layers.softens:
+            closed = closed + self._coatings_give(pressure) * pressure
         if not self.implicit:
             return closed
         found = self._wear.opening(pressure)
@@ -244,11 +246,25 @@ class LayerStep:
     def curved(self) -> bool:
         """Whether something gives way by a law that is not linear."""
         layers = self.passing.layers
-        return layers.closure is not None if self.capped else layers.curved
+        return layers.softens or (layers.closure is not None if self.capped else layers.curved)
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
-        return self.passing.layers.slope(pressure, capped=self.capped)
+        found = self.passing.layers.slope(pressure, capped=self.capped)
+        if not self.passing.layers.softens:
+            return found
+        gives = self._coatings_give(
+            pressure
+        )  # that more pressure leaves less of them is p / M of its wear, and left out
+        return gives if found is None else found + gives
+
+    def _coatings_give(self, pressure: Array) -> Array:
+        """Return by how much a unit of pressure closes what is left of coatings (m, n), mm/MPa: at the step's end."""
+        punch, strip = self.before.punch, self.before.strip
+        if self.implicit:
+            lost = self._worn.worn(pressure)
+            punch, strip = punch + self._length * lost.punch, strip + self._length * lost.strip
+        return self.passing.layers.coatings_give(self.passing.wear.pairs, punch, strip)
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""

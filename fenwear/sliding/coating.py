@@ -90,6 +90,42 @@ def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) 
     return coating_thickness(punch, pair.punch.unworn, "punch"), coating_thickness(strip, pair.strip.unworn, "strip")
 
 
+@dataclass(frozen=True)
+class SoftCoating:
+    """A coating that gives way beside its base, all of what is left of it alike, as if it were held sideways.
+
+    So it goes over to the base by itself: what gives way less and less is nothing where it is worn through.
+
+    Attributes:
+        thickness: At the body's own contact nodes (n,), mm.
+        modulus: Pressure over the share by which it is compressed, MPa.
+    """
+
+    thickness: Array
+    modulus: float
+
+    def gives(self, depth: Array) -> Array:
+        """Return by how much a unit of pressure closes what is left at a depth (n,), mm/MPa."""
+        return np.asarray(left_of(self.thickness, depth) / self.modulus)
+
+
+def soft_coatings(
+    pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]
+) -> tuple[SoftCoating | None, SoftCoating | None]:
+    """Return the coatings of punch and strip that give way beside their base; None for a body without.
+
+    Raises:
+        CaseError: the thickness of one is negative somewhere.
+    """
+    punch, strip = (
+        SoftCoating(thickness, law.coating.modulus)
+        if law is not None and law.coating is not None and law.coating.modulus is not None and thickness is not None
+        else None
+        for law, thickness in zip(laws, coatings_of(pair, laws), strict=True)
+    )
+    return punch, strip
+
+
 def covering(
     coatings: tuple[Array | None, Array | None], pair: ContactPair, depths: tuple[Array, Array] | None
 ) -> tuple[Array | None, Array | None]:

@@ -186,6 +186,8 @@ def test_friction_of_a_coating_holds_until_it_is_through(assembled: Assemble) ->
         ("{thickness=1e-3, per_area=0}", r"wear.punch.coating.per_area: expected"),
         ("{thickness=1e-3, coefficient=0}", "wear.punch.coating.coefficient: expected a finite number above zero"),
         ("{thickness=1e-3, coefficient='1 mm'}", "coating.coefficient"),
+        ("{thickness=1e-3, coefficient=1e-9, modulus=0}", r"wear.punch.coating.modulus: expected"),
+        ("{thickness=1e-3, coefficient=1e-9, modulus=9}", r"wear.punch.coating.modulus: expected more than the mean"),
         ("{thickness=1e-3, archard=1e-3}", "wear.punch.coating.hardness"),
     ],
 )
@@ -212,3 +214,78 @@ def test_the_end_of_partial_slip_is_shared_through_coatings() -> None:
     exact = np.where(depth < 2 * thickness, depth / 2, depth - (depth + 2 * thickness) / 4)
     assert (depth > 2 * thickness).any()
     np.testing.assert_allclose(coated, exact, rtol=1e-9, atol=1e-12)
+
+
+UNEVENLY = "thickness={expression='2e-3*(1-x/100)'}"
+SOFT = f"wear.%s={{coefficient=4e-7, coating={{{UNEVENLY}, coefficient=1e-7, modulus='20 MPa'}}}}"
+
+
+def test_a_soft_coating_is_a_layer_as_thick_as_what_is_left(assembled: Assemble) -> None:
+    """Of its modulus over what is left, at each place; unworn, and where it is thinner."""
+    soft, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 100
+    *_, worn = march(soft, half_cycles, implicit=True)
+    x = soft.pair.punch.unworn[:, 0]
+    for start, lost in ((None, 0.0), (worn.end, worn.wear[-1])):
+        left = 2e-3 * (1 - x / 100) - lost
+        assert left.min() > 0
+        rows = ", ".join(f"[{at!r}, {20 / own!r}]" for at, own in sorted(zip(x.tolist(), left.tolist(), strict=True)))
+        layer = f"contact.layer={{kind='linear', stiffness={{table=[{rows}], of='x', unit='MPa/mm'}}}}"
+        layered = assembled("example2", *SMALL, "wear.punch.coefficient=4e-7", layer)
+        count = 1 if start is None else half_cycles + 1
+        found, exact = (list(march(system, count, start=start))[-1].pressure[-1] for system in (soft, layered))
+        np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * exact.max())
+
+
+def test_soft_coatings_of_both_bodies() -> None:
+    """One behind the other as their sum; a strip's goes with its material."""
+    settings = [*SMALLEST, "contact.law='gross-sliding'", "stick={}", "motion.positions=3"]
+
+    def both(base: float) -> Tribosystem:
+        text = "wear.%s={coefficient='%g 1/MPa', coating={thickness='%g mm', coefficient='%g 1/MPa', modulus='3 GPa'}}"
+        bodies = [text % (body, base, thick, base / 5) for body, thick in (("punch", 2e-4), ("strip", 1e-4))]
+        return assemble(load_case("fretting-partial-slip", [*settings, *bodies]))
+
+    layer = "contact.layer={kind='linear', stiffness='1e7 MPa/mm'}"
+    bare = [f"wear.{body}={{coefficient='1e-16 1/MPa'}}" for body in ("punch", "strip")]
+    layered = assemble(load_case("fretting-partial-slip", [*settings, layer, *bare]))
+    found, exact = (next(iter(march(system, 1))).pressure[0] for system in (both(1e-16), layered))
+    np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * exact.max())
+    soft = both(5e-6)
+    marched = [list(march(soft, 100, implicit=way))[-1] for way in (True, False)]
+    errors = []
+    for tolerance in (0.3, 0.03):
+        *_, last = jump(soft, 100, tolerance=tolerance)
+        errors.append(0.0)
+        for name, thickness in zip(("wear", "wear_strip"), soft.coatings, strict=True):
+            one, other = (getattr(block, name)[-1] for block in marched)
+            assert 0.1 < (one >= thickness).mean() < 0.9
+            apart = np.abs(getattr(last, name)[-1] - (one + other) / 2).max() / one.max()
+            errors[-1] = max(errors[-1], float(apart))
+    assert errors[1] < errors[0] / 5
+    assert errors[1] < 3e-3
+
+
+def test_jumps_through_soft_coatings_as_marches(assembled: Assemble) -> None:
+    """Stiffness ends where the coating does: what is left gives way, thinner and thinner."""
+    system, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 240
+    marched = [list(march(system, half_cycles, implicit=way))[-1].wear[-1] for way in (True, False)]
+    exact, thickness = sum(marched) / 2, system.coatings[0]  # of which the errors of first order go
+    assert thickness is not None
+    assert 0.05 < (exact >= thickness).mean() < 0.5
+    hard = assembled("example2", *SMALL, (SOFT % "punch").replace(", modulus='20 MPa'", ""))
+    assert np.abs(list(march(hard, half_cycles))[-1].wear[-1] - exact).max() > 0.1 * exact.max()
+    errors = []
+    for tolerance in (0.3, 0.03):
+        *_, last = jump(system, half_cycles, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
+        assert errors[-1] < tolerance / 10
+    assert errors[1] < errors[0] / 10
+
+
+def test_soft_coatings_do_not_stick() -> None:
+    """Told by the key."""
+    wear = PUNCH % ("1e-6", ", modulus='1 GPa'")
+    with pytest.raises(CaseError, match=r"wear: expected coatings without a modulus"):
+        load_case("fretting-partial-slip", [*SMALLEST, *STICK, "contact.law='coulomb'", wear])
+    with pytest.raises(CaseError, match=r"contact.solver: expected 'condensed' with wear.punch.coating.modulus"):
+        load_case("example2", [*SMALL, "contact.solver='full'", SOFT % "punch"])

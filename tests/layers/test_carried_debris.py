@@ -70,7 +70,7 @@ def test_along_a_closed_track_against_the_closed_form() -> None:
     few = ("geometry.degree=1", f"run.half_cycles={count}", ONE_WAY, lies)
     system = assemble(load_case("example2", few))
     width, thickness = float(system.pair.weights.sum()), system.bodies.punch.thickness
-    for how, tolerance, error in (("explicit", 1.0, 1e-10), ("jump", 0.03, 3e-3), ("jump", 3e-4, 1e-4)):
+    for how, tolerance, error in (("explicit", 1.0, 1e-10), ("jump", 0.03, 3e-3), ("jump", 3e-4, 2e-4)):
         block = end(system, how, tolerance)
         x, worn = width * ROUND / TRACK / life, float(block.totals.of("volume_punch")[-1]) / thickness / count
         wanted = share * worn / (TRACK * x) * -np.expm1(-count * x)

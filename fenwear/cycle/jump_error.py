@@ -63,12 +63,12 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
         _creep_difference(system, apart, step, halves.worn),
         _carried_difference(system, apart, step, halves.worn),
     )
+    remembered, lies = (of(system, before, whole, halves) for of in (_state_difference, _debris_difference))
     return Estimate(
         max(share * depth, _through_difference(system, before, whole, halves)),
         share * pressure,
         share * _heat_difference(system, whole, halves),
-        share
-        * max(_state_difference(system, before, whole, halves), _debris_difference(system, before, whole, halves)),
+        share * max(remembered, lies),
     )
 
 

@@ -253,9 +253,8 @@ class LayerStep:
         found = self.passing.layers.slope(pressure, capped=self.capped)
         if not self.passing.layers.softens:
             return found
-        gives = self._coatings_give(
-            pressure
-        )  # that more pressure leaves less of them is p / M of its wear, and left out
+        # That more pressure leaves less of them is p / M of its wear, and left out.
+        gives = self._coatings_give(pressure)
         return gives if found is None else found + gives
 
     def _coatings_give(self, pressure: Array) -> Array:

@@ -172,6 +172,7 @@ class CondensedContact:
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
+        self._rigid_normals = np.array([phase.interface.rigid.rigid_normal.T for phase in self.phases])
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
         self._spread: SpreadPhases | None = None
@@ -370,11 +371,9 @@ class CondensedContact:
         # From the rigid motions of the start: they take up a worn depth that may be thousands of times what the bodies
         # give. What is left at the nodes in contact is as small as the elastic gap, and so is the residual's rounding.
         begun = np.zeros((m, self._offset.shape[1] - n)) if start is None else start.rigid
-        self._offset[:, :n] = gap + self._loads
-        for phase, own, offset in zip(self.phases, begun, self._offset, strict=True):
-            offset[:n] += phase.interface.rigid.rigid_normal @ own
-        self._offset[:, :n] /= self._gap_scale
-        if not np.isfinite(self._offset).all():
+        rigid = np.matmul(begun[:, None, :], self._rigid_normals)[:, 0]
+        self._offset[:, :n] = (gap + self._loads + rigid) / self._gap_scale
+        if not np.isfinite(self._offset.sum()):  # nor is a sum with one that is not
             raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None

@@ -236,7 +236,8 @@ class PhasesWear:
                     of_coating = pair.wear_projection @ (coating.rate[k] * self.strip.law.value(pressure[k]))
                     of_base = worn.coating * of_coating + worn.base * of_base
                 strip += of_base
-        return WornDepths(self.depth(pressure).sum(axis=0), strip)
+        punch = self.depth(pressure)
+        return WornDepths(punch[0] if len(punch) == 1 else punch.sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
         """Return the gap that the wear of all phases opens in each of them (m, n), mm."""

@@ -129,6 +129,7 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "punch.loads=[]",
             "motion={kind='cycle', columns=['time (s)', 'shift_x (um)', 'force_z (N)'], load={on='punch_top'}, "
             "rows=[[0, -3, -120], [2e-4, 3, -118], [1e-3, -3, -120]]}",
+            "contact.friction={expression='0.7 + 1e-4 * pm + cs'}",
         ),
     ),
     "in rings": (

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies, edges_of
-from fenwear.assembly.cycle_shear import SlidingWays
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
@@ -42,6 +41,7 @@ from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.track import on_closed_track
+from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis

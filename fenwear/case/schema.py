@@ -475,9 +475,6 @@ class Case(Part):
                 table and self.model.kind == "plane" and any(name.endswith("shift_y") for name in columns)
             ),
             "stick.force: expected none in a cycle, whose forces are columns,": table and self.stick.force is not None,
-            "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
-                self.contact.asks(name, self.wear.laws) for name in ("cs", "pm")
-            ),
             "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
                 law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
             ),

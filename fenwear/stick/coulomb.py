@@ -268,9 +268,7 @@ class _Run:
             return replace(at, temperature=at.temperature if warm is None else warm)
         at, steps = memory.at, self.problem.program.steps
         if at.pressures is not None and len(at.pressures) != len(steps):
-            n, m = at.contact.trial.shape
-            none = np.full((len(steps), n), np.nan), np.full((len(steps), n, m), np.nan)
-            at = replace(at, next_step=0, pressures=none[0], trials=none[1])
+            at = self.problem.forgotten(at)
         heating = np.zeros(len(self.problem.weights)) if at.heating is None else at.heating
         at = replace(self.problem.shaped(at, state.worn), load=load, temperature=warm)
         at = replace(at, heating=None if warm is None else heating)

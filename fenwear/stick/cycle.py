@@ -19,8 +19,10 @@ from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
 from fenwear.sliding.coating import CoatedBody, covering
+from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.screw import Screw
+from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
@@ -148,6 +150,8 @@ class PartialSlipState:
         coupling: Iterations of contact and heat in the last step.
         held: What laws remember after the last step, where that is not what `worn` has; the shape stays until the end
             of a half-cycle.
+        slips: Of the nodes in each time step of the cycle (k, n, m), mm, as `trials`; None where no law depends on
+            what a whole cycle does.
     """
 
     contact: StickState
@@ -164,6 +168,7 @@ class PartialSlipState:
     slid: Array | None = None
     speed: Array | None = None
     held: Held | None = None
+    slips: Array | None = None
 
     @property
     def near(self) -> tuple[Array, Array] | None:
@@ -279,6 +284,18 @@ class PartialSlipProblem:
             contact = creep.at(contact, worn.crept)
         return replace(at, worn=worn, held=None, contact=contact)
 
+    @property
+    def asks_cycle(self) -> bool:
+        """Whether a law depends on what a whole cycle does: its cross-shear, its mean pressure."""
+        return self.laws is not None and (self.laws.asks("cs") or self.laws.asks("pm"))
+
+    def forgotten(self, at: PartialSlipState) -> PartialSlipState:
+        """Return a state at the start of a cycle whose time steps have not been computed yet."""
+        steps, (n, m) = len(self.program.steps), at.contact.trial.shape
+        none = np.full((steps, n, m), np.nan)
+        slips = none if self.asks_cycle else None
+        return replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=none, slips=slips)
+
     def beginning(self, shape: WornDepths | None = None, load: float = 1.0) -> PartialSlipState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
 
@@ -308,8 +325,7 @@ class PartialSlipProblem:
         at = PartialSlipState(state, before, worn, load=load)
         for step in program.lead_in:
             at = self._stepped(at, step)
-        steps, (n, m) = len(program.steps), state.trial.shape
-        at = replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=np.full((steps, n, m), np.nan))
+        at = self.forgotten(at)
         if self.heat is None:
             return at
         return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
@@ -392,7 +408,31 @@ class PartialSlipProblem:
             punch, strip = self.heat.surfaces(at.temperature)
             warm = punch, strip
         speed, debris = 0.0 if at.speed is None else at.speed, self.interface.layers.thickness(at.worn)
-        return {"temperatures": warm, "worn": at.worn, "slid": at.slid, "speed": speed, "debris": debris}
+        return {
+            "temperatures": warm,
+            "worn": at.worn,
+            "slid": at.slid,
+            "speed": speed,
+            "debris": debris,
+            "cycle": self._shear(at),
+        }
+
+    def _shear(self, at: PartialSlipState) -> CycleShear | None:
+        """Return what laws know of the last cycle before a state; None where none asks, or before the first.
+
+        A time step that has not been computed slips nothing at the mean pressure.
+        """
+        if at.slips is None or at.pressures is None:
+            return None
+        middle, mean, places = self.interface.middle, self.interface.middle.rigid.mean_pressure, self.program.steps
+        positions = [self.interface.position(step.offset) for step in places]
+        slips: Array = np.nan_to_num(at.slips)
+        ways = np.array([position.slid(own) for position, own in zip(positions, slips, strict=True)])
+        lengths = np.linalg.norm(ways, axis=2)
+        directions = ways / np.where(lengths > 0, lengths, 1.0)[:, :, None]
+        pairs, wears = [position.pair for position in positions], self.wear.strip is not None
+        known = SlidingWays(pairs, middle.pair, lengths, directions, wears, mean, asked=True)
+        return known.shear(np.where(np.isnan(at.pressures), mean, at.pressures))
 
     def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:
         """Return the state after a time step with friction mu (n,)."""
@@ -426,8 +466,11 @@ class PartialSlipProblem:
         if self.laws is None:
             return after
         slipped = np.linalg.norm(state.slip, axis=1)
-        before = np.zeros_like(slipped) if at.slid is None else at.slid
-        return replace(after, slid=before + slipped, speed=slipped / step.duration)
+        before, slips = np.zeros_like(slipped) if at.slid is None else at.slid, at.slips
+        if slips is not None:
+            slips = slips.copy()
+            slips[at.next_step] = state.slip
+        return replace(after, slid=before + slipped, speed=slipped / step.duration, slips=slips)
 
     def half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
@@ -588,6 +631,7 @@ class PartialSlipProblem:
                 worn=before.worn,
                 slid=slid[k],
                 debris=known["debris"],
+                cycle=known["cycle"],
             )
             for k, pair in enumerate(self._pairs(slips, before))
         ]

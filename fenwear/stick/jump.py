@@ -135,7 +135,8 @@ def _rate(
     program, heat, own = problem.program, problem.heat, (problem.interface.layers.memory, problem.interface.creep)
     worn = problem.interface.layers.flown_as(worn, at.worn)
     at = problem.shaped(at, worn)
-    settled = heat is None and own == (None, None)  # what goes to and fro in a cycle is its own
+    # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
+    settled = heat is None and own == (None, None) and not problem.asks_cycle
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = problem.half_cycle(at)
     if heat is not None and before is None:

@@ -24,7 +24,7 @@ from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.response import identity
 from fenwear.interface import ContactPair, FrameCompliance, Interface, RigidEquilibrium
 from fenwear.interface.frame import contact_frame
-from fenwear.interface.placement import in_model
+from fenwear.interface.placement import in_model, in_space
 from fenwear.sliding.field import SlidingField
 
 
@@ -131,6 +131,10 @@ class Position:
     def in_frame(self, vectors: Array) -> Array:
         """Return the components (d n,) of vectors (n, d)."""
         return np.einsum("nac,nc->an", self.frame, vectors).ravel()
+
+    def slid(self, slip: Array) -> Array:
+        """Return slips along the tangents (n, d - 1) as vectors in space (n, 3)."""
+        return in_space(np.einsum("nac,na->nc", self.frame[:, 1:], slip))
 
     def beside(self, moved: Array | None) -> Array:
         """Return what the strip is moved by beside its motion (n, d) in the frame (d n,)."""

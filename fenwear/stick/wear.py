@@ -18,6 +18,7 @@ from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
 from fenwear.sliding.coating import CoatedBody, covering
+from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import WornDepths, coefficient, stays
@@ -99,6 +100,10 @@ class LocalLaws:
         given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear if law is not None)]
         return any(isinstance(one, Dependence) and one.passes for one in given)
 
+    def asks(self, name: str) -> bool:
+        """Return whether friction, wear or the loss of debris depends on a variable of coefficients."""
+        return self.friction.contact.asks(name, self.wear)
+
     def conditions(
         self,
         pair: ContactPair,
@@ -111,6 +116,7 @@ class LocalLaws:
         states: States = ({}, {}),
         debris: Array | None = None,
         touching: Mask | None = None,
+        cycle: CycleShear | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on.
 
@@ -124,6 +130,7 @@ class LocalLaws:
             states: That laws remember, as those of punch and strip know them.
             debris: Thickness of the third body (n,), mm; None without.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
+            cycle: What the last cycle tells of cross-shear and mean pressure; None before the first.
         """
         none, x = np.zeros_like(pressure), pair.punch.x
         initial = np.full_like(pressure, self.initial)
@@ -135,6 +142,7 @@ class LocalLaws:
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             none if slid is None else slid,
             self.regions,
+            cycle=cycle,
             states=states,
             covered=covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
             debris=debris,

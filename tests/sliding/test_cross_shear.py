@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, jump, load_case, march
-from fenwear.assembly.cycle_shear import SlidingWays
 from fenwear.case import WearLaw
 from fenwear.sliding.cross_shear import SlidingTensor
+from fenwear.sliding.ways import SlidingWays
 
 PATHS = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "contact.friction=0")
 

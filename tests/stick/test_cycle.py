@@ -221,3 +221,24 @@ def test_the_surface_is_stretched_most_at_the_ends_of_strokes() -> None:
     strain = TimeStepRecords.joined(parts).strain[:, :, 0]
     largest, at_ends = strain.max(axis=0), strain[[len(strain) // 2 - 1, -1]].max(axis=0)
     assert np.abs(largest - at_ends).max() < 0.02 * np.ptp(strain, axis=0).max()
+
+
+def test_mean_pressure_of_the_last_cycle() -> None:
+    """A wear law by pm and cs: of the time steps of the cycle before, over their slip; to and fro nothing crosses."""
+    law = "coefficient={expression='1e-9 * pm * (1 + cs)', unit='1/MPa'}"
+    driven = problem(f"wear={{punch={{{law}}}, strip={{{law}}}}}")
+    at, parts = driven.cycle(driven.beginning())
+    before = TimeStepRecords.joined(parts)
+    at, parts = driven.cycle(at)
+    now = TimeStepRecords.joined(parts)
+    both, steps = TimeStepRecords.joined([before, now]), len(now)
+    pressures, slips = both.pressure, both.slip_magnitude
+    for k in range(steps):  # the last cycle before each step
+        p, s = pressures[k : k + steps], slips[k : k + steps]
+        slid = s.sum(axis=0) > 0
+        mean = (p * s).sum(axis=0)[slid] / s.sum(axis=0)[slid]
+        wanted = 1e-9 * mean * (now.pressure[k] * now.slip_magnitude[k])[slid]
+        assert wanted.max() > 0
+        # Directions at nodes of the strip are those of some of the punch's, which is round.
+        for depth, same in ((now.punch_depth, 1e-11), (now.strip_depth, 1e-8)):
+            assert np.abs(depth[k][slid] - wanted).max() < same * now.punch_depth.max()

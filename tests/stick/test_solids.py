@@ -155,3 +155,26 @@ def test_a_torque_is_no_force() -> None:
     settings = ["motion={kind='oscillation', amplitude='0.01 rad', period=1, axis=[0, 0, 1]}", "stick.force='1 N'"]
     with pytest.raises(CaseError, match=r"stick\.force: expected none for a motion that turns"):
         load_case("fretting-sphere", settings)
+
+
+def test_cross_shear_of_an_ellipse() -> None:
+    """That of its chords, where the way is far longer than the bodies give way, in both laws of contact."""
+    x, y = (0.3 * f(2 * np.pi * np.arange(9) / 8) / k for k, f in ((1, np.cos), (2, np.sin)))
+    chords = np.diff([x, y]).T
+    tensor = np.einsum("ka,kb,k->ab", chords, chords, 1 / np.linalg.norm(chords, axis=1))
+    crossing = float(np.linalg.eigvalsh(tensor)[0] / np.trace(tensor))
+    rows = [[k / 8, float(1e3 * x[k]), float(1e3 * y[k]), -10] for k in range(9)]
+    driven = problem(
+        "punch.loads=[]",
+        "motion={kind='cycle', columns=['time (s)', 'shift_x (um)', 'shift_y (um)', 'force_z (N)'], "
+        f"load={{on='punch_top'}}, rows={rows}}}",
+        "contact.friction=0.01",
+        "wear={punch={coefficient={expression='1e-9 * cs', unit='1/MPa'}}}",
+    )
+    at, _ = driven.cycle(driven.beginning())
+    found = TimeStepRecords.joined(driven.cycle(at)[1])
+    rubbed = found.pressure * found.slip_magnitude
+    rubs = found.touched
+    crosses = found.punch_depth.sum(axis=0)[rubs] / (1e-9 * rubbed.sum(axis=0)[rubs])
+    assert rubs.any()
+    assert np.abs(crosses - crossing).max() < 0.005 * crossing

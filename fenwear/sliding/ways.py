@@ -1,4 +1,4 @@
-"""Sliding as a vector over a cycle on the materials of placed bodies: tensors, cross-shear, mean pressure."""
+"""Sliding as a vector over a cycle on the materials of both bodies: tensors, cross-shear, mean pressure."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ class SlidingWays:
     def shear(self, pressure: Array | None) -> CycleShear | None:
         """Return what coefficients know of a whole cycle; None where none asks for it.
 
-        Where nothing presses in the whole cycle the ways alone count, as where no pressures are known yet.
+        Where nothing presses in the whole cycle the ways alone count, as where no pressures are known yet; where
+        nothing slides the mean pressure is that of the phases.
 
         Args:
             pressure: Of all phases (m, n), MPa; None where they are not known.
@@ -79,7 +80,8 @@ class SlidingWays:
             return None
         found, ways, slid = self.tensor(pressure), self.tensor(), self.lengths.sum(axis=0)
         ratio = np.where(found.work > 0, found.ratio, ways.ratio)
-        return CycleShear((ratio, self._of_strip(pressure)), found.work / np.where(slid > 0, slid, 1.0))
+        mean = np.where(slid > 0, found.work / np.where(slid > 0, slid, 1.0), pressure.mean(axis=0))
+        return CycleShear((ratio, self._of_strip(pressure)), mean)
 
     def _of_strip(self, pressure: Array | None) -> Array:
         """Return the cross-shear ratio of the strip's material at the contact nodes."""

@@ -427,7 +427,7 @@ class PartialSlipProblem:
         middle, mean, places = self.interface.middle, self.interface.middle.rigid.mean_pressure, self.program.steps
         positions = [self.interface.position(step.offset) for step in places]
         slips: Array = np.nan_to_num(at.slips)
-        ways = np.array([position.slid(own) for position, own in zip(positions, slips, strict=True)])
+        ways = np.array([position.slid(slips[k]) for k, position in enumerate(positions)])
         lengths = np.linalg.norm(ways, axis=2)
         directions = ways / np.where(lengths > 0, lengths, 1.0)[:, :, None]
         pairs, wears = [position.pair for position in positions], self.wear.strip is not None

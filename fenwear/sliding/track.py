@@ -8,6 +8,9 @@ off its own area w_i goes to the rings that this area crosses, by shares, and al
 
 A node of the counter-body takes the mean of the rings that its own area crosses; the track ends where the contact
 does. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
+
+Surfaces that turn beside each other without ever coming to the same place, as the two faces of a disc, are tracks
+of their own: parts of the strip's surface share one where they lie at the same height, measured square to s.
 """
 
 from __future__ import annotations
@@ -17,16 +20,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.interface import ContactPair
 from fenwear.interface.overlap import ChartedSurface, Indices, node_triangles
-from fenwear.interface.placement import ZERO
+from fenwear.interface.placement import ZERO, in_space
 from fenwear.sliding.field import SlidingField
 
 RINGS = 2000  # at most
 FINER = 2  # rings over the width of a node's area
 THIN = 1e-12  # of a surface's width across the track
+SAME = 1e-6  # of a surface's extent: heights that are one
 LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s is the radius
 
 
@@ -38,24 +42,62 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
         field: The motion of the strip for a unit of the stroke.
         track: What closes the track: its length, mm, or 2 pi rad.
     """
-    rate = field.rate(pair.strip.x, pair.strip.outward)
-    if pair.punch.dim == 2:
-        spread = np.broadcast_to(pair.weights / (track * rate.mean()), (len(pair.strip.weights), len(pair.weights)))
-        return replace(pair, wear_projection=csr_array(spread))
+    rate, count = field.rate(pair.strip.x, pair.strip.outward), len(pair.strip.weights)
+    own = _tracks(pair.strip, field)
+    opposite = np.array([pair.wear_projection[own == k].sum(axis=0) for k in range(own.max() + 1)]).argmax(axis=0)
+    found = csr_array((count, len(pair.weights)))
+    for k in range(own.max() + 1):
+        on_strip, on_punch = own == k, opposite == k
+        spread = _along_one if pair.punch.dim == 2 else _along_rings
+        found = csr_array(found + spread(pair, field, track * rate, on_strip, on_punch))
+    return replace(pair, wear_projection=found)
+
+
+def _tracks(strip: ContactSurface, field: SlidingField) -> Indices:
+    """Return which track each node of a strip's surface is on (n,): parts at the same height share one."""
+    x = in_space(strip.x)
+    if field.turn == ZERO:
+        height = strip.x[:, -1] if strip.dim == 2 else x @ _mean_normal(strip)
+    else:
+        axis, arm = np.array(field.turn), x - field.centre
+        along = arm @ axis
+        around = np.linalg.norm(arm - along[:, None] * axis, axis=1)
+        height = along if strip.dim == 3 and _is_flat(strip, axis) else around
+    parts = strip.part
+    spans = np.array([(height[parts == k].min(), height[parts == k].max()) for k in range(parts.max() + 1)])
+    slack, track, reached = SAME * strip.extent(), np.zeros(len(spans), dtype=np.int64), np.inf
+    number = -1
+    for k in spans[:, 0].argsort():
+        low, high = spans[k]
+        if number < 0 or low > reached + slack:
+            number, reached = number + 1, high
+        track[k], reached = number, max(reached, high)
+    return np.asarray(track[parts])
+
+
+def _along_one(pair: ContactPair, _field: SlidingField, length: Array, on_strip: Mask, on_punch: Mask) -> csr_array:
+    """Return the wear_projection of a track in the plane, which is one ring of this length (n_strip,), mm."""
+    spread: Array = np.outer(on_strip, pair.weights * on_punch / length[on_strip].mean())
+    return csr_array(spread)
+
+
+def _along_rings(pair: ContactPair, field: SlidingField, length: Array, on_strip: Mask, on_punch: Mask) -> csr_array:
+    """Return the wear_projection of a track of a solid, whose rings are so long at the strip's nodes (n_strip,), mm."""
     across = _across(field, pair.strip)
-    punch, strip = _Crossing.of(pair.punch, across), _Crossing.of(pair.strip, across)
+    punch, strip = _Crossing.of(pair.punch, across).of_nodes(on_punch), _Crossing.of(pair.strip, across)
+    strip = strip.of_nodes(on_strip)
     count = int(np.clip(np.ceil(FINER * punch.span / punch.width), 1, RINGS))
     edges = np.linspace(punch.low.min(), punch.high.max(), count + 1)
     # A ring's area: as long as the motion is there, and as wide as the surface goes while s goes on by one.
-    s = across(pair.strip.x)
+    s, broad = across(pair.strip.x)[on_strip], (length / across.advance(pair.strip))[on_strip]
     order = np.argsort(s)
-    along = np.interp(edges, s[order], (track * rate / across.advance(pair.strip))[order])
+    along = np.interp(edges, s[order], broad[order])
     areas = np.diff(edges) * (along[1:] + along[:-1]) / 2
     depths = diags_array(1 / areas) @ punch.shares(edges).T @ diags_array(pair.weights)
     shares = strip.shares(edges)
     inside = shares.sum(axis=1)  # of the areas on the track's edge a part alone is worn, as deep as beside it
     means = diags_array(1 / np.where(inside > 0, inside, 1.0)) @ shares
-    return replace(pair, wear_projection=csr_array(means @ depths))
+    return csr_array(means @ depths)
 
 
 @dataclass(frozen=True)
@@ -87,13 +129,21 @@ class _Across:
 
 
 def _across(field: SlidingField, strip: ContactSurface) -> _Across:
-    normal = strip.weights @ strip.outward
-    normal /= np.linalg.norm(normal)
     if field.turn != ZERO:
         axis = np.array(field.turn)
-        return _Across(np.array(field.centre), axis, bool(abs(normal @ axis) > LEVEL))
-    side = np.cross(normal, field.shift)
+        return _Across(np.array(field.centre), axis, _is_flat(strip, axis))
+    side = np.cross(_mean_normal(strip), field.shift)
     return _Across(np.zeros(3), side / np.linalg.norm(side), radial=False)
+
+
+def _mean_normal(strip: ContactSurface) -> Array:
+    normal = strip.weights @ strip.outward
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _is_flat(strip: ContactSurface, axis: Array) -> bool:
+    """Return whether a surface is more of a disc about an axis than a shaft, by its mean over all it looks to."""
+    return bool(strip.weights @ np.abs(strip.outward @ axis) > LEVEL * strip.weights.sum())
 
 
 @dataclass(frozen=True)
@@ -123,6 +173,11 @@ class _Crossing:
         s = np.sort(across(triangles), axis=1)
         s[:, [0, 2]] += THIN * np.ptp(s) * np.array([-1, 1])  # none lies on one ring's edge as a whole
         return cls(s, area / np.bincount(node, area, nodes)[node], node, nodes)
+
+    def of_nodes(self, own: Mask) -> _Crossing:
+        """Return the areas of some of the nodes (n,) alone, the others having none."""
+        chosen = own[self.node]
+        return _Crossing(self.s[chosen], self.size[chosen], self.node[chosen], self.nodes)
 
     @property
     def low(self) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -53,33 +54,48 @@ def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> 
     assert np.degrees(np.cross(on_cup, on_ball) @ AXIS) == pytest.approx(-np.degrees(np.sin(np.radians(10))), abs=0.1)
 
 
+def about_axes() -> tuple[str, list[Rotation]]:
+    """Return the motion through turns about several axes, and where the ball is in the middle of each step."""
+    places = [Rotation.from_rotvec(np.array(one), degrees=True) for one in ([0, 0, 0], [14, 4, 0], [5, -12, 16])]
+    places.append(places[0])
+    rows = [[float(k), *map(float, place.as_rotvec(degrees=True)), -FORCE] for k, place in enumerate(places)]
+    columns = ["time (s)", "rotation_x (deg)", "rotation_y (deg)", "rotation_z (deg)", "force_z (N)"]
+    motion = f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_back', through=[0,0,0]}}}}"
+    turns = [(b * a.inv()).as_rotvec() for a, b in pairwise(places)]
+    return motion, [Rotation.from_rotvec(turn / 2) * a for turn, a in zip(turns, places, strict=False)]
+
+
 @pytest.mark.slow
 def test_both_bodies_wear_point_by_point(assembled: Callable[..., Tribosystem]) -> None:
     """The cup's nodes lose k sum of p s of their own; the ball's material what the cup had where it was turned to.
 
-    There as means over 2 mm around its nodes, by the nodes of either mesh: an error that falls with the meshes.
+    Turns are about three axes. On the ball as means over 2 mm around its nodes, by the nodes of either mesh: an error
+    that falls with the meshes.
     """
-    errors = []
+    errors, (motion, middles) = [], about_axes()
     for across, around, overlap in ((4, 3, 2), (6, 4, 4)):
         finer = (
             f"geometry.parameters={{across={across}, around={around}, overlap_elements={overlap}, overlap_angle=25}}"
         )
-        system = assembled("ball-in-cup", *COARSE, finer, "wear.strip.coefficient=3e-10", turning([0, 20, 0]))
+        system = assembled("ball-in-cup", *COARSE, finer, "wear.strip.coefficient=3e-10", motion)
         *_, last = march(system, 1)
         end, cup, ball = last.end, system.pair, system.pair.strip
-        doses = sum(RATE * way * c.pressure[0] for c, way in zip(end.contacts, system.path, strict=True) if c)
-        np.testing.assert_allclose(end.worn.punch, doses, rtol=0, atol=1e-12 * end.worn.punch.max())
-        turned = Rotation.from_rotvec(-np.radians(10) * AXIS).apply(cup.punch.x)  # in the middle of both steps
+        doses = [RATE * way * c.pressure[0] for c, way in zip(end.contacts, system.path, strict=True) if c]
+        np.testing.assert_allclose(end.worn.punch, sum(doses), rtol=0, atol=1e-12 * end.worn.punch.max())
+        volume = 0.3 * cup.weights @ sum(doses)
+        assert ball.weights @ end.worn.strip == pytest.approx(volume, rel=1e-12)
         centres = ball.x[np.linalg.norm(ball.x[:, :2], axis=1) < 0.8 * RADIUS]
 
         def means(x: Array, weights: Array, depth: Array, centres: Array = centres) -> Array:
             near = np.exp(-((x[:, None] - centres) ** 2).sum(axis=2) / (2 * 2.0**2))
             return np.asarray((weights * depth) @ near / (weights @ near))
 
-        wanted = means(turned, cup.weights, 0.3 * end.worn.punch)
+        wanted: Array = np.zeros(len(centres))
+        for dose, middle in zip(doses, middles, strict=True):
+            wanted += means(middle.inv().apply(cup.punch.x), cup.weights, 0.3 * dose)
         errors.append(float(np.abs(means(ball.x, ball.weights, end.worn.strip) - wanted).max() / wanted.max()))
-    assert errors[1] < errors[0] / 2
-    assert errors[1] < 0.02
+    assert errors[1] < errors[0] / 2, errors
+    assert errors[1] < 0.025
 
 
 def test_bad_cups(assembled: Callable[..., Tribosystem]) -> None:

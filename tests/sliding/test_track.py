@@ -11,7 +11,7 @@ import pytest
 from fenwear import Tribosystem
 from fenwear.arrays import Array
 from fenwear.assembly import place_case
-from fenwear.case import make_case
+from fenwear.case import load_case, make_case
 from fenwear.cycle import march, steady
 from fenwear.sliding.track import _part_below
 
@@ -90,6 +90,31 @@ def test_volume_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> None
     below, above = np.abs(xs[:, 1]) < 0.3, np.abs(r - 15) < 2
     middle = np.interp(r[above], *np.array(sorted(zip(r[below], depth[below], strict=True))).T)
     np.testing.assert_allclose(depth[above], middle, rtol=0.05)
+
+
+@pytest.mark.parametrize("same_face", [0, 1])
+def test_faces_of_a_disc_have_the_wear_of_their_own_pads(same_face: int) -> None:
+    """At each node of the disc the mean along a pad's arc by its share of the circle; on one face that of both."""
+    errors = []
+    for across in (2, 4):
+        sizes = {"across": across, "along": 2 * across, "around": 12 * across, "same_face": same_face,
+                 "front_angle": 50, "back_angle": 40, "pad_layers": 1, "disc_layers": 1, "hub_elements": 1}  # fmt: skip
+        told = ", ".join(f"{key}={value}" for key, value in sizes.items())
+        more = ("wear={punch={coefficient=1e-8}, strip={coefficient=1e-9}}",
+                f"punch.loads.1.force=[0, 0, {-5000 if same_face else 5000}]")  # fmt: skip
+        placed = place_case(load_case("disc-brake-two-pads", [f"geometry.parameters={{{told}}}", *more]))
+        x, disc = placed.pair.punch.x[:, 0], placed.pair.strip.x
+        found, r = placed.pair.wear_projection @ (1 + x / 80) ** 2, np.hypot(*disc[:, :2].T)
+        exact: Array = np.zeros(len(r))
+        for degrees, side, own in ((50, 1, disc[:, 2] > -1), (40, 1 - 2 * same_face, (disc[:, 2] > -1) == same_face)):
+            half, far = np.radians(degrees / 2), side * r / 80  # the mean of (1 + far cos phi)² over the arc
+            mean = 1 + 2 * far * np.sin(half) / half + far**2 * (0.5 + np.sin(2 * half) / (4 * half))
+            exact += np.where(own, half / np.pi * mean, 0.0)
+        inside = np.abs(r - 80) < 12
+        worst = float(np.abs(found - exact)[inside].max())
+        errors.append(worst)
+    assert errors[1] < 0.01, errors
+    assert errors[1] < errors[0] / 1.8, errors
 
 
 def test_steady_state_is_the_optimum(assembled: Callable[..., Tribosystem]) -> None:

@@ -114,4 +114,5 @@ def _constant(value: float, text: str) -> Function:
 def evaluate(function: Function, state: State, shape: tuple[int, ...]) -> Array:
     """Return the values (shape) of a parsed expression; NaN and infinities are left to the caller."""
     with np.errstate(all="ignore"):
-        return np.broadcast_to(np.asarray(function(state), dtype=float), shape).copy()
+        found = np.array(function(state), dtype=float)
+    return found if found.shape == shape else np.broadcast_to(found, shape).copy()

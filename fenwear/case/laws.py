@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -109,14 +110,19 @@ class Dependence(Part):
                 raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
-        wrong = ~(np.isfinite(values) & (values >= least))
-        if wrong.any():
-            node = int(np.flatnonzero(wrong)[0])
+        if not (np.minimum.reduce(values) >= least and np.maximum.reduce(values) < np.inf):
+            node = int(np.flatnonzero(~(np.isfinite(values) & (values >= least)))[0])
             named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
             wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
             raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values * factor
+
+
+@lru_cache(maxsize=100)
+def _of_unit(unit: str, pressure_exponent: float, speed_exponent: float) -> float:
+    """Return a unit of a coefficient in the internal one of its exponents."""
+    return convert(f"1 {unit}", WearLaw.coefficient_unit(pressure_exponent, speed_exponent))
 
 
 def _form(value: object) -> str:
@@ -384,7 +390,7 @@ class WearLaw(Part):
     def scale(self) -> float:
         """What turns values of a dependent coefficient into its internal unit."""
         if isinstance(self.coefficient, Dependence) and self.coefficient.unit:
-            return convert(f"1 {self.coefficient.unit}", self.unit)
+            return _of_unit(self.coefficient.unit, *self._exponents)
         return 1.0
 
     def resolved(self, data: dict[str, Any]) -> dict[str, Any]:

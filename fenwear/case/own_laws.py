@@ -7,6 +7,7 @@ there and of the states themselves. What becomes of them is decided in `fenwear.
 
 from __future__ import annotations
 
+import math
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -203,7 +204,7 @@ def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now
         found = _called(f"the state {name!r}", function, of, now, shape)
     except ValueError as error:
         raise CaseError(InputError(f"state {name!r}", str(error))) from error
-    if not np.isfinite(found).all():
+    if not math.isfinite(float(found @ found)) and not np.isfinite(found).all():  # a square may be beyond all numbers
         node = int(np.flatnonzero(~np.isfinite(found))[0])
         at = ", ".join(f"{one} = {np.broadcast_to(now[one], shape)[node]:g}" for one in of)
         raise CaseError(InputError(f"state {name!r}", f"expected finite numbers, got {found[node]:g} at {at}"))
@@ -211,7 +212,7 @@ def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now
 
 
 def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
-    given = {key: np.array(np.broadcast_to(now[key], shape) if now[key].shape != shape else now[key]) for key in of}
+    given = {key: now[key].copy() if now[key].shape == shape else np.full(shape, now[key]) for key in of}
     try:
         found = np.asarray(function(given))
         if np.iscomplexobj(found):

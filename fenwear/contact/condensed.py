@@ -25,7 +25,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Operator, Phases, Shifted, Solve
+from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
 from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread import DistributedBlock, OwnRows, SpreadCompliance
 from fenwear.contact.spread_nodes import SpreadNodes
@@ -48,6 +48,7 @@ PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
+NUDGE = 1e-6  # of the largest pressure, for differences
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
 EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
@@ -180,6 +181,10 @@ class CondensedContact:
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
         self.follows = False
+        self._mu: Callable[[Array], Array] | None = None  # of friction that follows the pressure
+        self._by_mu: Array = np.zeros(
+            (0, 0)
+        )  # what unit pressures add by the traction of a unit of it (size, n), scaled
         self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
         self._elastic: Operator | None = None
         self._operator: Operator | None = None
@@ -237,6 +242,7 @@ class CondensedContact:
 
     def take(self, ratios: Sequence[Array]) -> None:
         """Set tau of each phase on this rank."""
+        self._mu = None
         pairs = enumerate(zip(ratios, self._ratios, strict=True))
         changed = [k for k, (ratio, before) in pairs if ratio is not before and not np.array_equal(ratio, before)]
         self._ratios = list(ratios)
@@ -244,9 +250,53 @@ class CondensedContact:
             self._slide(changed)
             self._elastic = self._operator = None
 
+    @property
+    def can_follow(self) -> bool:
+        """Whether friction may follow the pressure: of one phase of few nodes."""
+        return not self._many and len(self.phases) == 1
+
+    def follow(self, mu: Callable[[Array], Array], bare: Array, along: Array) -> None:
+        """Take friction that follows the pressure, tau = bare + mu(p) along, until `slide` is called again.
+
+        Pressure and friction are found together, by one Newton's method: tau p has the slope bare + (mu + p mu') along.
+
+        Args:
+            mu: By the pressure (n,), MPa.
+            bare: What of tau is there without mu (n, d).
+            along: Tau of a unit of mu (n, d).
+        """
+        n = self.shape[1]
+        if not self._by_mu.size:
+            self.take([bare + along])
+            whole = self._dense[0, :, :n].copy()
+            self.take([bare])
+            self._by_mu = whole - self._dense[0, :, :n]
+        elif self._ratios[0] is not bare:
+            self.take([bare])
+        self._mu = mu
+
+    def _following(self, x: Array) -> Operator:
+        """Return the derivative with friction that follows the pressure, as `_jacobian`."""
+        n = self.shape[1]
+        assert self._mu is not None
+        pressure = np.maximum(x[:n], 0.0) * self._pressure_scale
+        mu, nudge = self._mu(pressure), NUDGE * max(float(pressure.max()), self._pressure_scale)
+        slope = (self._mu(pressure + nudge) - mu) / nudge
+        matrix = self._dense[0].copy()
+        matrix[:, :n] += self._by_mu * (mu + pressure * slope)
+        if self._wearing is None:
+            return Dense(matrix)
+        added, layer = self._wearing.local(pressure[None]), self._wearing.layer(pressure[None])
+        assert added is not None
+        scale = self._pressure_scale / self._gap_scale
+        return Shifted(matrix, scale * (added[0] if layer is None else added[0] + layer[0]))
+
     def _residual(self, x: Array) -> Array:
         f = self._linear.multiply(x)
         f += self._offset.ravel()
+        if self._mu is not None:
+            own = x[: self.shape[1]]
+            f += self._by_mu @ (self._mu(np.maximum(own, 0.0) * self._pressure_scale) * own)
         if self._wearing is not None:
             m, n = self.shape
             pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
@@ -304,6 +354,8 @@ class CondensedContact:
         return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
+        if self._mu is not None:
+            return self._following(x)
         if self._wearing is None:
             return self._linear
         m, n = self.shape
@@ -378,7 +430,9 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing
-        self.inequality.curved = wearing is not None and (wearing.curved or (self.follows and not self._gridded))
+        self.inequality.curved = self._mu is not None or (
+            wearing is not None and (wearing.curved or (self.follows and not self._gridded))
+        )
         x, f, iterations = self._solve(start)
         if self._gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution, LayerStep
 from fenwear.layers.memory import Held
 from fenwear.sliding.cross_shear import CycleShear
+from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -64,7 +65,14 @@ class PhaseStep:
         self._passing = system.passing(wear, [phase])
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
         # Explicitly, wear and what remembers follow the pressure, and do not change it.
-        self._wears_after = not self._constant and not implicit and system.friction.constant
+        friction = system.friction
+        apart = not self._constant and not implicit and not friction.remembers and not friction.asks("edge")
+        self._wears_after = apart and friction.constant
+        self._slides_before = apart and not friction.constant and not friction.asks("p", "pm")
+        condensed = isinstance(self._contact, CondensedContact) and self._contact.can_follow
+        self._follows = apart and exchange is None and friction.asks("p", "pm") and condensed
+        self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
+        self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
         self._known: list[ContactState] = []  # of the last cycles, the last one first
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
@@ -105,13 +113,27 @@ class PhaseStep:
             self._remember(before, end[0])
             return self._end(*end, before, self._passing, worn)
 
-        if self._wears_after:
+        touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
+        if self._slides_before:  # friction is that of the state at the start
+            mean = None if start is None else start.pressure[0]
+            self._update(mean, temperature, worn, half_cycles, cycle, touching=touching)
+        if self._wears_after or self._slides_before:
             contact, after, heat = self._solve(temperature, gap, start, self._passing, worn)
             passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
             self._remember(before, contact)
             return self._end(contact, after, heat, before, passing, worn)
 
-        touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
+        if self._follows:
+            near = None if start is None else start.pressure[0]
+            conditions = self.system.conditions(self.phase, near, None, worn, half_cycles, cycle, touching)
+            try:
+                contact = self._following(conditions, gap, start, worn)
+            except ConvergenceError:  # in turn they may come together yet
+                pass
+            else:
+                passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
+                self._remember(before, contact)
+                return self._end(contact, None, None, before, passing, worn)
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
@@ -135,9 +157,24 @@ class PhaseStep:
         self._remember(before, contact)
         return self._end(contact, after, heat, before, passing, worn)
 
+    def _following(
+        self, conditions: ContactConditions, gap: Array, start: ContactState | None, worn: WornDepths
+    ) -> ContactState:
+        """Return the contact whose friction follows its pressure, at conditions of all else.
+
+        Raises:
+            ConvergenceError: Newton's method does not find both together.
+        """
+        assert isinstance(self._contact, CondensedContact)
+        mu = self.system.friction.by_pressure(conditions)
+        self._contact.follow(mu, self._bare, self._along)
+        solve = self._capped if self._contact.most < np.inf else partial(self._flowing, self._contact)
+        contact, _, _ = solve(None, gap, start, self._passing, worn)
+        return contact
+
     def _remember(self, before: ContactState | None, contact: ContactState) -> None:
         """Keep the contacts of the last cycles, where the next one is extrapolated from them."""
-        if self.system.layers.closure is not None:
+        if self._follows or self.system.layers.closure is not None:
             follows = before is not None and bool(self._known) and before is self._known[0]
             self._known = [contact, *self._known[: len(ONWARDS) - 1]] if follows else [contact]
 
@@ -150,11 +187,11 @@ class PhaseStep:
         if before is None or len(known) < 2 or before is not known[0]:
             return before
         hardness, shares = self.system.layers.hardness, ONWARDS[len(known) - 1]
-        further = np.tensordot(shares, [one.pressure for one in known], 1)
+        further = sum((share * one.pressure for share, one in zip(shares, known, strict=True)), np.zeros(()))
         kept = (before.pressure > 0) & (further > 0)
         if hardness < np.inf:
             kept &= (before.pressure < hardness) & (further < hardness)
-        rigid = np.asarray(np.tensordot(shares, [one.rigid for one in known], 1), dtype=np.float64)
+        rigid = sum((share * one.rigid for share, one in zip(shares, known, strict=True)), np.zeros(()))
         return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(
@@ -182,15 +219,21 @@ class PhaseStep:
         end: Held | None = None
         if evolution is not None:  # coefficients are those of the states in the middle of the phase
             (conditions,), end, _ = evolution.through(system.layers.held(worn))
-        if not system.friction.constant and isinstance(self._contact, CondensedContact):
+        # Once the phase has ended its friction is known, but for one that has followed the pressure.
+        changes = not system.friction.constant and (self._follows or not ended)
+        if changes and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)
-            self._friction_ratio = system.phase_friction(self.phase, mu)
-            self._contact.slide([self._friction_ratio])
-            if self._thermal is not None:
-                self._thermal.slide(heating_friction(system, mu, self.phase))
+            self._friction_ratio = self._bare + mu[:, None] * self._along
+            if not ended:
+                self._contact.slide([self._friction_ratio])
+                if self._thermal is not None:
+                    self._thermal.slide(heating_friction(system, mu, self.phase))
         wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
+        ends = end if ended else None
+        if not system.layers.varies:
+            return LayerEvolution(system.layers, wear, self._passing.debris, evolution, ends)
         passing = system.passing(wear, [self.phase], evolution, [conditions])
-        return replace(passing, ended=end) if ended else passing
+        return replace(passing, ended=ends) if ended else passing
 
     @cached_property
     def _uncapped(self) -> ContactSolver:

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,7 +94,6 @@ class PhaseMeter:
 
     def __init__(self, system: ContactSetup, phase: int, mu: Array, wear: PhasesWear) -> None:
         pair, slid = system.pairs[phase], system.sliding_ratio[phase]
-        self._system, self._phase = system, phase
         self._areas = system.bodies.punch.thickness * pair.weights
         self._path = system.motion.phases[phase].distance * slid
         positions, phases = system.motion.positions, system.motion.phases
@@ -111,24 +109,36 @@ class PhaseMeter:
             np.array([self._areas, unknown if density is None else MILLIGRAM * density * self._areas])
             for density in opposite_densities(system, phase)
         ]
+        normal, none = pair.normal, np.zeros(len(slid))
+        self._bare = system.friction_in_space(phase, none)
+        self._along = system.friction_in_space(phase, none + 1) - self._bare  # of a unit of mu
+        bare, along = (in_model(one, normal.shape[1]) for one in (self._bare, self._along))
+        self._carried = self._areas * np.einsum("id,id->i", normal + bare, self._approach)
+        self._dragged = self._areas * np.einsum("id,id->i", along, self._approach)
         self._take(mu, wear)
 
     def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
         """Return the same at other coefficients."""
-        found = copy(self)
-        found._take(mu, wear)
+        found = object.__new__(PhaseMeter)
+        found.__dict__.update(self.__dict__)
+        if mu is self._mu:
+            found._rows = self._rows.copy()
+            found._wear(wear)
+        else:
+            found._take(mu, wear)
         return found
 
     def _take(self, mu: Array, wear: PhasesWear) -> None:
-        system, areas = self._system, self._areas
-        self._energy = mu * self._path
+        areas = self._areas
+        self._mu, self._energy = mu, mu * self._path
         self._rows = np.zeros((len(SUMS), len(areas)))
         self._rows[LOAD_PATH] = areas * self._path
         self._rows[WORK] = areas * self._energy
-        friction, normal = system.friction_in_space(self._phase, mu), system.pairs[self._phase].normal
-        traction = normal + in_model(friction, normal.shape[1])
-        self._load = areas * np.einsum("id,id->i", traction, self._approach)
-        self._drag = areas[:, None] * friction
+        self._load = self._carried + mu * self._dragged
+        self._drag = areas[:, None] * (self._bare + mu[:, None] * self._along)
+        self._wear(wear)
+
+    def _wear(self, wear: PhasesWear) -> None:
         self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
         for first, own, weigh in zip(VOLUMES, (wear.punch, wear.strip), self._weigh, strict=True):
             if own is None:

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -128,9 +129,8 @@ class DebrisCycle:
             thickness: At its start (n,), mm.
             worn: Depth worn off both bodies in each phase (m, n), mm.
         """
-        lost = -np.expm1(-self.loss) * thickness
-        stays = self.share * self.kept
-        return (stays * worn).sum(axis=0) - lost, ((1 - stays) * worn).sum(axis=0) + lost
+        lost = self._lost * thickness
+        return (self._stays * worn).sum(axis=0) - lost, (self._leaves * worn).sum(axis=0) + lost
 
     def rate(self, thickness: Array, worn: Array, cycles: float) -> tuple[Array, Array]:
         """Return the same for each cycle of an implicit step of so many; with none its rate at the start."""
@@ -142,8 +142,23 @@ class DebrisCycle:
         """Return how much thicker a step ends by what its phases wear in a cycle (m, n); None for one cycle."""
         return self.share * self.kept if cycles is None else cycles * self.fed / (1 + cycles * self.loss)
 
-    @property
+    @cached_property
+    def _lost(self) -> Array:
+        """1 - E (n,)."""
+        return -np.expm1(-self.loss)
+
+    @cached_property
+    def _stays(self) -> Array:
+        """What is left at the end of a unit worn in each phase (m, n)."""
+        return self.share * self.kept
+
+    @cached_property
+    def _leaves(self) -> Array:
+        """What is ejected by then."""
+        return 1 - self._stays
+
+    @cached_property
     def fed(self) -> Array:
         """X G / (1 - E) of a unit worn in each phase (m, n)."""
-        lost = -np.expm1(-self.loss)
-        return self.share * self.kept * np.divide(self.loss, lost, out=np.ones_like(lost), where=lost > 0)
+        lost = self._lost
+        return self._stays * np.divide(self.loss, lost, out=np.ones_like(lost), where=lost > 0)

@@ -113,11 +113,16 @@ class Memory:
 
     def bounded(self, held: Held) -> Held:
         """Return states within their bounds."""
-        found = [
-            np.array([np.clip(row, one.least, one.most) for row, one in zip(rows, states.values(), strict=True)])
-            for rows, states in ((held.contact, self.contact), (held.strip, self.strip))
-        ]
-        return Held(found[0].reshape(held.contact.shape), found[1].reshape(held.strip.shape))
+        least, most = self._bounds
+        contact = np.minimum(np.maximum(held.contact, least.contact), most.contact)
+        return Held(contact, np.minimum(np.maximum(held.strip, least.strip), most.strip))
+
+    @cached_property
+    def _bounds(self) -> tuple[Held, Held]:
+        """The least and the most of all states (q, 1) and (q_s, 1)."""
+        both = self.contact.values(), self.strip.values()
+        least = Held(*(np.array([one.least for one in own], dtype=float)[:, None] for own in both))
+        return least, Held(*(np.array([one.most for one in own], dtype=float)[:, None] for own in both))
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,7 @@ class Held:
         return Held(self.contact + other.contact, self.strip + other.strip)
 
     def __sub__(self, other: Held) -> Held:
-        return self + other.times(-1.0)
+        return Held(self.contact - other.contact, self.strip - other.strip)
 
     def times(self, factor: float) -> Held:
         """Return all of it times a factor."""
@@ -187,8 +192,9 @@ def _phi(z: Array) -> Array:
     """Return (e^z - 1) / z of matrices (n, q, q)."""
     n, q, _ = z.shape
     if q <= 1:
-        safe = np.where(z == 0, 1.0, z)
-        return np.where(z == 0, 1.0, np.expm1(safe) / safe)
+        still = z == 0
+        safe = z + still
+        return np.expm1(safe) / safe if not still.any() else np.where(still, 1.0, np.expm1(safe) / safe)
     block = np.zeros((n, 2 * q, 2 * q))
     block[:, :q, :q], block[:, :q, q:] = z, np.eye(q)
     return np.asarray(scipy.linalg.expm(block)[:, :q, q:])
@@ -245,13 +251,12 @@ class Evolution:
             CaseError: a rate fails, or is not finite.
             ConvergenceError: a state changes too fast within a phase.
         """
-        q, held, middles = len(self.memory.contact), start, []
-        slopes = _Slopes(*(np.zeros((rows.shape[1], len(rows), len(rows))) for rows in (start.contact, start.strip)))
+        q, held, middles, slopes = len(self.memory.contact), start, [], None
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
             begin = held.at_contact(pair)
             middle, end, z = self._over(begin, float(tau), self._under(k))
             middles.append(replace(self.conditions[k], states=self.memory.known(middle)))
-            strip, z_strip = held.strip, np.zeros_like(slopes.strip)
+            strip, z_strip = held.strip, np.zeros((held.strip.shape[1], len(held.strip), len(held.strip)))
             if len(strip):
                 onto = pair.wear_projection
                 left = 1 - onto @ np.ones(len(pair.weights))
@@ -261,7 +266,9 @@ class Evolution:
                 z_strip = under + left[:, None, None] * z_free
             held = Held(end[:q], strip)
             held = held if k == len(self.pairs) - 1 else self.memory.bounded(held)
-            slopes += _Slopes(z[:, :q, :q], z_strip)
+            own = _Slopes(z[:, :q, :q], z_strip)
+            slopes = own if slopes is None else slopes + own
+        assert slopes is not None
         return middles, held, slopes
 
     def after(self, start: Held) -> Held:
@@ -388,16 +395,20 @@ class Evolution:
         """Return states (Q, n) in the middle and at the end of a time, and the integral of J over it (n, Q, Q)."""
         first = rates(start)
         slope = rates.slope(start, first, tau)
-        end = start + _increment(first, slope, tau)
+        end = start + _increment(first, _phi(tau * slope), tau)
         for halving in range(1, HALVINGS + 1):
             parts = 2**halving
             dt, now, rate, own = tau / parts, start, first, slope
-            z, middle = np.zeros_like(slope), start
+            growth = _phi(dt * own)
+            z, middle = dt * own, start
             for part in range(parts):
                 if part:
                     rate = rates(now)
-                    own = slope if parts == 2 else rates.slope(now, rate, dt)  # the same where r is linear
-                now, z = now + _increment(rate, own, dt), z + dt * own
+                    if parts > 2:  # else the same, which it is where r is linear
+                        own = rates.slope(now, rate, dt)
+                        growth = _phi(dt * own)
+                    z = z + dt * own
+                now = now + _increment(rate, growth, dt)
                 if 2 * (part + 1) == parts:
                     middle = now
             missing, end = now - end, now
@@ -423,7 +434,7 @@ class _Rates:
         """Return the rates (Q, n) at states (Q, n)."""
         pairs = zip(self.states, self.known(values), strict=True)
         rows = [evaluate_of_state(name, one.rate, {*one.of, name}, now, values.shape[1:]) for (name, one), now in pairs]
-        return np.array(rows).reshape(values.shape)
+        return rows[0][None] if len(rows) == 1 else np.array(rows).reshape(values.shape)
 
     def slope(self, values: Array, rate: Array, tau: float) -> Array:
         """Return J (n, Q, Q): as given, else by differences that are small against what states change by in a time."""
@@ -431,14 +442,18 @@ class _Rates:
         found = np.zeros((n, q, q))
         for j, (other, state) in enumerate(self.states):
             asked = [i for i, (name, one) in enumerate(self.states) if _feels(name, one, other)]
-            size = NUDGE * (np.abs(values[j]) + np.abs(tau * rate[j]))
-            size = np.where(size > 0, size, size.max(initial=0.0))
-            if not asked or not size.any():
+            size = NUDGE * (np.abs(values[j]) + tau * np.abs(rate[j]))
+            largest = size.max(initial=0.0)
+            if not asked or largest == 0:
                 continue
+            size = np.where(size > 0, size, largest)
+            if state.most < np.inf:
+                size = np.where(values[j] + size > state.most, -size, size)
             moved = values.copy()
-            moved[j] += np.where(values[j] + size > state.most, -size, size)
+            moved[j] += size
             change = (self(moved) - rate) / (moved[j] - values[j])
-            found[:, asked, j] = change[asked].T
+            for i in asked:
+                found[:, i, j] = change[i]
         if any(state.slope is not None for _, state in self.states):
             for i, ((name, state), now) in enumerate(zip(self.states, self.known(values), strict=True)):
                 if state.slope is not None:
@@ -451,5 +466,8 @@ def _feels(name: str, state: State, other: str) -> bool:
     return other in state.of or WEAR in state.of or (other == name and state.slope is None)
 
 
-def _increment(rate: Array, slope: Array, tau: float) -> Array:
-    return tau * np.einsum("nab,bn->an", _phi(tau * slope), rate)
+def _increment(rate: Array, growth: Array, tau: float) -> Array:
+    """Return what states change by in a time, by their rates (Q, n) and phi of tau J (n, Q, Q)."""
+    if len(rate) == 1:
+        return np.asarray((tau * growth[:, 0, 0]) * rate)
+    return np.asarray(tau * np.einsum("nab,bn->an", growth, rate))

@@ -8,7 +8,7 @@ the contact sees the part in the plane only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Self
@@ -72,12 +72,14 @@ class ContactConditions:
 
     def of(self, body: Literal["punch", "strip", "mean"]) -> Mapping[str, Array]:
         """Return the variables of laws, of a body; or of the punch, with the mean temperature of both."""
+        if (known := self._known.get(body)) is not None:
+            return known
         punch, strip = self.temperatures
-        temperature = {"punch": punch, "strip": strip, "mean": (punch + strip) / 2}[body]
         own = 1 if body == "strip" else 0
         x, y, z = self.places[own].T
-        return {
-            "T": temperature,
+        none = np.zeros(self.shape)
+        found = self._known[body] = {
+            "T": (punch + strip) / 2 if body == "mean" else self.temperatures[own],
             "p": self.pressure,
             "v": np.asarray(self.speed),
             "x": x,
@@ -85,13 +87,24 @@ class ContactConditions:
             "z": z,
             "depth": self.depths[own],
             "s": self.slid,
-            "debris": np.zeros(self.shape) if self.debris is None else self.debris,
-            "edge": np.zeros(self.shape) if self.edge is None else self.edge,
-            "cs": np.zeros(self.shape) if self.cycle is None else self.cycle.ratio[own],
+            "debris": none if self.debris is None else self.debris,
+            "edge": none if self.edge is None else self.edge,
+            "cs": none if self.cycle is None else self.cycle.ratio[own],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
             **{f"region {name}": share for name, share in self.regions[own].items()},
             **self.states[own],
         }
+        return found
+
+    @cached_property
+    def _known(self) -> dict[str, Mapping[str, Array]]:
+        """What has been asked for by body."""
+        return {}
+
+    @cached_property
+    def derived(self) -> dict[str, Array]:
+        """What laws have made of it once, by name."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -119,6 +132,30 @@ class Friction:
         """Whether the share of the load that asperities carry changes with more than the place."""
         return self.contact.lubrication is not None and self.contact.lubrication.varies
 
+    def asks(self, *names: str) -> bool:
+        """Return whether mu depends on one of these variables of coefficients."""
+        lubrication = self.contact.lubrication
+        given = (self.contact.friction, None if lubrication is None else lubrication.given[1])
+        return any(isinstance(one, Dependence) and any(map(one.depends_on, names)) for one in given)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether mu is a law that has states of its own."""
+        return isinstance(self.contact.friction, Dependence) and bool(self.contact.friction.states)
+
+    def by_pressure(self, conditions: ContactConditions) -> Callable[[Array], Array]:
+        """Return mu (n,) by the pressure (n,), as `values`, where all else is as in these conditions."""
+        state, with_cycle, lubrication = dict(conditions.of("mean")), conditions.cycle is None, self.contact.lubrication
+
+        def values(pressure: Array) -> Array:
+            state["p"] = pressure
+            if with_cycle:
+                state["pm"] = pressure
+            share = 1.0 if lubrication is None else asperity_share(lubrication, state, conditions.shape)
+            return self._values(state, conditions, share)
+
+        return values
+
     def share(self, conditions: ContactConditions) -> Array | float:
         """Return the share of the pressure that asperities carry (n,); 1 without lubrication.
 
@@ -126,7 +163,18 @@ class Friction:
             CaseError: it is not between 0 and 1.
         """
         lubrication = self.contact.lubrication
-        return 1.0 if lubrication is None else asperity_share(lubrication, conditions.of("mean"), conditions.shape)
+        if lubrication is None:
+            return 1.0
+        if "share" not in conditions.derived:
+            conditions.derived["share"] = asperity_share(lubrication, conditions.of("mean"), conditions.shape)
+        return conditions.derived["share"]
+
+    def _values(self, state: Mapping[str, Array], conditions: ContactConditions, share: Array | float) -> Array:
+        """Return mu at the nodes (n,) by the variables of laws, a share, and of conditions what coatings are left."""
+        found, lubrication = self._of_asperities(state, conditions), self.contact.lubrication
+        if lubrication is None:
+            return found
+        return np.asarray(lubrication.fluid_friction + share * (found - lubrication.fluid_friction))
 
     def values(self, conditions: ContactConditions) -> Array:
         """Return mu at the nodes (n,): of asperities and fluid by what they carry.
@@ -134,10 +182,7 @@ class Friction:
         Raises:
             CaseError: it is negative or not finite.
         """
-        found, lubrication = self.of_asperities(conditions), self.contact.lubrication
-        if lubrication is None:
-            return found
-        return np.asarray(lubrication.fluid_friction + self.share(conditions) * (found - lubrication.fluid_friction))
+        return self._values(conditions.of("mean"), conditions, self.share(conditions))
 
     def of_asperities(self, conditions: ContactConditions) -> Array:
         """Return mu of what touches at the nodes (n,).
@@ -145,9 +190,12 @@ class Friction:
         Raises:
             CaseError: it is negative or not finite.
         """
+        return self._of_asperities(conditions.of("mean"), conditions)
+
+    def _of_asperities(self, state: Mapping[str, Array], conditions: ContactConditions) -> Array:
         mu = self.contact.friction
         if isinstance(mu, Dependence):
-            found = mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
+            found = mu.values(state, conditions.shape, 1.0, "contact.friction")
         else:
             found = np.full(conditions.shape, float(mu))
         for of_coating, share in zip(reversed(self.of_coatings), reversed(conditions.covered), strict=True):

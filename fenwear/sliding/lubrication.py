@@ -40,7 +40,7 @@ def asperity_share(lubrication: Lubrication, state: Mapping[str, Array], shape: 
         found = value.values(state, shape, value.scale("mm") if of_film else 1.0, key, 1e-300 if of_film else 0.0)
     if name == "film":
         return np.asarray(np.interp(found / (lubrication.roughness or 1.0), *np.array(lubrication.share_over_lambda).T))
-    if found.max(initial=0.0) > 1:
+    if np.maximum.reduce(found) > 1:
         at = int(found.argmax())
         told = ", ".join(f"{one} = {np.broadcast_to(state[one], shape)[at]:g}" for one in ("p", "v", "T"))
         raise CaseError(InputError(key, f"expected at most 1, got {found[at]:g} at {told}"))

@@ -381,6 +381,12 @@ class Wear:
         """Whether no coefficient depends on more than the place."""
         return stays((self.punch, self.strip), self.friction)
 
+    @cached_property
+    def _of_pressure(self) -> dict[str, PressureLaw]:
+        """What of a pressure wears each body, by its key."""
+        laws = {"wear.punch": self.punch, "wear.strip": self.strip}
+        return {key: PressureLaw.of(law) for key, law in laws.items() if law is not None}
+
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
 
@@ -401,11 +407,12 @@ class Wear:
 
             def rates(law: WearLaw, sliding: Array = sliding, key: str = key) -> Array:
                 numbered = zip(chosen, conditions, strict=True)
-                return np.array([sliding[k] * coefficient(law, self.friction, state, key) for k, state in numbered])
+                found = [sliding[k] * coefficient(law, self.friction, state, key) for k, state in numbered]
+                return found[0][None] if len(found) == 1 else np.array(found)
 
             above = law.of_coating
             coating = None if above is None or thickness is None else _CoatingWear(rates(above), thickness)
-            bodies.append(_BodyWear(rates(law), PressureLaw.of(law), coating))
+            bodies.append(_BodyWear(rates(law), self._of_pressure[key], coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 

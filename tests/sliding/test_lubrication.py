@@ -34,6 +34,24 @@ def test_a_curve_of_stribeck_in_the_rigid_limit(speed: float, share: float, asse
         assert mu == pytest.approx(share * 0.2 + (1 - share) * 0.01, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    "between", ["", "contact.hardness='45 MPa'", "contact.layer={kind='power', reference='1 um', pressure='9 MPa'}"]
+)
+def test_friction_that_follows_the_pressure_is_that_of_the_pressure(between: str, assembled: Assemble) -> None:
+    """Found together, they are a contact by itself whose friction is given: that of these pressures, node by node."""
+    film = "contact.lubrication={asperity_share={expression='0.2 + 0.8 * exp(-p / 30)'}, fluid_friction=0.01}"
+    given = ("contact.friction=0.6", "wear.punch.coefficient='1e-8 1/MPa'", film, *([between] if between else []))
+    system = assembled("example1", *SMALL, *given)
+    (*_, two), phase = march(system, 2), 0
+    *_, three = march(system, 3, start=two.end)
+    before, found = two.end.worn, three.end.contacts[phase].pressure[0]
+    apart = system.passed_contact(phase)
+    apart.slide([system.phase_friction(phase, system.friction.values(system.conditions(phase, found)))])
+    step = system.passing(system.phases_wear.some([phase]), [phase]).step(before, implicit=False, capped=True)
+    alone = apart.solve(system.gap(phase, before, passing=True), None, step).pressure[0]
+    np.testing.assert_allclose(found, alone, rtol=0, atol=1e-9 * alone.max())
+
+
 def test_with_stick_jumps_fall_to_the_march() -> None:
     """A share by the pressure, in partial slip, at every place."""
     film = "contact.lubrication={asperity_share={expression='min(1, 0.3 + p / 2000)'}, fluid_friction=0.6}"

@@ -249,6 +249,9 @@ class PhaseStep:
         worn: WornDepths,
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
         contact = self._contact
+        if self.system.layers.hardness == np.inf:
+            wearing = passing.step(worn, implicit=self.implicit)
+            return self._pressed(contact, self._thermal, temperature, gap, start, wearing)
         if isinstance(contact, CondensedContact) and contact.most < np.inf:
             try:
                 return self._capped(temperature, gap, start, passing, worn)

@@ -170,7 +170,8 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
         totals: What is added otherwise.
         lost: Depths worn meanwhile.
     """
-    if all(one is None for one in system.coatings):
+    punch, strip = system.coatings
+    if punch is None and strip is None:
         return totals
     sums = totals.sums.copy()
     rows = zip(

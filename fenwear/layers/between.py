@@ -111,6 +111,10 @@ class Layers:
         """Whether something gives way by a law that is not linear."""
         return self.closure is not None or self.hardness < np.inf
 
+    def gives_way(self, *, capped: bool) -> bool:
+        """Return whether something gives way by a law that is not linear, apart from what `capped` pressures flow."""
+        return self.softens or (self.closure is not None if capped else self.curved)
+
     @property
     def softens(self) -> bool:
         """Whether a coating gives way beside its base."""

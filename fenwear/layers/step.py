@@ -132,8 +132,8 @@ class LayerEvolution:
             implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
             capped: Whether the contact itself lets no pressure beyond the hardness.
         """
-        step = LayerStep(self, before, cycles, implicit, capped)
-        return step if implicit or step.curved else None
+        gives_way = implicit or self.layers.gives_way(capped=capped)
+        return LayerStep(self, before, cycles, implicit, capped) if gives_way else None
 
 
 @dataclass(frozen=True)
@@ -245,8 +245,7 @@ class LayerStep:
     @property
     def curved(self) -> bool:
         """Whether something gives way by a law that is not linear."""
-        layers = self.passing.layers
-        return layers.softens or (layers.closure is not None if self.capped else layers.curved)
+        return self.passing.layers.gives_way(capped=self.capped)
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""

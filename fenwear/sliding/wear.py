@@ -164,7 +164,7 @@ class PhasesWear:
         punch, strip = (None if body is None else _some(body, chosen) for body in (self.punch, self.strip))
         return PhasesWear(punch, strip, [self.pairs[k] for k in chosen])
 
-    @property
+    @cached_property
     def coated(self) -> bool:
         """Whether a body has a coating."""
         return any(body is not None and body.coating is not None for body in (self.punch, self.strip))

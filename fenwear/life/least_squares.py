@@ -30,6 +30,7 @@ NO_INFLUENCE = 1e-9  # relative change of all predictions over the relative chan
 KEPT = 16  # predictions
 REFUSED = 1e3  # times what was measured: the prediction of values that the model refuses
 MOST_TRIALS = 100
+SETTLED = 1e-5  # change of the unknowns over themselves that ends a fit: Newton's next one would be its square
 BASELINES = ("offset", "tilt")
 
 Vector: TypeAlias = Sequence[float] | Array
@@ -62,6 +63,7 @@ class LeastSquares:
         self._check(unknowns)
         self.predict = Predictor(self.model, data)
         self._known: dict[bytes, Array] = {}  # predictions of fitted unknowns, on the jumps kept
+        self._derivatives: dict[bytes, Array] = {}  # of predictions at the last of them, on every rank
         self.observed = np.concatenate([series.values for series in self.series])
         self.has_sigma = self.series[0].sigma is not None
         self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
@@ -125,6 +127,7 @@ class LeastSquares:
         """Do so on this rank."""
         self.predict.keep_jumps(self.values(z))
         self._known.clear()
+        self._derivatives.clear()
 
     def values(self, z: Vector) -> dict[str, float]:
         """Return the keys' values of fitted unknowns."""
@@ -154,6 +157,9 @@ class LeastSquares:
 
     def shared_jacobian(self, base: Array) -> Array:
         """Return the same, one column on each rank; collective."""
+        key = base.tobytes()
+        if key in self._derivatives:
+            return self._derivatives[key]
 
         def shifted(k: int) -> Array:
             ends = []
@@ -163,7 +169,9 @@ class LeastSquares:
                 ends.append(self.predicted(moved))
             return np.asarray((ends[1] - ends[0]) / (2 * STEP))
 
-        return np.array(share(self.comm, len(base), shifted), dtype=float).T
+        found = np.array(share(self.comm, len(base), shifted), dtype=float).T
+        self._derivatives = {key: found}
+        return found
 
     def check_influence(self, jacobian: Array, z: Vector) -> None:
         """Check that every unknown changes some prediction.
@@ -214,7 +222,7 @@ class LeastSquares:
         minimizer = self.minimizer(observed, start)
         minimizer.max_nfev = MOST_TRIALS
         with warnings.catch_warnings(action="ignore"):  # a singular covariance is told in our words
-            return minimizer.minimize(method="least_squares", jac=derivative, x_scale="jac")
+            return minimizer.minimize(method="least_squares", jac=derivative, x_scale="jac", xtol=SETTLED)
 
     def minimizer(self, observed: Array | None = None, start: Vector | None = None) -> lmfit.Minimizer:
         """Return lmfit's minimizer of the weighted residuals; arguments as of `fit`."""

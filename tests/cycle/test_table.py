@@ -78,6 +78,35 @@ def test_what_a_cycle_wears_is_of_the_coating_while_it_lasts(assembled: Callable
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
 
 
+def test_a_ring_wears_both_sides_of_its_groove(assembled: Callable[..., Tribosystem]) -> None:
+    """Worn in, p r is the same all over the side it is pressed on; each wears by its own load and way, both bodies.
+
+    Axisymmetric: p = F / (2 pi (r2 - r1) r), and a cycle wears k F theta / (2 pi (r2 - r1)) off, whatever r is.
+    """
+    system = assembled("ring-in-groove", "geometry.parameters.across=4")
+    pair = system.pair
+    *_, earlier = jump(system, 2_000_000, tolerance=1e-2)
+    *_, last = jump(system, 2_001_000, tolerance=1e-2, start=earlier.end)
+    grown, r = last.end.worn - earlier.end.worn, pair.punch.x[:, 0]
+    sides = [pair.punch.nodes_of(name) for name in ("lower", "upper")]
+    for phase, contact in enumerate(last.end.contacts):
+        assert contact is not None
+        own, force = ((1, 500.0), (0, 150.0), (0, 800.0))[min(phase, 5 - phase)]  # first and last, and so on
+        assert (contact.pressure[0][sides[1 - own]] == 0).all()
+        assert pair.weights @ contact.pressure[0] == pytest.approx(force, rel=1e-9)
+        if force != 150.0:  # while it changes sides, where it does not slide
+            exact = force / (2 * np.pi * 7 * r[sides[own]])
+            np.testing.assert_allclose(contact.pressure[0][sides[own]], exact, rtol=1e-5)
+    for own, force, turn in ((0, 800.0, 4 * np.pi / 3), (1, 500.0, 2 * np.pi / 3)):
+        exact = force * turn / (2 * np.pi * 7)
+        np.testing.assert_allclose(grown.punch[sides[own]] / 1000, 5e-9 * exact, rtol=1e-5)
+        off_groove = (pair.wear_interpolation @ grown.strip)[sides[own]]
+        np.testing.assert_allclose(off_groove / 1000, 1e-9 * exact, rtol=1e-5)
+    worn, totals = last.end.worn, last.end.totals
+    assert pair.weights @ worn.punch == pytest.approx(float(totals.of("volume_punch")), rel=1e-9)
+    assert pair.strip.weights @ worn.strip == pytest.approx(float(totals.of("volume_strip")), rel=1e-9)
+
+
 def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:
     rows = "rows=[[0, 0, -1], [1, 1, -1], [2, 0, -1]], load={on='punch_top'}"
     motion = f"motion={{kind='cycle', columns=['time (s)', 'shift_x (mm)', 'force_z (N)'], {rows}}}"

@@ -191,7 +191,8 @@ class ManyNodes:
         self.near: list[Near] = []
         if wear is not None and len(self.blocks) > 1:
             others = sorted([] if before is None else before.near, key=lambda near: near.unlike(wear))
-            new = [] if others and others[0].unlike(wear) <= ALIKE else [Near(self.blocks, wear)]
+            mean = others[0].mean if others else _Mean(self.blocks)
+            new = [] if others and others[0].unlike(wear) <= ALIKE else [Near(mean, wear)]
             self.near = [*new, *others][:KEPT]
 
     def multiply(self, x: Array) -> Array:
@@ -231,11 +232,38 @@ class ManyNodes:
         return _Together(self, kept, own, apart).solve
 
 
-class Near:
-    """The preconditioner of the common depth: (mean of S) (mean of S + sum of D)^-1 on the nodes that touch."""
+class _Mean:
+    """The mean of the phases' S with the balance of forces added, for rigid modes open gaps, too."""
 
-    def __init__(self, blocks: Sequence[PhaseBlock], wear: Array) -> None:
+    def __init__(self, blocks: Sequence[PhaseBlock]) -> None:
         self._blocks = blocks
+        self._nodes: Indices = np.zeros(0, dtype=np.int32)  # whose numbers are kept
+        self._kept: Array = np.zeros((0, 0))
+
+    def entries(self, rows: Indices, columns: Indices) -> Array:
+        """Return the numbers of some rows and columns."""
+        asked = np.union1d(rows, columns)
+        if not np.isin(asked, self._nodes, assume_unique=True).all():
+            nodes = self._nodes = np.union1d(self._nodes, asked).astype(np.int32)
+            self._kept = np.zeros((len(nodes), len(nodes)))
+            for block in self._blocks:
+                self._kept += block.compliance.entries(nodes, nodes)
+                self._kept += block.modes[nodes] @ block.balance[:, nodes]
+            self._kept /= len(self._blocks)
+        i, j = (np.searchsorted(self._nodes, some) for some in (rows, columns))
+        return self._kept[np.ix_(i, j)]
+
+
+class Near:
+    """The preconditioner of the common depth: (mean of S) (mean of S + sum of D)^-1 on the nodes that touch.
+
+    Args:
+        mean: Of S.
+        wear: D of each phase (m, n).
+    """
+
+    def __init__(self, mean: _Mean, wear: Array) -> None:
+        self.mean = mean
         self._wear: Array = np.asarray(wear.sum(axis=0))
         self._updating = Updating(self._entries)
 
@@ -246,16 +274,8 @@ class Near:
         least, most = both.min(axis=0), both.max(axis=0)
         return float((most / np.where(least > 0, least, np.where(most > 0, 1e-300, 1.0))).max(initial=0.0))
 
-    def mean(self, rows: Indices, columns: Indices) -> Array:
-        """Return numbers of the mean of S with the balance of forces added: rigid modes open gaps, too."""
-        found: Array = np.zeros((len(rows), len(columns)))
-        for block in self._blocks:
-            found += block.compliance.entries(rows, columns)
-            found += block.modes[rows] @ block.balance[:, columns]
-        return found / len(self._blocks)
-
     def _entries(self, rows: Indices, columns: Indices) -> Array:
-        found = self.mean(rows, columns)
+        found = self.mean.entries(rows, columns)
         i, j = np.equal.outer(rows, columns).nonzero()
         found[i, j] += self._wear[rows[i]]
         return found

@@ -37,6 +37,7 @@ TOLERANCE = 1e-11  # of residuals, which are scaled to 1
 AT_BOUND = 1e-12  # of unknowns, which are scaled to 1: how near to their bound they count as at it
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 SETS = 30  # that are gone through before SNES starts
+AGAIN = 3  # times that a set may come again, where its derivative is another one
 CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor still serves
 SERVES = 3  # such steps, after which the next solve has a factor of its own
 MOST_SHARE = 0.5  # of a step along the last one, that is corrected
@@ -133,6 +134,7 @@ class Inequality:
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
+        self._stepped: Array | None = None  # where the first step from the last start led to, on its own set
 
     @cached_property
     def _full_steps(self) -> PETSc.SNES:
@@ -209,6 +211,7 @@ class Inequality:
         if self.by_digits and not line_search and isinstance(self._jacobian(start), Approximate):
             x = self._improved(start)
             return self._by_snes(start, line_search) if x is None else x
+        self._stepped = None
         stepwise = self.curved or self._bounded_above  # sets change more often, or there is more than one factor's step
         x = (self._by_chords(start) if stepwise else self._on_set(start)) if near else None
         if x is None and self.sets_first and not line_search:
@@ -231,6 +234,8 @@ class Inequality:
                 if iteration:
                     kept = self._factor(self._jacobian(x), key)
                 x[kept.free] -= kept.solve(rest)
+                if not iteration:
+                    self._stepped = x.copy()
         except np.linalg.LinAlgError:
             return None
         if self._free(x) != key:
@@ -298,22 +303,33 @@ class Inequality:
         return max(TOLERANCE, EPSILON * self._rounding())
 
     def _through_sets(self, start: Array) -> Array | None:
-        """Return the solution by a sequence of sets, each solved for as it is; None where one comes again."""
-        x, key, seen = start.copy(), self._free(start), set[bytes]()
+        """Return the solution by a sequence of sets, each solved for as it is; None where they come again and again.
+
+        Where pressures are beyond a cap, or below a threshold, the derivative is another one, and a set may come twice.
+        """
+        x, key, stepped = start.copy(), self._free(start), self._stepped
+        seen: dict[bytes, list[Operator]] = {}
         for _ in range(SETS):
-            if key in seen:
-                return None
-            seen.add(key)
             free = np.frombuffer(key, dtype=bool)
-            x[~free] = self._lower[~free]
-            try:
-                kept = self._factor(self._jacobian(x), key)
-                x[kept.free] -= kept.solve(self._function(x)[kept.free])
-            except np.linalg.LinAlgError:
-                return None
+            if stepped is not None:
+                x, stepped = stepped, None
+            else:
+                x[~free] = self._lower[~free]
+                operator = self._jacobian(x)
+                before = seen.setdefault(key, [])
+                if len(before) == AGAIN or any(one is operator for one in before):
+                    return None
+                before.append(operator)
+                try:
+                    kept = self._factor(operator, key)
+                    x[kept.free] -= kept.solve(self._function(x)[kept.free])
+                except np.linalg.LinAlgError:
+                    return None
             wanted = np.where(free, x > self._lower, self._function(x) < -TOLERANCE)
             if np.array_equal(wanted, free):
-                return self._on_set(x)
+                found = self._on_set(x)
+                if found is not None:
+                    return found
             key = wanted.tobytes()
         return None
 

@@ -103,7 +103,9 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
             "contact.hardness='550 MPa'",
             "punch.creep={terms=[{compliance=0.2, time='2e-3 s'}]}",
-            "wear={punch={coefficient={law='filmed'}}}",
+            "wear={punch={coefficient='2e-7 1/MPa', coating={thickness='0.1 um', coefficient='1e-7 1/MPa', "
+            "modulus='500 MPa'}}}",
+            "contact.friction={law='slippery'}",
         ),
     ),
     "a coating": (
@@ -111,7 +113,7 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         (
             *SMALL,
             "wear={punch={coefficient='2e-7 1/MPa', coating={thickness='1e-7 mm', coefficient='1e-7 1/MPa', "
-            "friction=0.69}}}",
+            "friction=0.69, modulus='500 MPa'}}}",
         ),
     ),
     "laws with memory": (  # registered in `test_combinations.py`

@@ -267,7 +267,7 @@ class ContactSetup:
 
         Raises:
             CaseError: a value of it is not positive somewhere, the modulus of rough surfaces is missing, or the
-                hardness or a soft coating does not carry the load.
+                hardness does not carry the load.
         """
         case = self.made_from
         modulus = None if case is None else common_modulus(case, self.bodies.regions, self.pair)
@@ -278,10 +278,6 @@ class ContactSetup:
         if found.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
             raise CaseError(InputError("contact.hardness", message))
-        for body, soft in zip(("punch", "strip"), found.soft, strict=True):
-            if soft is not None and soft.modulus <= mean:
-                message = f"expected more than the mean pressure of {mean:.6g} MPa: it is compressed to nothing"
-                raise CaseError(InputError(f"wear.{body}.coating.modulus", message))
         return found
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:

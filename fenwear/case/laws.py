@@ -218,8 +218,8 @@ class Coating(OfPlace):
     )
     modulus: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None,
-        description="pressure over the share by which what is left of it is compressed, beside the base: E (1 - nu) / "
-        "((1 + nu) (1 - 2 nu)) of a thin coating; by default it gives way no more than its base",
+        description="M of a coating that gives way beside the base: of c that is left c (1 - exp(-p / M)) is closed; "
+        "E (1 - nu) / ((1 + nu) (1 - 2 nu)) of a thin coating; by default it gives way no more than its base",
     )
     friction: Annotated[Number, Field(ge=0)] | None = Field(
         default=None,

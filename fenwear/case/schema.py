@@ -478,9 +478,6 @@ class Case(Part):
             "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
                 law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
             ),
-            "wear: expected coatings without a modulus, which give way in gross sliding alone,": any(
-                law.gives_way for law in self.wear.laws
-            ),
             "grid.across: expected grid.nodes, of a grid that stays,": (
                 self.grid is not None and self.grid.across is not None
             ),

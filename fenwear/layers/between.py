@@ -1,8 +1,8 @@
 """What lies between two surfaces, as one: what it adds to the gap of the nodes, and the rows of its state.
 
-    gap = bodies + (winkler + sum of c / M) p + delta(p) - t + D,    p <= hardness
+    gap = bodies + winkler p + delta(p) - t + D,    p <= hardness
 
-with the linear closure, that of coatings of which c is left, of modulus M, that of a law (`closure`), the thickness of
+with the linear closure, that of a law and of coatings by what is left of them (`closure`), the thickness of
 debris (`debris`) and the plastic depth D, which grows where the pressure is at the hardness. In one phase that is an
 upper bound of the inequality, and D grows by what the gap would be below zero (0 <= dD, p <= hardness, dD (p -
 hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface gives way in a solve by SOFT (p /
@@ -34,7 +34,7 @@ from fenwear.case.layers import (
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
-from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
+from fenwear.layers.closure import Closure, CoatedClosure, ExponentialClosure, PowerClosure, RoughClosure
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
@@ -96,10 +96,11 @@ class Layers:
         """That which lies at the contact's nodes; None without, or where the strip carries it."""
         return None if self.strip_carries else self.debris
 
-    def given(self, pressure: Array) -> Array:
-        """Return by how much pressures (..., n) close what lies between, mm."""
+    def given(self, pressure: Array, closure: Closure | None = None) -> Array:
+        """Return by how much pressures (..., n) close what lies between, mm, by default without what coatings do."""
+        closure = closure or self.closure
         found = np.zeros_like(pressure) if self.winkler is None else self.winkler * pressure
-        return found if self.closure is None else found + self.closure.closure(pressure)
+        return found if closure is None else found + closure.closure(pressure)
 
     @property
     def varies(self) -> bool:
@@ -120,21 +121,36 @@ class Layers:
         """Whether a coating gives way beside its base."""
         return self.soft != (None, None)
 
-    def coatings_give(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> Array:
-        """Return by how much a unit of pressure closes what is left of coatings in each phase (m, n), mm/MPa.
+    def coatings_left(
+        self, pairs: Sequence[ContactPair], punch: Array, strip: Array
+    ) -> tuple[Array | None, Array | None]:
+        """Return what is left of coatings that give way in each phase (m, n), mm; None for a body without.
 
         Args:
             pairs: The surfaces opposite each other in each phase.
             punch, strip: Depths worn off both bodies at their own nodes, mm.
         """
-        found = np.zeros((len(pairs), self.nodes))
         of_punch, of_strip = self.soft
-        if of_punch is not None:
-            found += of_punch.gives(punch)
-        if of_strip is not None:
-            gives = of_strip.gives(strip)
-            found += np.array([pair.wear_interpolation @ gives for pair in pairs])
-        return found
+        below = None if of_strip is None else of_strip.left(strip)
+        return (
+            None if of_punch is None else np.broadcast_to(of_punch.left(punch), (len(pairs), self.nodes)),
+            None if below is None else np.array([pair.wear_interpolation @ below for pair in pairs]),
+        )
+
+    def coatings_closure(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> CoatedClosure:
+        """Return by what coatings give way in each phase (m, n) at depths; arguments as of `coatings_left`."""
+        left = self.coatings_left(pairs, punch, strip)
+        both = zip(left, self.soft, strict=True)
+        return CoatedClosure(
+            None, tuple((own, soft.modulus) for own, soft in both if own is not None and soft is not None)
+        )
+
+    def closure_at(self, pair: ContactPair, worn: WornDepths) -> Closure | None:
+        """Return the law by which all that lies between gives way where these depths are worn, at one place."""
+        if not self.softens:
+            return self.closure
+        coats = self.coatings_closure([pair], worn.punch, worn.strip).coatings
+        return CoatedClosure(self.closure, tuple((left[0], modulus) for left, modulus in coats))
 
     def unworn(self, strip: int) -> WornDepths:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""

@@ -2,13 +2,15 @@
 
     power          delta = r (p / p_1)^m
     exponential    p = p_1 (exp(delta / l) - 1)
+    coating        delta = c (1 - exp(-p / M)), c what is left of it
     rough          p = (4/3) E* eta sqrt(R) sigma^(3/2) F(d / sigma),  F(h) = integral from h of (z - h)^(3/2) phi(z) dz
 
-The last is the law of Greenwood and Williamson (Proc. R. Soc. Lond. A 295, 1966, 300): eta round asperities of radius R
-on an area, of Gaussian heights z sigma with density phi; d the distance of the mean planes. With the parabolic cylinder
-function D (Abramowitz and Stegun, 19.5.3) F(h) = Gamma(5/2) / sqrt(2 pi) exp(-h^2/4) D_(-5/2)(h), and F' = -(3/2) times
-the same integral of (z - h)^(1/2). The closure counts from where the mean planes are `FIRST` sigma apart, beyond which
-less than 1e-9 of the asperities touch.
+That of a coating is Hencky's: its strain is the logarithm of its height, ln(h / c) = -p / M, so that no pressure takes
+all of it. The last is the law of Greenwood and Williamson (Proc. R. Soc. Lond. A 295, 1966, 300): eta round asperities
+of radius R on an area, of Gaussian heights z sigma with density phi; d the distance of the mean planes. With the
+parabolic cylinder function D (Abramowitz and Stegun, 19.5.3) F(h) = Gamma(5/2) / sqrt(2 pi) exp(-h^2/4) D_(-5/2)(h),
+and F' = -(3/2) times the same integral of (z - h)^(1/2). The closure counts from where the mean planes are `FIRST`
+sigma apart, beyond which less than 1e-9 of the asperities touch.
 """
 
 from __future__ import annotations
@@ -93,6 +95,35 @@ class RoughClosure:
         """Return its derivative (...), mm/MPa."""
         touching = np.maximum(pressure, 0.0) / self.stiffness + _inverse().first
         return np.asarray(-self.height * _inverse().slope(np.log(touching)) / (touching * self.stiffness))
+
+
+@dataclass(frozen=True)
+class CoatedClosure:
+    """A law and coatings that give way beside each other, each by what is left of it.
+
+    Attributes:
+        law: What else gives way; None for nothing.
+        coatings: What is left of each (..., n), mm, and its modulus M, MPa.
+    """
+
+    law: Closure | None
+    coatings: tuple[tuple[Array, float], ...]
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm."""
+        found = np.zeros_like(pressure) if self.law is None else self.law.closure(pressure)
+        return sum((left * compressed(pressure, modulus) for left, modulus in self.coatings), found)
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa."""
+        found = np.zeros_like(pressure) if self.law is None else self.law.slope(pressure)
+        parts = (left / modulus * (1 - compressed(pressure, modulus)) for left, modulus in self.coatings)
+        return sum(parts, found)
+
+
+def compressed(pressure: Array, modulus: float) -> Array:
+    """Return the share of its thickness by which a coating is compressed (...)."""
+    return np.asarray(-np.expm1(-np.maximum(pressure, 0.0) / modulus))
 
 
 def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.layers.between import DEBRIS, PLASTIC, Layers
+from fenwear.layers.closure import CoatedClosure, compressed
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Evolution, Held
 from fenwear.sliding.friction import ContactConditions
@@ -174,7 +175,7 @@ class LayerStep:
         passing = self.passing
         closed = passing.layers.closing(pressure, capped=self.capped)
         if passing.layers.softens:
-            closed = closed + self._coatings_give(pressure) * pressure
+            closed = closed + self._coatings(pressure).closure(pressure)
         if not self.implicit:
             return closed
         found = self._wear.opening(pressure)
@@ -194,11 +195,15 @@ class LayerStep:
         if self.passing.layers.strip_carries:
             return None
         found = self._wear.local(pressure)
+        if found is not None and self.passing.layers.softens:
+            found = found * self._felt(pressure)[0].mean(axis=0)  # of all phases: a step to the solution
         return None if found is None else found - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
         left, right = self._wear.border(pressure)
+        if self.passing.layers.softens:
+            left = self._felt_by_border(left, pressure)
         if self.passing.layers.strip_carries:
             left, right = self._with_carried(left, right, pressure)
         elif self.passing.debris is None and not self._fills:
@@ -208,6 +213,15 @@ class LayerStep:
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
         return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
+
+    def _felt_by_border(self, left: Array, pressure: Array) -> Array:
+        """Return L of `border` with what coatings that are compressed leave of it."""
+        (punch, strip), n = self._felt(pressure), pressure.shape[1]
+        first = 0 if self._worn.punch is None else n
+        found = left.copy()
+        found[:, :, :first] *= punch[:, :, None]
+        found[:, :, first:] *= strip[:, :, None]
+        return found
 
     def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
         """Return both with what the strip carries between, as its wear."""
@@ -223,6 +237,9 @@ class LayerStep:
         if not self.implicit:
             return None, None
         punch, strip = self._wear.by_body(pressure)
+        if self.passing.layers.softens:
+            both = zip((punch, strip), self._felt(pressure), strict=True)
+            punch, strip = (None if own is None else own * share.mean(axis=0) for own, share in both)
         if self.passing.layers.strip_carries:
             return punch, self._carried_below(pressure, strip)
         if self.passing.debris is None:
@@ -252,17 +269,35 @@ class LayerStep:
         found = self.passing.layers.slope(pressure, capped=self.capped)
         if not self.passing.layers.softens:
             return found
-        # That more pressure leaves less of them is p / M of its wear, and left out.
-        gives = self._coatings_give(pressure)
+        gives = self._coatings(pressure).slope(pressure)
         return gives if found is None else found + gives
 
-    def _coatings_give(self, pressure: Array) -> Array:
-        """Return by how much a unit of pressure closes what is left of coatings (m, n), mm/MPa: at the step's end."""
+    def _depths(self, pressure: Array) -> tuple[Array, Array]:
+        """Return the depths of punch and strip by which coatings give way: those at the step's end."""
         punch, strip = self.before.punch, self.before.strip
-        if self.implicit:
-            lost = self._worn.worn(pressure)
-            punch, strip = punch + self._length * lost.punch, strip + self._length * lost.strip
-        return self.passing.layers.coatings_give(self.passing.wear.pairs, punch, strip)
+        if not self.implicit:
+            return punch, strip
+        lost = self._worn.worn(pressure)
+        return punch + self._length * lost.punch, strip + self._length * lost.strip
+
+    def _coatings(self, pressure: Array) -> CoatedClosure:
+        """Return by what coatings give way in each phase (m, n)."""
+        return self.passing.layers.coatings_closure(self.passing.wear.pairs, *self._depths(pressure))
+
+    def _felt(self, pressure: Array) -> tuple[Array, Array]:
+        """Return how much of what punch and strip lose opens the gap of each phase (m, n) each.
+
+        Where a coating goes that was compressed its compression does, too.
+        """
+        layers = self.passing.layers
+        left = layers.coatings_left(self.passing.wear.pairs, *self._depths(pressure))
+        punch, strip = (
+            np.ones_like(pressure)
+            if own is None or soft is None
+            else np.where(own > 0, 1 - compressed(pressure, soft.modulus), 1.0)
+            for own, soft in zip(left, layers.soft, strict=True)
+        )
+        return punch, strip
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""

@@ -94,19 +94,20 @@ def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) 
 class SoftCoating:
     """A coating that gives way beside its base, all of what is left of it alike, as if it were held sideways.
 
-    So it goes over to the base by itself: what gives way less and less is nothing where it is worn through.
+    So it goes over to the base by itself: what gives way less and less is nothing where it is worn through. Its law is
+    in `fenwear.layers.closure`.
 
     Attributes:
         thickness: At the body's own contact nodes (n,), mm.
-        modulus: Pressure over the share by which it is compressed, MPa.
+        modulus: Small pressures over the share by which they compress it, MPa.
     """
 
     thickness: Array
     modulus: float
 
-    def gives(self, depth: Array) -> Array:
-        """Return by how much a unit of pressure closes what is left at a depth (n,), mm/MPa."""
-        return np.asarray(left_of(self.thickness, depth) / self.modulus)
+    def left(self, depth: Array) -> Array:
+        """Return what is left of it at a depth (n,), mm."""
+        return left_of(self.thickness, depth)
 
 
 def soft_coatings(

@@ -315,14 +315,19 @@ class PartialSlipProblem:
         opening = self.opening(interface.middle, worn)
         state, before = untouched(interface), Imposed(loaded.times(0), opening)
         for k in range(1, program.pressing + 1):
-            imposed = Imposed(loaded.times(k / program.pressing), self.opening(interface.middle, worn))
+            imposed = replace(
+                before,
+                loaded=loaded.times(k / program.pressing),
+                opening=self.opening(interface.middle, worn),
+                closure=interface.layers.closure_at(interface.middle.pair, worn),
+            )
             if interface.creep is not None and len(worn.crept):  # creep comes with the loads
                 state = interface.creep.at(state, k / program.pressing * worn.crept)
             state, before = advance(interface, state, before, imposed, self.friction), imposed
             worn = interface.layers.flown(worn, state.flowed)
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
-        at = PartialSlipState(state, before, worn, load=load)
+        at = PartialSlipState(state, replace(before, closure=None), worn, load=load)
         for step in program.lead_in:
             at = self._stepped(at, step)
         at = self.forgotten(at)
@@ -345,7 +350,8 @@ class PartialSlipProblem:
         opening, loaded = self.opening(position, worn), self.expanded(given, step.offset)
         duration = 0.0 if step.fraction is None else step.duration  # before the cycle begins nothing creeps
         beside = self._beside(position, step, at.imposed)
-        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside)
+        closure = interface.layers.closure_at(position.pair, worn)
+        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside, closure)
 
     def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array | None:
         """Return what the strip's supports are moved by beside the displacement at the end of a step (n, d), mm.
@@ -462,6 +468,7 @@ class PartialSlipProblem:
         pressures, trials = at.then(state)
         following = (at.next_step + 1) % len(self.program.steps)
         worn = self.interface.layers.flown(at.worn, state.flowed)
+        imposed = replace(imposed, closure=None)  # what gives way follows from the depths
         after = PartialSlipState(state, imposed, worn, following, pressures=pressures, trials=trials, load=at.load)
         if self.laws is None:
             return after
@@ -650,7 +657,8 @@ class PartialSlipProblem:
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)
         on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
-        closed = self.interface.layers.given(state.pressure) - self.interface.layers.given(before.pressure)
+        layers, closure = self.interface.layers, self.interface.layers.closure_at(position.pair, at.worn)
+        closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)
         if self.interface.creep is not None:
             crept = zip(*map(self.interface.creep.displaced, (state.crept, before.crept)), strict=True)
             on_punch, on_strip, closed = (

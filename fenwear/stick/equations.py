@@ -110,7 +110,8 @@ class Step:
             return position.in_frame(on_punch - turn(read @ on_strip))
 
         now, old = apart(self.free_punch, self.free_strip), apart(before.on_punch, before.on_strip)
-        closed = interface.layers.given(before.pressure)
+        self.closure, self.hardness = imposed.closure or interface.layers.closure, interface.layers.hardness
+        closed = interface.layers.given(before.pressure, self.closure)
         if creep is not None:
             (*crept, layer), (*had, closed_before) = self._crept(creep)
             now, old = now + apart(crept[0], crept[1]), old + apart(had[0], had[1])
@@ -120,7 +121,6 @@ class Step:
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n] - closed
-        self.closure, self.hardness = interface.layers.closure, interface.layers.hardness
         # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
         # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
         self.scale = np.abs(position.compliance.diagonal()).reshape(self.d, self.n)

@@ -316,7 +316,7 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     places = (last if side > 0 else first) + side * np.array([2, 3])
     if places.min() < 0 or places.max() >= n:
         return None
-    if problem.interface.layers.closure is not None:
+    if problem.interface.layers.closure is not None or problem.interface.layers.softens:
         return None
     r, k = position.modes.shape[1], len(zone)
     scale = float(np.median(position.compliance.diagonal()[:n]))

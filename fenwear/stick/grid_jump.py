@@ -42,6 +42,7 @@ class Answering:
         left: What their pressures add to a cycle's wear and to what lies between (total, k).
         right: The gap that depths and what lies between open there (k, total).
         share: Of the cycle's time.
+        closure: By what all that lies between gives way there; None for nothing.
     """
 
     position: Position
@@ -50,6 +51,7 @@ class Answering:
     left: csr_array
     right: csr_array
     share: float
+    closure: Closure | None = None
 
 
 class GridJump:
@@ -59,20 +61,17 @@ class GridJump:
         groups: Of the cycle's time steps.
         itself: B (total, total).
         step: H.
-        closure: What gives way beside the bodies; None for nothing.
 
     Raises:
         ConvergenceError: the step is beyond all numbers.
     """
 
-    def __init__(
-        self, groups: Sequence[Answering], itself: csr_array, step: float, closure: Closure | None = None
-    ) -> None:
+    def __init__(self, groups: Sequence[Answering], itself: csr_array, step: float) -> None:
         self.groups, self.step = groups, step
         self._alone = None
         if itself.nnz:
             self._alone = splu(csc_array(eye_array(itself.shape[0]) - step * itself))
-        self._parts = [_Part(group, step, closure) for group in groups]
+        self._parts = [_Part(group, step) for group in groups]
         self._cuts = np.cumsum([part.size for part in self._parts])[:-1]
 
     def _without_pressure(self, right: Array) -> Array:
@@ -122,8 +121,8 @@ class GridJump:
 class _Part:
     """C with rigid motions on the nodes of a group; pressures in a unit by which both are of one size."""
 
-    def __init__(self, group: Answering, step: float, closure: Closure | None) -> None:
-        position, closed = group.position, group.closed
+    def __init__(self, group: Answering, step: float) -> None:
+        position, closed, closure = group.position, group.closed, group.closure
         on = position.compliance.on_grid
         assert on is not None
         self.group, self.k, self.r = group, len(closed), position.modes.shape[1]

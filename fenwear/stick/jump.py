@@ -284,7 +284,7 @@ class _Implicit:
         creep = problem.interface.creep
         self._solve: Callable[[Array], Array]
         if creep is None and all(group.position.compliance.on_grid is not None for group in self.groups):
-            self._solve = GridJump(self.groups, itself, GAMMA * cycles, problem.interface.layers.closure).solve
+            self._solve = GridJump(self.groups, itself, GAMMA * cycles).solve
         else:
             self._solve = self._factored(itself)
         self._creep = (
@@ -307,7 +307,7 @@ class _Implicit:
     def _answer_of(self, group: Answering) -> Array:
         """Return how pressures of a group fall by a depth at each (k, k), MPa/mm, which is kept."""
         if id(group) not in self._answers:
-            self._answers[id(group)] = _stiffness(self.problem, group)
+            self._answers[id(group)] = _stiffness(group)
         return self._answers[id(group)]
 
     @cached_property
@@ -402,7 +402,10 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
             by = by - csr_array((np.full(count, filled), (every, first + closed)), shape=(count, total))
         share = float(records.duration[members].sum() / records.duration.sum())
         pressure = records.pressure[members].mean(axis=0)
-        found.append(Answering(position, closed, pressure, csr_array(sum(onto[1:], onto[0])), csr_array(by), share))
+        closure = layers.closure_at(position.pair, now.worn)
+        found.append(
+            Answering(position, closed, pressure, csr_array(sum(onto[1:], onto[0])), csr_array(by), share, closure)
+        )
     itself = csr_array((total, total))
     if over is not None:
         lost, at = over.loss, np.arange(n)
@@ -488,7 +491,7 @@ class _Remembered:
         return csr_array(found)
 
 
-def _stiffness(problem: PartialSlipProblem, group: Answering) -> Array:
+def _stiffness(group: Answering) -> Array:
     """Return how the pressures of closed nodes fall by a depth at each, under a constant load (k, k), MPa/mm."""
     position, closed = group.position, group.closed
     k, r = len(closed), position.modes.shape[1]
@@ -496,7 +499,7 @@ def _stiffness(problem: PartialSlipProblem, group: Answering) -> Array:
     unit = float(np.median(position.compliance.diagonal()[:n]))
     system = np.zeros((k + r, k + r))
     system[:k, :k] = position.compliance.entries(closed, closed) / unit
-    closure = problem.interface.layers.closure
+    closure = group.closure
     if closure is not None:
         system[np.arange(k), np.arange(k)] += closure.slope(group.pressure)[closed] / unit
     system[:k, k:] = position.modes[closed]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
+from fenwear.layers.closure import Closure
 from fenwear.sliding.wear import STIFF
 from fenwear.stick.position import LoadEffect
 
@@ -26,6 +27,7 @@ class Imposed:
         duration: Of the step, s: what creeps does so over it.
         beside: What the strip's supports are moved by beside the displacement, at the contact nodes (n, d), mm; None
             for nothing.
+        closure: By what all that lies between gives way where it is worn as here; None where nothing does.
     """
 
     loaded: LoadEffect
@@ -35,6 +37,7 @@ class Imposed:
     strain: float = 0.0
     duration: float = 0.0
     beside: Array | None = None
+    closure: Closure | None = None
 
     def towards(self, other: Imposed, share: float) -> Imposed:
         """Return what is imposed a share of the way to the other."""
@@ -50,6 +53,7 @@ class Imposed:
             self.strain + share * (other.strain - self.strain),
             share * other.duration,
             _between(self.beside, other.beside, share),
+            other.closure,
         )
 
 

@@ -10,6 +10,7 @@ from combinations import SMALL as SMALLEST
 from combinations import STICK
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.arrays import Array
 from fenwear.sliding.coating import shares
 
 Assemble = Callable[..., Tribosystem]
@@ -187,7 +188,6 @@ def test_friction_of_a_coating_holds_until_it_is_through(assembled: Assemble) ->
         ("{thickness=1e-3, coefficient=0}", "wear.punch.coating.coefficient: expected a finite number above zero"),
         ("{thickness=1e-3, coefficient='1 mm'}", "coating.coefficient"),
         ("{thickness=1e-3, coefficient=1e-9, modulus=0}", r"wear.punch.coating.modulus: expected"),
-        ("{thickness=1e-3, coefficient=1e-9, modulus=9}", r"wear.punch.coating.modulus: expected more than the mean"),
         ("{thickness=1e-3, archard=1e-3}", "wear.punch.coating.hardness"),
     ],
 )
@@ -222,18 +222,25 @@ SOFT = f"wear.%s={{coefficient=4e-7, coating={{{UNEVENLY}, coefficient=1e-7, mod
 
 def test_a_soft_coating_is_a_layer_as_thick_as_what_is_left(assembled: Assemble) -> None:
     """Of its modulus over what is left, at each place; unworn, and where it is thinner."""
-    soft, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 100
+    soft, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 60
     *_, worn = march(soft, half_cycles, implicit=True)
     x = soft.pair.punch.unworn[:, 0]
     for start, lost in ((None, 0.0), (worn.end, worn.wear[-1])):
         left = 2e-3 * (1 - x / 100) - lost
         assert left.min() > 0
-        rows = ", ".join(f"[{at!r}, {20 / own!r}]" for at, own in sorted(zip(x.tolist(), left.tolist(), strict=True)))
-        layer = f"contact.layer={{kind='linear', stiffness={{table=[{rows}], of='x', unit='MPa/mm'}}}}"
-        layered = assembled("example2", *SMALL, "wear.punch.coefficient=4e-7", layer)
         count = 1 if start is None else half_cycles + 1
-        found, exact = (list(march(system, count, start=start))[-1].pressure[-1] for system in (soft, layered))
+        found = list(march(soft, count, start=start))[-1].pressure[-1]
+        layered = assembled("example2", *SMALL, "wear.punch.coefficient=4e-7", _layer(soft, found, left, 20))
+        exact = list(march(layered, count, start=start))[-1].pressure[-1]
         np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * exact.max())
+
+
+def _layer(system: Tribosystem, pressure: Array, left: Array | float, modulus: float) -> str:
+    """Return the linear layer that closes as coatings of which so much is left do under these pressures (n,)."""
+    x, pressed = system.pair.punch.unworn[:, 0], np.maximum(pressure, 1e-9 * pressure.max())
+    secant = pressed / (left * -np.expm1(-pressed / modulus))  # of Hencky's law
+    rows = ", ".join(f"[{at!r}, {own!r}]" for at, own in sorted(zip(x.tolist(), secant.tolist(), strict=True)))
+    return f"contact.layer={{kind='linear', stiffness={{table=[{rows}], of='x', unit='MPa/mm'}}}}"
 
 
 def test_soft_coatings_of_both_bodies() -> None:
@@ -245,10 +252,12 @@ def test_soft_coatings_of_both_bodies() -> None:
         bodies = [text % (body, base, thick, base / 5) for body, thick in (("punch", 2e-4), ("strip", 1e-4))]
         return assemble(load_case("fretting-partial-slip", [*settings, *bodies]))
 
-    layer = "contact.layer={kind='linear', stiffness='1e7 MPa/mm'}"
     bare = [f"wear.{body}={{coefficient='1e-16 1/MPa'}}" for body in ("punch", "strip")]
+    unworn = both(1e-16)
+    found = next(iter(march(unworn, 1))).pressure[0]
+    layer = _layer(unworn, found, 3e-4, 3000)
     layered = assemble(load_case("fretting-partial-slip", [*settings, layer, *bare]))
-    found, exact = (next(iter(march(system, 1))).pressure[0] for system in (both(1e-16), layered))
+    exact = next(iter(march(layered, 1))).pressure[0]
     np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * exact.max())
     soft = both(5e-6)
     marched = [list(march(soft, 100, implicit=way))[-1] for way in (True, False)]
@@ -279,13 +288,45 @@ def test_jumps_through_soft_coatings_as_marches(assembled: Assemble) -> None:
         *_, last = jump(system, half_cycles, tolerance=tolerance)
         errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
         assert errors[-1] < tolerance / 10
-    assert errors[1] < errors[0] / 10
+    assert errors[1] < errors[0] / 5
 
 
-def test_soft_coatings_do_not_stick() -> None:
+def test_a_soft_coating_under_many_times_its_modulus(assembled: Assemble) -> None:
+    """Pressures of 10 MPa and more on 1 MPa: all of it but e^-10 is compressed, and wears through as any other."""
+    system = assembled("example2", *SMALL, (SOFT % "punch").replace("20 MPa", "1 MPa"))
+    marched = [list(march(system, 240, implicit=way))[-1].wear[-1] for way in (True, False)]
+    *_, last = jump(system, 240, tolerance=0.03)
+    exact = sum(marched) / 2
+    assert np.abs(last.wear[-1] - exact).max() < 3e-3 * exact.max()
+
+
+def test_a_soft_coating_that_sticks_is_a_layer_and_wears_through() -> None:
+    """Where it is strained little it is a linear layer node by node; jumps fall to the march through its end."""
+    small = [*SMALLEST, *STICK, "contact.law='coulomb'", "motion.positions=1"]
+    coat = "wear.punch={coefficient='%s', coating={thickness='%s', coefficient='%s', modulus='%s'}}"
+    thick = coat % ("1e-16 1/MPa", "5 mm", "1e-16 1/MPa", "10000 GPa")
+    soft = assemble(load_case("fretting-partial-slip", [*small, thick]))
+    found = next(iter(march(soft, 1))).pressure[0]
+    bare = assemble(load_case("fretting-partial-slip", [*small, "wear.punch.coefficient='1e-16 1/MPa'"]))
+    assert np.abs(next(iter(march(bare, 1))).pressure[0] - found).max() > 0.05 * found.max()
+    layer = _layer(soft, found, 5.0, 1e7)
+    layered = assemble(load_case("fretting-partial-slip", [*small, "wear.punch.coefficient='1e-16 1/MPa'", layer]))
+    exact = next(iter(march(layered, 1))).pressure[0]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8 * exact.max())
+    wears = assemble(
+        load_case("fretting-partial-slip", [*small, coat % ("4e-5 1/MPa", "0.1 um", "1e-5 1/MPa", "200 MPa")])
+    )
+    *_, marched = march(wears, 200)
+    assert 0.1 < (marched.wear[-1] >= 1e-4).mean() < 0.9
+    errors = []
+    for tolerance in (0.3, 0.003):
+        *_, last = jump(wears, 200, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - marched.wear[-1]).max() / marched.wear[-1].max()))
+    assert errors[0] < 0.1
+    assert errors[1] < 5e-3
+
+
+def test_coatings_that_give_way_are_condensed() -> None:
     """Told by the key."""
-    wear = PUNCH % ("1e-6", ", modulus='1 GPa'")
-    with pytest.raises(CaseError, match=r"wear: expected coatings without a modulus"):
-        load_case("fretting-partial-slip", [*SMALLEST, *STICK, "contact.law='coulomb'", wear])
     with pytest.raises(CaseError, match=r"contact.solver: expected 'condensed' with wear.punch.coating.modulus"):
         load_case("example2", [*SMALL, "contact.solver='full'", SOFT % "punch"])

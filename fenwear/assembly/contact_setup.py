@@ -503,7 +503,7 @@ class ContactSetup:
             self.ways.shear(None) if cycle is None else cycle,
             self.layers.known(pair, worn),
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
-            self.layers.thickness(worn),
+            self.layers.facing(pair, worn),
             edge,
         )
 

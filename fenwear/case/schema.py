@@ -349,9 +349,6 @@ class Case(Part):
         if names.role_of(third.carried_by) not in ROLES:
             known = " or ".join(repr(name) for name in names.by_roles.values())
             return [f"contact.third_body.carried_by: expected {known}, got {third.carried_by!r}"]
-        if self.debris_on_strip and self.contact.asks("debris", self.wear.laws):
-            told = "expected 'punch' where a law depends on debris: it knows what lies at a place of the contact"
-            return [f"contact.third_body.carried_by: {told}"]
         return []
 
     def _debris_problems(self) -> list[str]:

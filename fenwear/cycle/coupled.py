@@ -330,7 +330,7 @@ class Coupled:
     def _first_debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
         """Return the thickness of the debris that is looked for from: what there was before, or would be in the end."""
         if passing is not None:
-            return np.asarray(self.system.layers.thickness(passing.before))
+            return self._debris_before(passing)
         resting = self.system.passing(self.system.phases_wear).resting(pressure)
         return np.zeros(pressure.shape[1]) if resting is None or not np.isfinite(resting).all() else resting
 
@@ -339,8 +339,15 @@ class Coupled:
         assert self._passing is not None
         if passing is None:
             return np.asarray(self._passing.resting(pressure))
-        before = np.asarray(self.system.layers.thickness(passing.before))
-        return before + passing.cycles * self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
+        return (
+            self._debris_before(passing)
+            + passing.cycles * self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
+        )
+
+    def _debris_before(self, passing: DepthEvolution) -> Array:
+        """Return the thickness of the debris where a step begins, where it lies: (n,), or on the strip (n_strip,)."""
+        layers = self.system.layers
+        return np.asarray((layers.on_strip if layers.strip_carries else layers.thickness)(passing.before))
 
     def _update(
         self,
@@ -366,7 +373,9 @@ class Coupled:
             for k, p in enumerate(pressure)
         ]
         if debris is not None:
-            conditions = [replace(one, debris=np.maximum(debris, 0.0)) for one in conditions]
+            lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries and passing is not None
+            facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.pairs]
+            conditions = [replace(one, debris=own) for one, own in zip(conditions, facing, strict=True)]
         evolution = system.evolution(conditions, worn)
         if evolution is not None:
             evolution = replace(evolution, near=self.held)

@@ -183,6 +183,16 @@ class Layers:
         """Return the thickness of the debris that the strip carries (n_strip,), mm; None without."""
         return np.asarray(worn.carried[0]) if self.strip_carries and len(worn.carried) else None
 
+    def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array | None:
+        """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
+
+        What the strip carries is what lies opposite each node. None without.
+        """
+        if not self.strip_carries or self.debris is None:
+            return self.thickness(worn)
+        lies = None if worn is None else self.on_strip(worn)
+        return np.full(self.nodes, self.debris.initial) if lies is None else np.asarray(pair.wear_interpolation @ lies)
+
     def with_thickness(self, worn: WornDepths, thickness: Array) -> WornDepths:
         """Return the depths with debris of another thickness (n,), mm."""
         state = worn.between.copy()

@@ -182,9 +182,7 @@ class CondensedContact:
         self._wearing: WearCompliance | None = None
         self.follows = False
         self._mu: Callable[[Array], Array] | None = None  # of friction that follows the pressure
-        self._by_mu: Array = np.zeros(
-            (0, 0)
-        )  # what unit pressures add by the traction of a unit of it (size, n), scaled
+        self._by_mu: Array = np.zeros((0, 0))  # what unit pressures add by the traction of a unit of it (size, n)
         self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
         self._elastic: Operator | None = None
         self._operator: Operator | None = None

@@ -204,11 +204,11 @@ class LayerStep:
         left, right = self._wear.border(pressure)
         if self.passing.layers.softens:
             left = self._felt_by_border(left, pressure)
+        covers = self._fills or self.passing.debris is not None
         if self.passing.layers.strip_carries:
             left, right = self._with_carried(left, right, pressure)
-        elif self.passing.debris is None and not self._fills:
-            return left, right
-        if self.passing.layers.strip_carries and not self._fills:
+            covers = self._fills
+        if not covers:
             return left, right
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)

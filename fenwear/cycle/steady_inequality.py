@@ -11,12 +11,16 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState
+from fenwear.contact.blocks import PhaseBlock
+from fenwear.contact.grid_shape import GridShape
+from fenwear.contact.gridded import PhasesGrid
 from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.interface.convolution import Convolution
 from fenwear.layers import Evolution
 from fenwear.memory import GIB, free_memory, memory_size
 from fenwear.optimum import Optimum
@@ -27,6 +31,7 @@ from fenwear.sliding.wear import StepWear
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 GRAZING = 1e-7  # of the wear by the mean pressure: a motion of open nodes that leaves them where they are
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
+GRIDDED = 1000  # nodes of a grid from which on products take the place of matrices
 LARGE = 4000  # nodes from which on no matrix of them is made
 NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
 SMALL = GIB  # below which no estimate refuses anything
@@ -91,9 +96,12 @@ class SteadyInequality:
         interfaces, scale = self.system.interfaces, self.p_scale / self.gap_scale
         modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
-        self.equations: ShapeEquations | SpreadShape
+        self.equations: ShapeEquations | SpreadShape | GridShape
         linear = self.system.heat is None and self.closure is None and self.system.creep is None
-        if linear and (self.n >= LARGE or interfaces[0].rows is not None):
+        grid = self._grid(ratios, scale, modes, balances) if linear and self.n >= GRIDDED else None
+        if grid is not None:
+            self.equations = GridShape(grid, modes, balances)
+        elif linear and (self.n >= LARGE or interfaces[0].rows is not None):
             self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
         else:
             made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
@@ -104,6 +112,18 @@ class SteadyInequality:
             self.equations = ShapeEquations([made[key] for key in keys], modes, balances)
         # The last derivative, and what it is of.
         self._known: tuple[list[csr_array], Array, Array | None, Operator] | None = None
+
+    def _grid(self, ratios: Sequence[Array], scale: float, modes: Array, balances: Array) -> PhasesGrid | None:
+        """Return what multiplies on the grid that all compliances are convolutions on; None where they are not."""
+        interfaces = self.system.interfaces
+        if self.system.pair.punch.grid is None or any(own.cost is None for own in interfaces):
+            return None
+        known: dict[bytes, Array] = {}
+        found = [own.compliance(ratio, scale, known) for own, ratio in zip(interfaces, ratios, strict=True)]
+        if not all(isinstance(one, Convolution) for one in found):
+            return None
+        blocks = [PhaseBlock(one, one.diagonal(), modes, balances[k]) for k, one in enumerate(found)]
+        return PhasesGrid(blocks, self.system.pairs)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None = None) -> None:  # noqa: ARG002
         """Take friction and wear at the conditions of the phases; what states of laws do there, they have done."""

@@ -46,6 +46,13 @@ TEXTS = {
     "pressure_map": "Maps of the contact pressure at {chosen}, with the way of the strip, the border of contact and "
     "the largest value. Colours end where late states do.",
     "wear_strip_map": "Maps of the worn depth of the strip over its largest at {chosen}, which is told above each.",
+    "surface_map": "Maps of the height of the punch over its smooth shape, worn depths taken off, at {chosen}. "
+    "What is more than twice as deep as the first map has the darkest colour.",
+    "surface_strip_map": "Maps of the height of the strip over its smooth shape, worn depths taken off, at {chosen}. "
+    "What is more than twice as deep as the first map has the darkest colour.",
+    "roughness": "Rough surfaces where they have worn, without their form: (a) mean and root mean square of the "
+    "heights and (b) their skewness over the {axis}, and bearing curves at {chosen}: what share of the surface lies "
+    "above a height over its mean.",
     "temperature_map": "Maps of the temperature of the punch's contact surface at {chosen}.",
     "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch at {chosen}.",
     "tracks": "Sliding over the last cycle: (a) tracks of the strip's material, dots where it begins, and (b) the "

@@ -28,6 +28,7 @@ from fenwear.report.course import (
 from fenwear.report.lies_between import between_figure, lies_between
 from fenwear.report.maps import cuts_figure, map_figure, quantities, quantities_between
 from fenwear.report.program import program_figure
+from fenwear.report.roughness_figures import roughness_of, with_surfaces
 from fenwear.report.shapes import profile_figure, shape_figure, wear_map_figure
 from fenwear.report.shown import chosen_half_cycles, cycle_means, early_half_cycles, early_of, nearest_half_cycles
 from fenwear.report.stick import stick_figures
@@ -151,8 +152,9 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
     drawn: dict[str, Figure] = {}
     model = model_of(history)
     if model == "solid":
-        shown = quantities(history) | quantities_between(history)
-        drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in shown.items()}
+        surfaces = with_surfaces(history)
+        shown = quantities(surfaces) | quantities_between(history)
+        drawn |= {name: map_figure(surfaces, one, chosen[-MAPS:], look) for name, one in shown.items()}
         drawn |= tracks_of(history, look)
         drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
         drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
@@ -168,6 +170,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
             drawn["temperature"] = temperature_figure(history, chosen, look)
         if lies_between(history):
             drawn["between"] = between_figure(history, chosen, look)
+    drawn |= roughness_of(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
     if bores_of(history):
         drawn["place"] = place_figure(history, look)

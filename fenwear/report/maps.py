@@ -28,6 +28,7 @@ from fenwear.report.style import (
     shades,
 )
 from fenwear.report.surface import Surface, cut_places, surface_of
+from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other
 BESIDE = 3  # contacts whose cuts stand beside each other
+DEEP = 2.0  # of the deepest place of the first map: heights below have one colour
 EDGE_OF_CONTACT = 1e-2  # of the largest pressure
 
 
@@ -79,6 +81,9 @@ def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
             "strip:\ntemperature",
         ),
     }
+    for body, end in BODIES.items():
+        title = f"Height of the {body}"
+        found[f"surface{end}_map"] = Quantity(f"surface{end}", body, title, "µm", 1e3, "cividis", f"{body}:\nheight")
     return {name: q for name, q in found.items() if q.variable in history}
 
 
@@ -123,8 +128,10 @@ def map_figure(
             _contact_edge(ax, surface, found)
             if one_way(history):
                 title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
-        size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
-        name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
+        size = f"≤ {most:,.0f}" if most >= 1000 else f"≤ {most:.3g}"
+        if quantity.variable.startswith("surface"):
+            size = f"{found.min():.3g} to {most:.3g}"
+        name_panel(ax, f"{title}\n{size} {quantity.unit}")
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
     label = f"{name} over the largest one" if relative else f"{name} ({quantity.unit})" if quantity.unit else name
     colour_bar(figure, drawn, axes, label, **bar_place(look))
@@ -168,6 +175,8 @@ def _levels(
     if quantity.variable == "pressure":
         low, top = 0.0, pressure_top(history, half_cycles)
         cut, high = high > top, min(high, top)
+    if quantity.variable.startswith("surface"):  # a scar that is deep would leave nothing of the roughness to be seen
+        low = max(low, DEEP * float(values[0].min()))
     low = 0.0 if 0 < low < high / 2 else low
     levels = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high if high > low else low + 1.0)
     return np.asarray(levels), "max" if cut else "neither"

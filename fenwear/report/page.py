@@ -29,7 +29,8 @@ from fenwear.results.sheet import BODIES, LINES, OF_CONTACT, UNCERTAINTY, shown
 
 REPORT = "report.html"
 SECTIONS = ("geometry", "loops", "zones", "tractions", "traction_map", "sliding", "energy", "stress_range",
-            "profiles", "shape", "wear_map", "wear_strip_map", "pressure", "mean_pressure", "pressure_map", "tracks",
+            "profiles", "shape", "wear_map", "wear_strip_map", "surface_map", "surface_strip_map",
+            "roughness", "pressure", "mean_pressure", "pressure_map", "tracks",
             "cuts_along", "cuts_across", "program", "peaks", "place", "volume", "creep", "scar", "friction",
             "surface_stress", "temperature", "boundary_temperature", "temperature_map",
             "temperature_strip_map")  # fmt: skip

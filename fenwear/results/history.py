@@ -151,6 +151,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
             **part_columns(system, plane=False),
             **steps.columns(system),
             **table_cycle.columns(system),
+            **roughness.columns(system),
         }
     arc = pair.punch.arc is not None
     text = "arc length along the contact" if arc else "position along the contact, from the centre of the geometry"
@@ -167,7 +168,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         columns |= _outline(pair.punch, "")
     if system.strip_changes and pair.strip.arc is not None:
         columns |= _outline(pair.strip, "_strip")
-    return {**columns, **part_columns(system, plane=True), **steps.columns(system)}
+    return {**columns, **part_columns(system, plane=True), **steps.columns(system), **roughness.columns(system)}
 
 
 def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:

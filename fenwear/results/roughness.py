@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import roughness
 from fenwear.cycle import Block
+from fenwear.results.surfaces import Column
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 FEWEST = 8  # nodes along each axis of the rectangle, below which the whole grid is taken
@@ -34,6 +34,20 @@ def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
     """Return the surfaces with a topography, by their bodies."""
     both = {"punch": system.pair.punch, "strip": system.pair.strip}
     return {body: one for body, one in both.items() if one.heights is not None and one.grid is not None}
+
+
+def columns(system: Tribosystem) -> dict[str, Column]:
+    """Return the topographies before anything has worn, by name."""
+    plane = system.case.model.kind == "plane"
+    return {
+        f"topography{ENDS[body]}": Column(
+            (f"{'x' if plane else 'node'}{ENDS[body]}",),
+            np.asarray(surface.heights),
+            {"units": "mm", "long_name": f"height of the unworn {body} over its smooth shape, out of it"},
+        )
+        for body, surface in _rough(system).items()
+        if body == "punch" or system.strip_changes
+    }
 
 
 def variables(system: Tribosystem) -> dict[str, Variable]:
@@ -77,18 +91,18 @@ def worn_heights(block: Block, body: str, row: int) -> Array:
     surface, depth = _rough(block.system)[body], {"punch": block.wear, "strip": block.wear_strip}[body][row]
     assert surface.grid is not None
     assert surface.heights is not None
-    return levelled(surface.grid, surface.heights - depth, depth > 0)
+    return levelled(surface.grid.places, surface.heights - depth, depth > 0)
 
 
-def levelled(grid: RegularGrid, heights: Array, worn: NDArray[np.bool_]) -> Array:
+def levelled(places: NDArray[np.int64], heights: Array, worn: NDArray[np.bool_]) -> Array:
     """Return heights over their mean and form in the rectangle around what has worn (m,), mm.
 
     Args:
-        grid: Where they are.
+        places: Of the nodes on their grid (n, axes).
         heights: (n,), mm.
         worn: Which nodes have worn (n,).
     """
-    places, chosen = grid.places, np.ones(len(heights), dtype=bool)
+    chosen = np.ones(len(heights), dtype=bool)
     if worn.any():
         low, high = places[worn].min(axis=0), places[worn].max(axis=0)
         if (high - low >= FEWEST).all():

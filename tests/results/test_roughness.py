@@ -19,7 +19,9 @@ def test_wave_on_a_form() -> None:
     """Sa = 2 A / pi, Sq = A / sqrt(2), Ssk = 0; of heights A cos(pi s) lies a share s above; a bowl is no roughness."""
     grid = RegularGrid((0.0,), (LENGTH / 40,), (801,), 1, 0.0)
     x = grid.flat[:, 0]
-    z = levelled(grid, HEIGHT * np.cos(2 * np.pi * x / LENGTH) + 3.0 + 0.2 * (x - 0.3) ** 2, np.zeros(801, dtype=bool))
+    z = levelled(
+        grid.places, HEIGHT * np.cos(2 * np.pi * x / LENGTH) + 3.0 + 0.2 * (x - 0.3) ** 2, np.zeros(801, dtype=bool)
+    )
     found = roughness(z)
     assert found.mean == pytest.approx(2 * HEIGHT / np.pi, rel=5e-3)
     assert found.rms == pytest.approx(HEIGHT / np.sqrt(2), rel=5e-3)
@@ -34,9 +36,9 @@ def test_rectangle_around_what_has_worn() -> None:
     x, y = grid.flat.T
     heights = np.where((x >= 5) & (x <= 20) & (y >= 8) & (y <= 31), 0.1 * x * y - 3 * x + y**2, 1e3 * np.sin(x + y))
     worn = np.isin(x, (5, 20)) & np.isin(y, (8, 31))
-    assert np.abs(levelled(grid, heights, worn)).max() < 1e-9
-    assert len(levelled(grid, heights, worn)) == 16 * 24
-    assert len(levelled(grid, heights, worn & (x > 10))) == 1200
+    assert np.abs(levelled(grid.places, heights, worn)).max() < 1e-9
+    assert len(levelled(grid.places, heights, worn)) == 16 * 24
+    assert len(levelled(grid.places, heights, worn & (x > 10))) == 1200
 
 
 def test_run_tells_how_rough_it_is(tmp_path: Path) -> None:

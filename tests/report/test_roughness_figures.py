@@ -1,0 +1,61 @@
+"""Pictures of rough surfaces: what they draw is what the numbers of the history are of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from fenwear.case.reading import load_case
+from fenwear.report.maps import quantities
+from fenwear.report.roughness_figures import roughness_figure, roughness_of, with_surfaces
+from fenwear.results.reading import load_history
+from fenwear.run import run_case
+
+SETTINGS = (
+    "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",
+    "punch.operator='fine'", "strip.operator='fine'", "grid.nodes=25", "grid.size=['0.36 mm', '0.36 mm']",
+    "motion.positions=2", "run.half_cycles=2", "output.uncertainty=false", "output.report=false",
+    "punch.topography.rms='0.05 um'", "punch.topography.longest='0.2 mm'", "strip.topography.amplitude='0.2 um'",
+    "strip.topography.wavelength=['0.12 mm', '0.18 mm']",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def history(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
+    """Return the history of a rough ball on a wavy flat."""
+    folder: Path = tmp_path_factory.mktemp("rough") / "run"
+    run_case(load_case("ball-on-flat", SETTINGS), output=folder, log=lambda _: None)
+    return load_history(folder)
+
+
+def test_bearing_curves_have_the_roughness(history: xarray.Dataset) -> None:
+    """The mean distance and the root mean square of what is drawn are Sa and Sq of the history, for both bodies."""
+    last = int(history.half_cycle[-1])
+    figure = roughness_figure(history, [last])
+    assert len(figure.axes) == 4
+    for ax, end in zip(figure.axes[2:], ("", "_strip"), strict=True):
+        (line,) = ax.lines
+        shares, heights = (np.asarray(values) for values in line.get_data())
+        assert (np.diff(heights) <= 0).all()
+        share = shares / 100
+        rms = 1e3 * float(history[f"roughness_rms{end}"].sel(half_cycle=last))
+        assert np.sqrt(np.trapezoid(heights**2, share)) == pytest.approx(rms, rel=0.02)
+        mean = 1e3 * float(history[f"roughness_mean{end}"].sel(half_cycle=last))
+        assert np.trapezoid(np.abs(heights), share) == pytest.approx(mean, rel=0.02)
+
+
+def test_heights_are_less_what_has_worn(history: xarray.Dataset) -> None:
+    """Maps show the topography less the worn depth; a run without a topography has none."""
+    found = with_surfaces(history)
+    for end in ("", "_strip"):
+        assert found[f"surface{end}"].dims == history[f"wear{end}"].dims
+        gone = history[f"topography{end}"] - found[f"surface{end}"]
+        np.testing.assert_allclose(gone.T.values, history[f"wear{end}"].values, rtol=0, atol=1e-15)
+    assert {"surface_map", "surface_strip_map"} <= quantities(found).keys()
+    assert "roughness" in roughness_of(history, [1])
+    smooth = history.drop_vars([name for name in map(str, history.variables) if name.startswith("topography")])
+    assert with_surfaces(smooth).equals(smooth)
+    assert not roughness_of(smooth, [1])

@@ -1,0 +1,106 @@
+"""Errors of half-spaces on contact grids against closed forms by the nodes across the contact: Hertz and Cattaneo.
+
+Errors are over the largest value; "at nodes" is the largest of any node inside, two spacings from borders, where
+pressures and tractions turn with a root.
+
+python3 tests/benchmarks/grid_errors.py [NODES...]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+
+from fenwear.arrays import Array
+from fenwear.stick import Imposed, StickState, advance, untouched
+from fenwear.stick.cycle import PartialSlipProblem
+from fenwear.stick.final import final_shape
+from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.wear import BodyRate, LocalWear
+from fenwear_verify.half_space_stick import Elastic, on_grid
+from fenwear_verify.stick_solids import to_and_fro
+
+YOUNG, LOAD, RADIUS, FRICTION, PULLED = 210_000.0, 100.0, 10.0, 0.5, 0.7
+HALF_AXES, TOP = (0.2080002, 0.1311640), 1750.100  # mm, MPa: crossed cylinders of 10 and 5 mm
+WIDER, WORN = 1.08, 1.75  # grid over the contact, and over that before it has worn
+AMPLITUDE, DEPTH, VOLUME = 1.58597e-3, 1.83246e-3, 2.55879e-4  # mm, mm³: to and fro, and where its wear ends
+
+
+def pressed(bodies: OppositeBodies, gap: Array) -> tuple[StickState, Imposed]:
+    """Return the state of bodies that are pressed on each other, and what is imposed at its end."""
+    load, friction = bodies.loaded(None), np.full(len(gap), FRICTION)
+    start = Imposed(load.times(0), gap)
+    end = replace(start, loaded=load)
+    return advance(bodies, untouched(bodies), start, end, friction), end
+
+
+def cap(r: Array) -> Array:
+    """Return sqrt(1 - r²) within 1, else zero."""
+    return np.sqrt(np.maximum(1 - r**2, 0))
+
+
+def told(row: str, nodes: int, begin: float, found: Array, exact: Array, inner: Array) -> None:
+    """Print a row: errors of the largest value, in the mean square, and at nodes."""
+    top, wrong = exact.max(), np.abs(found - exact)
+    largest, mean = abs(found.max() / top - 1), np.sqrt((wrong**2).sum() / (exact**2).sum())
+    seconds = time.process_time() - begin
+    print(
+        f"{row:34} {nodes:4} {largest:9.1e} {mean:12.1e} {(wrong / top)[inner].max():9.1e} {seconds:8.1f}", flush=True
+    )
+
+
+def worn(nodes: int) -> None:
+    """Print the errors of where the wear of partial slip ends, row 37: depth and volume."""
+    body, begin = Elastic(YOUNG / 2.6, 0.3), time.process_time()
+    a = (3 * LOAD * RADIUS / (4 * YOUNG / 0.91 / 2)) ** (1 / 3)
+    count = 2 * int(WORN * nodes / 2)
+    bodies = on_grid(body, body, 2 * a / nodes, (count, count), LOAD, RADIUS)
+    n = len(bodies.middle.pair.weights)
+    wear = LocalWear(BodyRate(np.full(n, 1e-8)), None)
+    problem = PartialSlipProblem(bodies, to_and_fro(AMPLITUDE, 2), wear, np.full(n, FRICTION))
+    found = final_shape(problem)
+    depth, volume = found.depth.max() / DEPTH - 1, problem.weights @ found.depth / VOLUME - 1
+    seconds = time.process_time() - begin
+    print(f"37 end of partial slip: {nodes} nodes, depth {depth:.1e}, volume {volume:.1e}, {seconds:.1f} s", flush=True)
+
+
+def main() -> None:
+    """Print the table."""
+    print(f"{'':34} {'':4} {'largest':>9} {'mean square':>12} {'at nodes':>9} {'time (s)':>8}")
+    for nodes in [int(text) for text in sys.argv[1:]] or [32, 64, 128]:
+        for poisson in (0.3, 0.0):
+            body, modulus = Elastic(YOUNG / (2 * (1 + poisson)), poisson), YOUNG / (1 - poisson**2) / 2
+            a = (3 * LOAD * RADIUS / (4 * modulus)) ** (1 / 3)
+            step, count, top = 2 * a / nodes, 2 * round(WIDER * nodes / 2), 1.5 * LOAD / (np.pi * a**2)
+            begin, bodies = time.process_time(), on_grid(body, body, step, (count, count), LOAD, RADIUS)
+            r = np.linalg.norm(bodies.middle.pair.punch.x, axis=1)
+            state, start = pressed(bodies, bodies.middle.pair.initial_gap)
+            if poisson:
+                told("19 sphere, pressure", nodes, begin, state.pressure, top * cap(r / a), r < a - 2 * step)
+                continue
+            c, begin = a * (1 - PULLED) ** (1 / 3), time.process_time()
+            start = replace(start, displacement=None, force=0.0)
+            end = replace(start, force=PULLED * FRICTION * LOAD)
+            state = advance(bodies, state, start, end, np.full(len(r), FRICTION))
+            exact = FRICTION * top * (cap(r / a) - c / a * cap(r / c))
+            inner = (np.abs(r - a) > 2 * step) & (np.abs(r - c) > 2 * step)
+            told("34 sphere, traction, Q = 0.7 mu P", nodes, begin, state.traction[:, 0], exact, inner)
+        body, step = Elastic(YOUNG / 2.6, 0.3), 2 * HALF_AXES[0] / nodes
+        counts = tuple(2 * round(WIDER * half / step) for half in HALF_AXES)
+        begin, bodies = time.process_time(), on_grid(body, body, step, counts, LOAD, RADIUS)
+        x, y = bodies.middle.pair.punch.x[:, :2].T
+        state, _ = pressed(bodies, x**2 / (2 * RADIUS) + y**2 / RADIUS)
+        r = np.hypot(x / HALF_AXES[0], y / HALF_AXES[1])
+        inner = r < 1 - 2 * step / HALF_AXES[1]
+        told("20 crossed cylinders, pressure", nodes, begin, state.pressure, TOP * cap(r), inner)
+        worn(nodes)
+
+
+if __name__ == "__main__":
+    main()

@@ -217,7 +217,7 @@ class Stepper:
             for one, share in ((state, 0.0), (half, 0.5), (halves, 1.0))
         )
         simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
-        worn = replace(halves.worn - state.worn, between=NOTHING)
+        worn = replace(halves.worn - state.worn, between=NOTHING, carried=NOTHING)
         wrong, all_worn = (area(self.system, one) for one in (simpson - worn, worn))
         return wrong / max(all_worn, 1e-300)
 

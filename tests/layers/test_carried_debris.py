@@ -99,6 +99,16 @@ def test_laws_know_what_the_strip_carries_past_a_place() -> None:
     assert marched[1].wear.max() < 0.8 * bare.wear.max()
 
 
+def test_a_film_that_slows_its_own_wear_comes_to_rest_along_a_track() -> None:
+    """The steady state is where jumps come to, in few of them: what lies on the strip is no error of what is worn."""
+    slowed = "wear={punch={coefficient={expression='1e-8*(0.5+exp(-debris/1e-5))', unit='1/MPa'}}}"
+    few = ("geometry.degree=1", "run.half_cycles=20000", ONE_WAY, carried(0.6, "50 mm"), slowed)
+    system = assemble(load_case("example2", few))
+    blocks = list(evolve(system, integration="jump", tolerance=3e-3))
+    assert sum(len(block.wear) for block in blocks) < 50
+    assert blocks[-1].end.worn.carried[0] == pytest.approx(steady(system).debris.mean(), rel=1e-8)
+
+
 def test_what_sticks_stays_where_it_is_on_either_body() -> None:
     found = []
     for body in ("punch", "strip"):

@@ -1,6 +1,7 @@
 """Gaps between the parts of a contact in the plane, over which no line may be drawn.
 
-A history of a contact whose parts lie apart has the part of each node (`part`, `part_strip`).
+A history of a contact whose parts lie apart has the part of each node (`part`, `part_strip`). Of rings parts are told
+by their radii: both sides of a groove begin at the same one.
 """
 
 from __future__ import annotations
@@ -18,16 +19,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NEAR = 1e-9  # of the contact's length: places are the same
+BACK = 0.5  # of it: where radii begin anew
 
 
 def gaps_of(history: xarray.Dataset) -> Array:
     """Return the last place before and the first place after each gap of both surfaces (g, 2), mm."""
-    found = [np.zeros((0, 2))]
+    found: list[Array] = [np.zeros((0, 2))]
     for end in ("", "_strip"):
-        if f"part{end}" in history:
-            x, part = history[f"x{end}"].values, history[f"part{end}"].values
-            at = np.flatnonzero(np.diff(part))
-            found.append(np.stack([x[at], x[at + 1]], axis=1))
+        if f"part{end}" in history and f"x{end}" in history:
+            x: Array = history[f"x{end}"].values
+            at = np.flatnonzero(np.diff(history[f"part{end}"].values))
+        elif f"r{end}" in history:
+            x = history[f"r{end}"].values
+            at = np.flatnonzero(np.diff(x) < -BACK * max(float(np.ptp(x)), 1e-300))
+        else:
+            continue
+        found.append(np.stack([x[at], x[at + 1]], axis=1))
     return np.unique(np.concatenate(found), axis=0)
 
 

@@ -264,12 +264,17 @@ def name_bodies(figures: Iterable[Figure], names: Names) -> None:
 
 
 def save(figure: Figure, path: Path, dpi: int) -> None:
-    """Write a figure; a PNG is laid out and drawn once, where `savefig` does both twice."""
+    """Write a figure; a PNG is laid out and drawn once, where `savefig` does both twice.
+
+    Panels of a fixed aspect are laid out twice: only then are their labels where they will be.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     if path.suffix == ".png":
         figure.set_dpi(dpi)
         canvas: Any = FigureCanvasAgg(figure)
+        if any(ax.get_aspect() != "auto" for ax in figure.axes):
+            figure.draw_without_rendering()
         canvas.print_png(path)
     else:
         figure.savefig(path, dpi=dpi)

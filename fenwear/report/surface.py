@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 POINTS = 301  # along a cut
 TICKS = 2  # intervals between those of each of several parts on a map
+CLOSE = 0.1  # of a map: ticks of two parts whose texts would run into each other
 BESIDE = 1.1  # of the parts' size: how far apart they are laid
 AXES = ("x", "y", "z")
 EDGEWISE = 0.3  # of a surface's area: what is seen of it along an axis, less of what is seen edge-on
@@ -139,11 +140,14 @@ class Surface:
 
         if not self.overlaps:
             return
-        places, texts = [], []
+        places, texts = list[float](), list[str]()
+        whole = float(np.ptp(self.map[:, self._beside]))
         for k in range(self.part.max() + 1):
             own = self._flat[self.part == k, self._beside]
             values = MaxNLocator(TICKS).tick_values(own.min(), own.max())
             values = values[(values >= own.min()) & (values <= own.max())]
+            if len(values) > 1 and values[0] + self._apart - values[-1] < CLOSE * whole:
+                values = values[1:]  # its text would run into the last one of the part before
             places += [float(value + k * self._apart) for value in values]
             texts += [f"{value:g}" for value in values]
         (ax.xaxis, ax.yaxis)[self._beside].set_ticks(places, labels=texts)

@@ -7,10 +7,12 @@ that, its highest peak at the plane.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
@@ -24,8 +26,11 @@ from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
 from fenwear.interface.patches import facet_side
 from fenwear.interface.transfer import dual_transfer
+from fenwear.memory import free_memory, memory_size
+from fenwear.parallel import agreed
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
+PER_NODE = 300.0  # bytes that a node takes in each position of the strip (measured, 129 and 257 nodes in 3 and 21)
 REACH = 65  # nodes along the longer side of the largest grid, from which the first contact is looked for
 
 Both = tuple[ElasticBody, ElasticBody]  # punch and strip
@@ -34,8 +39,11 @@ Both = tuple[ElasticBody, ElasticBody]  # punch and strip
 def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody) -> None:
     """Let the contact surfaces of both bodies be grids, where the case has one.
 
+    Collective.
+
     Raises:
-        CaseError: the surfaces look along no common axis, or a grid reaches beyond the surface.
+        CaseError: the surfaces look along no common axis, a grid reaches beyond the surface, or its nodes do not fit
+            into the memory.
     """
     if case.grid is None:
         return
@@ -47,6 +55,7 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
         raise CaseError(InputError("grid", "expected contact surfaces that look at each other along one axis"))
     level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
     own = _grid(case.grid, punch.surface, axis, level)
+    _check_memory(punch.body.mesh.comm, own, sliding)
     for body, grid in ((punch, own), (strip, _reached(own, sliding))):
         surface, reading = _laid(case, body, grid)
         body.lay_grid(surface, reading, None if case.grid.across is None else grid)
@@ -55,11 +64,30 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
 def on_grid(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody, grid: RegularGrid) -> Both:
     """Return both bodies on another grid of the punch, that of the strip as much longer as the punch reaches.
 
+    Collective.
+
     Raises:
-        CaseError: a grid reaches beyond the surface.
+        CaseError: a grid reaches beyond the surface, or its nodes do not fit into the memory.
     """
+    _check_memory(punch.body.mesh.comm, grid, sliding)
     on_punch, on_strip = _laid(case, punch, grid), _laid(case, strip, _reached(grid, sliding))
     return punch.on_grid(*on_punch), strip.on_grid(*on_strip)
+
+
+def _check_memory(comm: MPI.Comm, grid: RegularGrid, sliding: Sliding) -> None:
+    """Make sure that what takes values between the surfaces in all positions fits into the memory; collective.
+
+    Raises:
+        CaseError: it does not.
+    """
+    nodes, positions = math.prod(grid.counts), len({phase.offset for phase in sliding.motion.phases})
+    free, taken = agreed(comm, free_memory()), PER_NODE * nodes * positions
+    if free is None or taken <= free:
+        return
+    counts = " by ".join(f"{count:,}" for count in grid.counts)
+    message = f"{counts} nodes in {positions} positions of the strip take about {memory_size(taken)}, but "
+    message += f"{memory_size(free)} are free; expected fewer, or fewer motion.positions"
+    raise CaseError(InputError("grid.nodes", message))
 
 
 def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurface, csr_array]:

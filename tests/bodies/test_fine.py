@@ -16,7 +16,7 @@ from ufl.algorithms import extract_coefficients
 
 from fenwear import Case, CaseError, assemble, load_case, march
 from fenwear.arrays import Array
-from fenwear.assembly import build_bodies, elastic, make_sliding, place
+from fenwear.assembly import build_bodies, elastic, grids, make_sliding, place
 from fenwear.bodies import operators
 from fenwear.bodies.correction import Ground
 from fenwear.bodies.fine import FineBody, fine
@@ -315,6 +315,16 @@ def test_what_a_grid_cannot_lie_on(settings: list[str], key: str) -> None:
     """A grid beyond the surface, of another number of sides, or with what is of meshes alone, is refused by key."""
     with pytest.raises(CaseError, match=key):
         assemble(load_case("ball-on-flat", [*BALL, "grid.nodes=9", *settings]))
+
+
+def test_more_nodes_than_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are refused before they are made, with what they take in all positions of the strip."""
+    monkeypatch.setattr(grids, "free_memory", lambda: 1e6)
+    settings = [*BALL, "grid.nodes=33", "wear.strip.coefficient='1e-8 1/MPa'", "motion.positions=5"]
+    with pytest.raises(
+        CaseError, match=r"grid.nodes: 33 by 33 nodes in 5 positions of the strip take about 2 MiB, but"
+    ):
+        assemble(load_case("ball-on-flat", settings))
 
 
 def test_a_contact_that_reaches_edges() -> None:

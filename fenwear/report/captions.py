@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import xarray
 
+from fenwear.report.gaps import sides_of
 from fenwear.report.lies_between import lies_between
 from fenwear.report.style import Style, direction_words, strip_moves
 from fenwear.report.surface import cut_places, model_of
 from fenwear.results.sheet import BODIES
 
+ALONG = ("profiles", "shape", "pressure", "mean_pressure", "temperature")  # the contact, by lines
 TEXTS = {
     "geometry": "Geometry: (a) whole, (b) near the contact, with elements, supports (red), loads (blue) and the "
     "contact (green); x along the contact, z upwards.",
@@ -106,4 +108,6 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
         last=f"{int(history.half_cycle[-1]):,}",
         between=lies_between(history).get(name.removesuffix("_map"), "").partition(" (")[0],
     )
+    if name in ALONG and (sides := sides_of(history)) is not None:
+        told += f" Solid: the contact {sides[0]}; dotted: {sides[1]}."
     return f"{told} {_each(history)}".strip() if name.startswith("cuts") else told

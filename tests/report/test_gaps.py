@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from fenwear.report.gaps import gaps_of, part_lines, parted
+from fenwear.report.gaps import gaps_of, part_lines, parted, sides_of
 
 
 def test_no_line_over_a_gap() -> None:
@@ -34,3 +34,21 @@ def test_one_part_has_no_gap() -> None:
     gaps = gaps_of(xarray.Dataset(coords={"x": x}))
     assert gaps.shape == (0, 2)
     np.testing.assert_array_equal(parted(x, 2 * x, gaps)[1], 2 * x)
+
+
+def test_sides_of_a_groove_are_two_lines() -> None:
+    """The second, at the radii of the first, is dotted in its colour; captions tell which is which."""
+    r, side = np.tile([31.0, 33.0, 38.0], 2), np.repeat([0, 1], 3)
+    names = {"flag_meanings": "lower upper"}
+    history = xarray.Dataset({"contact": ("node", side, names), "wear": ("node", side)}, {"r": ("node", r)})
+    assert sides_of(history) == ("lower", "upper")
+    figure = Figure()
+    ax = figure.subplots()
+    ax.plot(r, side + 1.0)
+    ax.plot(r[:3], r[:3])
+    part_lines([figure], gaps_of(history))
+    lower, alone, upper = ax.get_lines()
+    for line, value in ((lower, 1.0), (upper, 2.0)):
+        np.testing.assert_array_equal(line.get_data(), [r[:3], np.full(3, value)])
+    assert (upper.get_linestyle(), upper.get_color()) == (":", lower.get_color())
+    assert alone.get_linestyle() == "-"

@@ -51,10 +51,15 @@ from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.layers.memory import Held
 
+ALONG = 1e-9  # cosine between loads and a motion: what is along none
 ZERO = 1e-12  # of the largest: a velocity that is rounding
 LEFT = 0.1  # of heat.property_tolerance: what properties may still change by in the state that is found
 FALLING = 0.7  # of the change of the properties in the pass before
 PASSES = 30
+NO_ONE_MOTION = (
+    "no cyclic steady state exists: no one rigid motion wears all that carries pressure, as where loads press a body "
+    "to either side in turn, and both wear for ever. Follow the wear by `run`"
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -181,7 +186,12 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
 
     def found() -> SteadyState:
         problem = SteadyInequality(prepared)
-        return _result(problem, *_solve(problem))
+        try:
+            return _result(problem, *_solve(problem))
+        except ConvergenceError as error:
+            if _loads_oppose(prepared):
+                raise ConvergenceError(NO_ONE_MOTION) from error
+            raise
 
     prepared.team.serve(prepared)
     return replace(prepared.led_whole(found), system=system)
@@ -273,6 +283,26 @@ def _check_exists(system: Tribosystem) -> None:
             )
 
 
+def _loads_oppose(system: Tribosystem) -> bool:
+    """Return whether no rigid motion is along the loads of all phases that slide.
+
+    Worn depths of a cycle are H v, so that, without friction, sum of w p (H v) = -F v is positive for the loads F of
+    each phase that wears.
+    """
+    loads = np.array([-own.rigid.resultant for own in system.interfaces])[system.path.max(axis=1) > 0]
+    loads = loads / system.mode_lengths
+    sizes = np.linalg.norm(loads, axis=1)
+    loads = loads[sizes > 0] / sizes[sizes > 0, None]
+    if not len(loads):
+        return False
+    along = linprog(  # the largest t with F v >= t for all of them
+        np.append(np.zeros(loads.shape[1]), -1.0),
+        np.hstack([-loads, np.ones((len(loads), 1))]), np.zeros(len(loads)),
+        bounds=[*[(-1.0, 1.0)] * loads.shape[1], (None, 1.0)],
+    )  # fmt: skip
+    return bool(along.status == 0 and -along.fun <= ALONG)
+
+
 def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | None]:
     """Return contact of all phases, with heat the temperatures, the heat of whole cycles, and what laws remember."""
     system = problem.system
@@ -339,6 +369,8 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
     weights, motion = system.pair.weights, system.motion
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
+    if (contact.pressure[:, ~touched] > 0).any():  # its shape goes away from all others
+        raise ConvergenceError(NO_ONE_MOTION)
     shape = np.where(touched, omega - _rigid_part(system, omega - system.pair.initial_gap, touched), np.nan)
     depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
     depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)

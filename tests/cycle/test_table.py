@@ -9,6 +9,7 @@ import pytest
 
 from fenwear import CaseError, Tribosystem, evolve, jump, load_case, march, steady
 from fenwear.assembly import place_case
+from fenwear.errors import ConvergenceError
 from fenwear.results.table_cycle import table_cycle
 from tests.results.test_contacts import COARSE as PADS
 
@@ -105,6 +106,22 @@ def test_a_ring_wears_both_sides_of_its_groove(assembled: Callable[..., Tribosys
     worn, totals = last.end.worn, last.end.totals
     assert pair.weights @ worn.punch == pytest.approx(float(totals.of("volume_punch")), rel=1e-9)
     assert pair.strip.weights @ worn.strip == pytest.approx(float(totals.of("volume_strip")), rel=1e-9)
+
+
+@pytest.mark.parametrize("across", [4, 8])  # Newton's method ends somewhere, or nowhere
+def test_a_ring_pressed_to_either_side_has_no_steady_state(assembled: Callable[..., Tribosystem], across: int) -> None:
+    """No one motion wears both sides, which is said; pressed to one side alone there is one, with p r all over it."""
+    with pytest.raises(ConvergenceError, match="to either side in turn"):
+        steady(assembled("ring-in-groove", f"geometry.parameters.across={across}"))
+    rows = "rows=[[0, 0, -500], [1, 120, -500], [2, 240, -800], [3, 360, -500]]"
+    columns = "columns=['time (s)', 'angle_z (deg)', 'force_z (N)']"
+    motion = f"motion={{kind='cycle', {columns}, {rows}, load={{on='punch_rims'}}}}"
+    system = assembled("ring-in-groove", "geometry.parameters.across=4", motion)
+    found, pair = steady(system), system.pair
+    own, force = pair.punch.nodes_of("lower"), np.array([500.0, 650.0, 650.0])  # in the middle of each step
+    exact = force[:, None] / (2 * np.pi * 7 * pair.punch.x[own, 0])
+    assert (found.phase_pressure[:, ~own] == 0).all()
+    np.testing.assert_allclose((found.phase_pressure[:, own]).mean(axis=0), exact.mean(axis=0), rtol=1e-9)
 
 
 def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:

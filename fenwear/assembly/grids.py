@@ -193,6 +193,8 @@ def _reading(body: ElasticBody, grid: RegularGrid) -> csr_array:
             " by ".join(f"{at:.4g} to {end:.4g}" for at, end in zip(*ends, strict=True))
             for ends in ((first, last), (low, high))
         ]
-        text = f"spans {spans[0]} mm on the {body.body.name}, whose contact surface spans {spans[1]} only"
+        text = f"spans {spans[0]} mm on the {body.body.name}, whose contact surface spans {spans[1]}"
+        beyond = bool((first < low).any() or (last > high).any())
+        text += " only" if beyond else ", but is no rectangle: corners of the grid lie off it"
         raise CaseError(InputError("grid.size", f"{text}: expected a grid within it"))
     return found

@@ -25,7 +25,7 @@ from fenwear.contact.endless import EndlessGrid, Patch
 from fenwear.contact.gridded import PhasesGrid
 from fenwear.contact.krylov import flexible
 from fenwear.contact.operators import Indices, Solve
-from fenwear.contact.worn_shape import ShapeRows
+from fenwear.contact.worn_shape import ShapeRows, worn_by
 
 ACCURACY, FAR = 1e-13, 1e-6  # residual over the right-hand side, and what is no solution
 LONGEST = 1e4  # step of the preconditioner: wear by the mean pressure over the elastic gap
@@ -74,15 +74,7 @@ class WornGrid:
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        m, n, _ = self.equations.shape
-        p, omega, _, _ = self.equations.parts(x)
-        result = self.equations.multiply(x)
-        result[m * n : (m + 1) * n] += self.held * omega - self.worn(p)
-        return result
-
-    def worn(self, pressure: Array) -> Array:
-        """Return what pressures (m, n) wear in a cycle (n,)."""
-        return np.asarray(sum(own @ p for own, p in zip(self.wear, pressure, strict=True)))
+        return self.equations.multiply_with(x, self.wear, self.held)
 
     def factor(self, kept: Indices) -> Solve:
         """Return the solution operator of the rows and columns `kept`, all rigid motions among them.
@@ -151,5 +143,5 @@ class _Near:
         p[:, on.box.nodes] = on.box.values(boxed * self.touching)
         velocity = -own[0] / h
         left = wear - modes @ velocity
-        omega = np.where(self.worn, h * (left + self.of.worn(p)), left / self.alone)
+        omega = np.where(self.worn, h * (left + worn_by(self.of.wear, p)), left / self.alone)
         return np.concatenate([p.ravel(), omega, (own[1:] - own[0]).ravel(), velocity])

@@ -65,12 +65,7 @@ class WornOperator:
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        m, n, _ = self.equations.shape
-        p, omega, _, _ = self.equations.parts(x)
-        result = self.equations.multiply(x)
-        worn = sum(own @ one for own, one in zip(self.meeting.wear, p, strict=True))
-        result[m * n : (m + 1) * n] += self.meeting.held * omega - worn
-        return result
+        return self.equations.multiply_with(x, self.meeting.wear, self.meeting.held)
 
     def factor(self, kept: Indices) -> Solve:
         """Return the solution operator of the rows and columns `kept`, all rigid motions among them.

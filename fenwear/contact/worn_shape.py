@@ -34,6 +34,11 @@ ENOUGH = 2e-12  # residual, scaled to 1, that ends the iterations
 WHOLE = 600
 
 
+def worn_by(wear: Sequence[csr_array], pressure: Array) -> Array:
+    """Return what pressures (m, n) wear in a cycle (n,), by M_k of each phase."""
+    return np.asarray(sum(own @ p for own, p in zip(wear, pressure, strict=True)))
+
+
 class ShapeRows(ABC):
     """The rows of all unknowns, without what wears.
 
@@ -74,6 +79,14 @@ class ShapeRows(ABC):
         gaps[1:] += a @ self.modes.T
         forces = np.einsum("krn,kn->kr", self.balances, p)
         return np.concatenate([gaps.ravel(), self.modes @ velocity, forces.ravel()])
+
+    def multiply_with(self, x: Array, wear: Sequence[csr_array], held: Array) -> Array:
+        """Return the left side of all rows with wear; arguments as of `derivative`."""
+        m, n, _ = self.shape
+        p, omega, _, _ = self.parts(x)
+        result = self.multiply(x)
+        result[m * n : (m + 1) * n] += held * omega - worn_by(wear, p)
+        return result
 
 
 @dataclass(frozen=True)
@@ -249,14 +262,7 @@ class ByShape:
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        m, n, _ = self.equations.shape
-        p, omega, _, _ = self.equations.parts(x)
-        result = self.equations.multiply(x)
-        result[m * n : (m + 1) * n] += self.held * omega - self._worn(p)
-        return result
-
-    def _worn(self, pressure: Array) -> Array:
-        return np.asarray(sum(own @ p for own, p in zip(self.wear, pressure, strict=True)))
+        return self.equations.multiply_with(x, self.wear, self.held)
 
     def factor(self, kept: Indices) -> Solve:
         """Return the solution operator of the rows and columns `kept`.
@@ -336,7 +342,7 @@ class _Reduced:
     def _rows(self, p: Array, thermal: Array, omega: Array, velocity: Array) -> Array:
         """Return the reduced rows: thermal gaps, wear, and forces of the first phase."""
         equations = self.equations
-        wear = self.derivative.held * omega - self.derivative._worn(p) + equations.modes @ velocity
+        wear = self.derivative.held * omega - worn_by(self.derivative.wear, p) + equations.modes @ velocity
         rows = [wear[self.shaped], equations.balances[0] @ p[0]]
         if equations.coupling is not None:
             rows.insert(0, thermal.ravel() - equations.coupling @ p.ravel())

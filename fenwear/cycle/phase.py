@@ -113,10 +113,10 @@ class PhaseStep:
             self._remember(before, end[0])
             return self._end(*end, before, self._passing, worn)
 
+        near_pressure = None if start is None else start.pressure[0]
         touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
         if self._slides_before:  # friction is that of the state at the start
-            mean = None if start is None else start.pressure[0]
-            self._update(mean, temperature, worn, half_cycles, cycle, touching=touching)
+            self._update(near_pressure, temperature, worn, half_cycles, cycle, touching=touching)
         if self._wears_after or self._slides_before:
             contact, after, heat = self._solve(temperature, gap, start, self._passing, worn)
             passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
@@ -124,8 +124,7 @@ class PhaseStep:
             return self._end(contact, after, heat, before, passing, worn)
 
         if self._follows:
-            near = None if start is None else start.pressure[0]
-            conditions = self.system.conditions(self.phase, near, None, worn, half_cycles, cycle, touching)
+            conditions = self.system.conditions(self.phase, near_pressure, None, worn, half_cycles, cycle, touching)
             try:
                 contact = self._following(conditions, gap, start, worn)
             except ConvergenceError:  # in turn they may come together yet

@@ -10,6 +10,7 @@ FULL_START_SEARCH = "contact solved from full contact on, with a line search"
 RIGID_START = "contact solved from where rigid bodies would touch"
 RIGID_START_SEARCH = "contact solved from where rigid bodies would touch, with a line search"
 SOFTER_START = "contact solved by way of softer bodies"
+PIVOTS = "contact solved by pivots"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
 NONE: Counter[str] = Counter()

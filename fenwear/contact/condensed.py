@@ -37,6 +37,7 @@ from fenwear.remedies import (
     FULL_START,
     FULL_START_SEARCH,
     LINE_SEARCH,
+    PIVOTS,
     RIGID_START,
     RIGID_START_SEARCH,
     SOFTER_START,
@@ -51,6 +52,7 @@ LARGE = 5000  # from which on phases that wear together make no matrix of all th
 NUDGE = 1e-6  # of the largest pressure, for differences
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
+PIVOTED = 1000  # unknowns up to which pivots may be tried: their cost is the number's third power
 EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
 
 
@@ -492,6 +494,11 @@ class CondensedContact:
         yield FULL_START_SEARCH, partial(solve, full.ravel(), line_search=True)
         if even:
             yield SOFTER_START, self._from_softer_bodies
+        monotone = (
+            self._coupling is None
+        )  # where heat bulges the surfaces, there may be solutions that time does not lead to
+        if self.size <= PIVOTED and not self._many and monotone and self.most == np.inf:
+            yield PIVOTS, partial(self.inequality.solve_by_pivots, (full if even else touching).ravel())
 
     def _from_softer_bodies(self) -> Array:
         """Return the solution by way of bodies that touch all over, and then give way less and less.

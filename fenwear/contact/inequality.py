@@ -30,6 +30,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array
 from fenwear.contact.operators import Approximate, Indices, Operator, Solve
+from fenwear.contact.pivoting import complementary
 from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
@@ -42,6 +43,7 @@ CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the resid
 SERVES = 3  # such steps, after which the next solve has a factor of its own
 MOST_SHARE = 0.5  # of a step along the last one, that is corrected
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
+LINEARISED = 10  # times, where pivots look for the set
 ROUNDS = 40  # of some digits each, where the derivative changes
 CLOSE = 1e-9  # of residuals, where solutions cost by their digits
 
@@ -217,6 +219,24 @@ class Inequality:
         if x is None and self.sets_first and not line_search:
             x = self._through_sets(start)
         return self._by_snes(start, line_search, most) if x is None else x
+
+    def solve_by_pivots(self, start: Array) -> Array:
+        """Return the solution (size,) by Lemke's method, of the derivative at the start, at its solution, and so on.
+
+        Where there are lower bounds alone, and they are zero.
+
+        Raises:
+            ConvergenceError: pivots find none, or their solutions do not settle.
+        """
+        x, free = start, np.isneginf(self._lower)
+        for _ in range(LINEARISED):
+            operator = self._jacobian(x)
+            matrix = np.array([operator.multiply(unit) for unit in np.eye(len(x))]).T
+            x = complementary(matrix, self._function(x) - operator.multiply(x), free)
+            found = self._by_chords(x) if self.curved else self._on_set(x)
+            if found is not None:
+                return found
+        raise ConvergenceError(f"{self.name} did not converge by pivots")
 
     def _on_set(self, start: Array) -> Array | None:
         """Return the solution where it has the same free unknowns as the start, else None."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, evolve, jump, load_case, march, steady
+from fenwear import CaseError, Tribosystem, assemble, evolve, jump, load_case, march, steady
 from fenwear.assembly import place_case
 from fenwear.errors import ConvergenceError
+from fenwear.remedies import PIVOTS
 from fenwear.results.table_cycle import table_cycle
 from tests.results.test_contacts import COARSE as PADS
 
+MESHES = Path(__file__).parents[2] / "meshes"
 POSITIONS = 3
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.parameters.overlap=3",
          'wear.strip={coefficient="1e-8 1/MPa"}')  # fmt: skip
@@ -122,6 +125,28 @@ def test_a_ring_pressed_to_either_side_has_no_steady_state(assembled: Callable[.
     exact = force[:, None] / (2 * np.pi * 7 * pair.punch.x[own, 0])
     assert (found.phase_pressure[:, ~own] == 0).all()
     np.testing.assert_allclose((found.phase_pressure[:, own]).mean(axis=0), exact.mean(axis=0), rtol=1e-9)
+
+
+def test_a_ring_that_rolls_in_its_groove(tmp_path: Path) -> None:
+    """Pressed at its rim alone it touches at an edge, of either side in turn: sets of nodes go round, pivots end."""
+    geometry = (MESHES / "ring_in_groove.geo").read_text()
+    both, outer = '"punch_rims") = {uprights_0[0], uprights_0[2]}', '"punch_rims") = {uprights_0[2]}'
+    assert both in geometry
+    (tmp_path / "rolling.geo").write_text(geometry.replace(both, outer))
+    settings = [f"geometry.file={tmp_path / 'rolling.geo'}", "geometry.parameters.across=3"]
+    system = assemble(load_case("ring-in-groove", settings))
+    *_, last = blocks = list(jump(system, 20, tolerance=1e-2))
+    assert sum(block.remedies[PIVOTS] for block in blocks) > 0
+    pair, sides = system.pair, [system.pair.punch.nodes_of(name) for name in ("lower", "upper")]
+    for contact, force in zip(last.end.contacts, (500.0, 150.0, 800.0, 800.0, 150.0, 500.0), strict=True):
+        assert contact is not None
+        pressure, gap = contact.pressure[0], contact.gap[0]
+        assert pair.weights @ pressure == pytest.approx(force, rel=1e-9)
+        assert (pressure[sides[0 if force == 500.0 else 1]] == 0).all()
+        assert pressure.min() >= 0
+        assert gap.min() > -1e-9 * 0.05
+        assert np.abs(pressure * gap).max() < 1e-9 * 0.05 * pressure.max()
+    assert pair.weights @ last.end.worn.punch == pytest.approx(float(last.end.totals.of("volume_punch")), rel=1e-9)
 
 
 def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:

@@ -176,7 +176,7 @@ def fitted(feature: str, law: str, _: Path) -> None:
     series = Series(
         "volume", "punch", None, np.array(cycles), "cycles", np.array(volumes), 1e-3 * np.array(volumes), (1, 2)
     )
-    start = case_of(feature, law, f"{key}={1.1 * made!r}")
+    start = case_of(feature, law, f"{key}={1.02 * made!r}")
     assert calibrate(start, [DataSet("twin", (), (series,))], [key]).values[key] == pytest.approx(made, rel=5e-3)
 
 
@@ -191,9 +191,9 @@ def lived(feature: str, law: str, _: Path) -> None:
     made, spread = model_value(case, key), 1 if key == EXPONENT else 5
     level = evaluate(Model(case), parse_quantity("volume after 2 cycles"), {key: made})[0]
     scatter = parse_scatter(case, f"{key}=lognormal({made!r}, {spread} %)")
-    found = lifetime(case, f"volume {level!r} mm^3", scatter, samples=4, comm=MPI.COMM_SELF)
+    found = lifetime(case, f"volume {level!r} mm^3", scatter, samples=3, comm=MPI.COMM_SELF)
     assert not found.failures
-    assert found.lives == pytest.approx(np.full(4, 2.0), rel=0.4)
+    assert found.lives == pytest.approx(np.full(3, 2.0), rel=0.4)
     order = np.argsort(found.samples[:, 0])
     assert (np.diff(found.lives[order]) < 0).all(), "what wears more lives less"
 
@@ -215,16 +215,29 @@ OPEN = [cell for cell in CELLS if not closed(*cell)]
 
 # A calibration is several runs and a run with heat many small steps: they are walked at length.
 LONG = {"calibrate", "sensitivity", "life"}
+# With stick a fit asks for the runs that sensitivities ask for, which every row walks, on jumps that it keeps: these
+# rows have a state of their own that the jumps keep, too.
+FITTED_WITH_STICK = ("in the plane", "heat, to and fro", "laws with memory", "in solids")
+
+
+def repeats(feature: str, law: str, way: str) -> bool:
+    """Return whether other cells walk all that an open one would."""
+    return way == "calibrate" and (
+        feature == "all that lies between"  # its parts have rows
+        or (LAWS[law] == "coulomb" and feature not in FITTED_WITH_STICK)
+    )
+
+
 WALKS = [
     pytest.param(*cell, marks=pytest.mark.slow if cell[2] in LONG or cell[0] != "in the plane" else ())
     for cell in OPEN
-    if cell[2] != "ranks" and (cell[0], cell[2]) != ("all that lies between", "calibrate")  # its parts have rows
+    if cell[2] != "ranks" and not repeats(*cell)
 ]
 
 
 @pytest.mark.parametrize(("feature", "law", "way"), WALKS)
 def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -> None:
-    """Every open cell of the table."""
+    """Every open cell of the table, but what others walk."""
     WALKED[way](feature, law, tmp_path)
 
 

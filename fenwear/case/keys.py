@@ -14,7 +14,7 @@ from pydantic_core import PydanticUndefined
 
 from fenwear.case.bodies import Body
 from fenwear.case.laws import Dependence, WearLaw
-from fenwear.case.quantities import Unit
+from fenwear.case.quantities import Unit, unit_of
 from fenwear.case.schema import Case, part_models
 from fenwear.errors import CaseError, InputError
 
@@ -121,7 +121,7 @@ def _keys(model: type[BaseModel], at: str, kind: str) -> Iterator[Key]:
 
 def _below(field: FieldInfo, parts: list[Any], path: str, kind: str) -> Iterator[Key]:
     listed = _container(field.annotation)
-    key = Key(path, _unit(field), _values(field.annotation), _default(field), field.description or "", kind)
+    key = Key(path, unit_of(field), _values(field.annotation), _default(field), field.description or "", kind)
     if Dependence in parts:
         key = replace(key, values="number, or a table of the keys below")
     elif parts:
@@ -139,16 +139,6 @@ def _container(annotation: Any) -> str:
     """Return what stands between a key and those in it: a name of a table, a number of a list, or nothing."""
     origins = {get_origin(a) for a in (annotation, *get_args(annotation))}
     return ".NAME" if dict in origins else ".N" if tuple in origins else ""
-
-
-def _unit(field: FieldInfo) -> str:
-    return next((m.symbol for m in (*field.metadata, *_metadata(field.annotation)) if isinstance(m, Unit)), "")
-
-
-def _metadata(annotation: Any) -> Iterator[Any]:
-    yield from getattr(annotation, "__metadata__", ())
-    for argument in get_args(annotation):
-        yield from _metadata(argument)
 
 
 def _values(annotation: Any) -> str:

@@ -37,7 +37,9 @@ class Dependence(Part):
         default=None, description="value of each material region of the body, of the punch for friction"
     )
     law: str | None = Field(default=None, description="name of a law registered in Python")
-    unit: str = Field(default="", description="unit of the values")
+    unit: str = Field(
+        default="", description="unit of the values; by default that of the key's bare numbers, which is told"
+    )
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:

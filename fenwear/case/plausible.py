@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from fenwear.case.laws import Dependence
+from fenwear.case.laws import Dependence, WearLaw
+from fenwear.case.quantities import unit_of
 from fenwear.case.schema import OFFSET, Case, Written
 
 HOT = 2000.0  # K: most metals have melted, and no friction couple is used there
@@ -85,7 +86,13 @@ def plausibility_warnings(case: Case) -> list[str]:
     """Return what is to be said of the values of a case, each with its key."""
     values = dict(_leaves(case, ""))
     far = dict(_out_of_range(case, values))
-    return [*far.values(), *_mixed_units(case, far), *_mixed_temperatures(case, values), *_tables(case)]
+    return [
+        *far.values(),
+        *_mixed_units(case, far),
+        *_laws_without_unit(case),
+        *_mixed_temperatures(case, values),
+        *_tables(case),
+    ]
 
 
 def written(data: Mapping[str, Any], resolved: Mapping[str, Any]) -> Written:
@@ -169,6 +176,32 @@ def _mixed_units(case: Case, but: Container[str]) -> Iterator[str]:
                 f"{key}: a number without a unit, read as {values[key]}, beside {beside} = "
                 f"{case.written.united[beside]!r}: give its unit"
             )
+
+
+def _laws_without_unit(case: Case) -> Iterator[str]:
+    """Tell of expressions, tables, regions and laws that say no unit, in which what they give is read."""
+    for key, law, unit in _dependences(case, ""):
+        if unit and not law.unit:
+            form, article = next(
+                (name, "an" if name == "expression" else "a")
+                for name in ("expression", "table", "regions", "law")
+                if getattr(law, name) is not None
+            )
+            named = "values of regions" if form == "regions" else f"{article} {form}"
+            yield f'{key}: {named} without a unit, read in {unit}: give it, {{{form} = ..., unit = "{unit}"}}'
+
+
+def _dependences(part: BaseModel | Mapping[str, Any], path: str) -> Iterator[tuple[str, Dependence, str]]:
+    """Yield what depends on the state inside a part: its key, itself, and the internal unit of its values."""
+    fields = type(part).model_fields if isinstance(part, BaseModel) else {}
+    items = [(name, getattr(part, name)) for name in fields] if isinstance(part, BaseModel) else list(part.items())
+    for name, value in items:
+        key = f"{path}.{name}" if path else name
+        if isinstance(value, Dependence):
+            own = part.unit if isinstance(part, WearLaw) and name == "coefficient" else unit_of(fields[name])
+            yield key, value, own
+        elif isinstance(value, BaseModel | Mapping):
+            yield from _dependences(value, key)
 
 
 def _is_temperature(key: str) -> bool:

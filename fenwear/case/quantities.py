@@ -5,10 +5,12 @@ Every number is held in mm, N, s, K (see `fenwear.case.units`); a case file may 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic.fields import FieldInfo
 
 from fenwear.case.units import convert, quantity_text
 
@@ -33,6 +35,17 @@ def quantity(unit: str) -> Any:
         BeforeValidator(lambda value: convert(value, unit)),
         PlainSerializer(lambda value: quantity_text(value, unit)),
     )
+
+
+def unit_of(field: FieldInfo) -> str:
+    """Return the unit of a key's bare numbers; "" where they are pure."""
+    return next((m.symbol for m in (*field.metadata, *_metadata(field.annotation)) if isinstance(m, Unit)), "")
+
+
+def _metadata(annotation: Any) -> Iterator[Any]:
+    yield from getattr(annotation, "__metadata__", ())
+    for argument in get_args(annotation):
+        yield from _metadata(argument)
 
 
 Length = Annotated[float, *quantity("mm")]

@@ -217,7 +217,8 @@ def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calib
     z = np.zeros(len(problem.unknowns))
     result = None
     for number in range(ROUNDS):  # the jumps of the start are too long or too short for the end
-        _begin(problem, z)
+        if not _begin(problem, z):
+            break  # the fit is on the jumps of its own end
         if number == 0:
             problem.check_influence(problem.jacobian(z), z)
         progress(f"fit {number + 1} of {ROUNDS}")
@@ -257,10 +258,13 @@ def _correlation(problem: LeastSquares, result: Any, jacobian: Array | None = No
     return Correlation(problem.series, whole, problem.sigma, has_sigma=problem.has_sigma)
 
 
-def _begin(problem: LeastSquares, z: Array) -> None:
-    """Run the model where a round of the fit begins; what fails there is told with the values."""
+def _begin(problem: LeastSquares, z: Array) -> bool:
+    """Run the model where a round of the fit begins, and return whether it jumps otherwise than in the round before.
+
+    What fails there is told with the values.
+    """
     try:
-        problem.keep_jumps(z)
+        return problem.keep_jumps(z)
     except ConvergenceError as error:
         values = ", ".join(f"{key} = {value:.4g}" for key, value in problem.values(z).items())
         raise type(error)(

@@ -69,6 +69,7 @@ class LeastSquares:
         self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
         self.correlated: Correlated | None = None  # how the errors of measurement are, beyond sigma
         self._lines, self.baseline_names = self._baselines()
+        self._reach = self._first_reach()
         count = len(self.unknowns) + self._lines.shape[1]
         if len(self.observed) <= count:
             raise CaseError(
@@ -116,18 +117,28 @@ class LeastSquares:
                 names.append((number, name))
         return (np.array(columns).T if columns else np.zeros((len(self.observed), 0))), names
 
-    def keep_jumps(self, z: Vector) -> None:
+    def _first_reach(self) -> Array:
+        """Return how far the first step of a fit may go, by each parameter: a factor of e; a line through the data.
+
+        scipy's own scale, the Jacobian, lets a fit from zero begin with steps of one standard deviation, and doubles.
+        """
+        size = float(max(np.abs(self.observed).max(), self.sigma.max()))
+        return np.concatenate([np.ones(len(self.unknowns)), size / np.abs(self._lines).max(axis=0)])
+
+    def keep_jumps(self, z: Vector) -> bool:
         """Let the runs from now on jump as those of these fitted unknowns do: predictions are smooth functions then.
 
-        Collective, or for rank 0 that leads.
+        Collective, or for rank 0 that leads. Returns whether they jump otherwise than before.
         """
-        self.team.each(self, "keep_own_jumps", z)
+        return bool(self.team.each(self, "keep_own_jumps", z))
 
-    def keep_own_jumps(self, z: Vector) -> None:
+    def keep_own_jumps(self, z: Vector) -> bool:
         """Do so on this rank."""
-        self.predict.keep_jumps(self.values(z))
+        if not self.predict.keep_jumps(self.values(z)):
+            return False
         self._known.clear()
         self._derivatives.clear()
+        return True
 
     def values(self, z: Vector) -> dict[str, float]:
         """Return the keys' values of fitted unknowns."""
@@ -179,7 +190,7 @@ class LeastSquares:
         Raises:
             CaseError: names those that do not.
         """
-        scale = float(np.abs(self.predicted(z)).max()) or 1.0
+        scale = float(np.abs(self._tried(np.asarray(z, dtype=float))).max()) or 1.0
         problems = [
             InputError(f"--unknown {one.unknown.key}", "has no influence on what was measured")
             for one, column in zip(self.unknowns, jacobian.T, strict=True)
@@ -222,7 +233,7 @@ class LeastSquares:
         minimizer = self.minimizer(observed, start)
         minimizer.max_nfev = MOST_TRIALS
         with warnings.catch_warnings(action="ignore"):  # a singular covariance is told in our words
-            return minimizer.minimize(method="least_squares", jac=derivative, x_scale="jac", xtol=SETTLED)
+            return minimizer.minimize(method="least_squares", jac=derivative, x_scale=self._reach, xtol=SETTLED)
 
     def minimizer(self, observed: Array | None = None, start: Vector | None = None) -> lmfit.Minimizer:
         """Return lmfit's minimizer of the weighted residuals; arguments as of `fit`."""

@@ -21,13 +21,14 @@ class Predictor:
         self.model, self.data = model, list(data)
         self._sequences: dict[tuple[str, ...], tuple[int, ...]] = {}
 
-    def keep_jumps(self, values: Mapping[str, float]) -> None:
-        """Let the runs from now on jump as those at these values do."""
-        self._sequences = {}
+    def keep_jumps(self, values: Mapping[str, float]) -> bool:
+        """Let the runs from now on jump as those at these values do; return whether that is otherwise than before."""
+        before, self._sequences = self._sequences, {}
         made = {}
         for settings, snapshots in self._runs(values).items():
             made[settings] = tuple(int(s.cycle) for s in snapshots)
         self._sequences = made
+        return made != before
 
     def __call__(self, values: Mapping[str, float], *, strict: bool = False) -> list[Array]:
         """Return the predictions of every series, in the order of the data sets.

@@ -39,6 +39,22 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
             "5000 µm as it is read without a unit",
         ),
         (["materials.steel.yield_stress=0.3"], "materials.steel.yield_stress", "0.3 MPa as it is read without a unit"),
+        (
+            ["wear.punch.coefficient={expression='4e-8 * (1 + p / 50)'}"],
+            "wear.punch.coefficient",
+            'an expression without a unit, read in MPa^-1: give it, {expression = ..., unit = "MPa^-1"}',
+        ),
+        (
+            ["wear.punch.coefficient={table=[[0, 1e-9], [9, 2e-9]], of='s'}", "wear.punch.pressure_exponent=1.5"],
+            "wear.punch.coefficient",
+            "a table without a unit, read in MPa^-1.5",
+        ),
+        (["materials.steel.young={expression='2e5 - T'}"], "materials.steel.young", "read in MPa: give it"),
+        (
+            ["contact.third_body={share=0.5, life={expression='3 + p'}}"],
+            "contact.third_body.life",
+            "read in mm: give it",
+        ),
         (["motion.amplitude=2"], "motion.amplitude", "read as 2.0 mm, beside motion.angular_frequency = '10 rad/s'"),
         (["heat.initial='20 degC'", "heat.ambient=20"], "heat.ambient", "20 K without a unit, which is -253.15 degC"),
         (["heat.initial='20 degC'"], "strip.temperatures.0.temperature", "0 K, which is -273.15 degC"),
@@ -86,3 +102,16 @@ def test_how_a_case_was_written_is_no_part_of_it() -> None:
 def test_every_range_is_one() -> None:
     """From low to high, with a reason."""
     assert all(r.low < r.high and r.reason and r.size > 0 for r in RANGES)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "contact.friction={expression='0.2 + 0 * p'}",  # a pure number
+        "wear.punch={per_area={expression='2e-9 + 0 * p'}}",
+        "wear.punch.coefficient={expression='4e-8 + 0 * p', unit='1/MPa'}",
+        "wear.punch.coefficient=4e-8",  # bare numbers are in the unit of the key, as the reference says
+    ],
+)
+def test_nothing_is_said_of_laws_whose_unit_is_clear(setting: str) -> None:
+    assert plausibility_warnings(load_case("example1", [setting])) == []

@@ -442,6 +442,11 @@ class ContactSetup:
         return (*found, self.path.sum(axis=0) / motion.period if motion.steps else mean)
 
     @cached_property
+    def _none(self) -> Array:
+        """Nothing at the nodes (n,)."""
+        return np.zeros(len(self.pair.weights))
+
+    @cached_property
     def _initial(self) -> Array:
         """The initial temperature at the nodes (n,), K."""
         return np.full(len(self.pair.weights), 0.0 if self.heat is None else self.heat.initial)
@@ -481,19 +486,19 @@ class ContactSetup:
             cycle: Of the pressures of all phases, by `SlidingWays.shear`; by default they are not known.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
-        n, initial = len(self.pair.weights), self._initial
+        none, initial = self._none, self._initial
         slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[phase or 0]
-        pair, none = self.pair if phase is None else self.pairs[phase], np.zeros(n)
+        pair = self.pair if phase is None else self.pairs[phase]
         depths: tuple[Array, Array] = none, none
         if worn is not None:
             depths = worn.punch, pair.wear_interpolation @ worn.strip if self.strip_wears else none
         edge = None
         if self.edges is not None:
             if touching is None:
-                touching = np.full(n, True) if pressure is None else pressure > 0
+                touching = np.full(len(none), True) if pressure is None else pressure > 0
             edge = self.edges.distance(touching)
         return ContactConditions(
-            np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
+            np.full(len(none), self.rigid.mean_pressure) if pressure is None else pressure,
             self._speeds[-1 if phase is None else phase],
             (initial, initial) if temperatures is None else temperatures,
             self._places[-1 if phase is None else phase],

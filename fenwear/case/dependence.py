@@ -96,6 +96,9 @@ def _build(node: ast.AST, text: str, depth: int) -> Function:
             if len(args) != (2 if name in ("min", "max") else 1):
                 raise ValueError(f"wrong number of arguments of {name} in {text!r}")
             function, inners = FUNCTIONS[name], [_build(argument, text, depth - 1) for argument in args]
+            if len(inners) == 1:
+                (only,) = inners
+                return lambda state: function(only(state))
             return lambda state: function(*(inner(state) for inner in inners))
     found = ast.get_source_segment(text, node) or type(node).__name__  # ast.unparse may exhaust the stack
     raise ValueError(f"expected an expression of {KNOWN}; {found!r} is not known in {text!r}")

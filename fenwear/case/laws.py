@@ -94,9 +94,18 @@ class Dependence(Part):
         return convert(f"1 {self.unit}", unit) if self.unit else 1.0
 
     def values(
-        self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str, least: float = 0.0
+        self,
+        state: Mapping[str, Array],
+        shape: tuple[int, ...],
+        factor: float,
+        key: str,
+        least: float = 0.0,
+        *,
+        checked: bool = True,
     ) -> Array:
         """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
+
+        On the way to a solution, whose own values are, they need not be `checked`.
 
         Raises:
             CaseError: it is less than `least` or not finite somewhere; `key` is the case's key.
@@ -112,13 +121,13 @@ class Dependence(Part):
                 raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
-        if not (np.minimum.reduce(values) >= least and np.maximum.reduce(values) < np.inf):
+        if checked and not (np.minimum.reduce(values) >= least and np.maximum.reduce(values) < np.inf):
             node = int(np.flatnonzero(~(np.isfinite(values) & (values >= least)))[0])
             named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
             wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
             raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
-        return values * factor
+        return values if factor == 1 else values * factor
 
 
 @lru_cache(maxsize=100)

@@ -215,7 +215,7 @@ def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: t
     given = {key: now[key].copy() if now[key].shape == shape else np.full(shape, now[key]) for key in of}
     try:
         found = np.asarray(function(given))
-        if np.iscomplexobj(found):
+        if found.dtype.kind == "c":
             raise ValueError("it gives complex numbers")
         values = found.astype(float)  # a copy of what may be the user's own
     except KeyError as error:

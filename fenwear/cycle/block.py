@@ -352,10 +352,10 @@ class Recorder:
 
     def _balances(self) -> Array:
         """Return the largest error of the force and moment balance of each half-cycle relative to the contact force."""
-        groups: dict[tuple[int, int], list[tuple[int, PhaseRecord]]] = {}  # of a phase at one friction
+        groups: dict[tuple[int, int], list[tuple[int, PhaseRecord]]] = {}  # of a phase on its surfaces
         for number, row in enumerate(self._rows):
             for record in row.phases:
-                groups.setdefault((record.phase, id(record.friction_ratio)), []).append((number, record))
+                groups.setdefault((record.phase, id(record.equilibrium)), []).append((number, record))
         errors = np.zeros(len(self._rows))
         for members in groups.values():
             numbers, records = zip(*members, strict=True)
@@ -363,9 +363,13 @@ class Recorder:
             pressure = np.concatenate([record.contact.pressure for record in records])
             force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
-            rows = equilibrium.equilibrium(records[0].friction_ratio)
             loads = np.array([self._rows[number].load for number in numbers])
-            balance = np.einsum("kn,mn->km", pressure, rows) + loads[:, None] * equilibrium.resultant
+            ratios = [record.friction_ratio for record in records]
+            if all(ratio is ratios[0] for ratio in ratios):
+                carried = np.einsum("kn,mn->km", pressure, equilibrium.equilibrium(ratios[0]))
+            else:
+                carried = np.array([equilibrium.of(own, ratio) for own, ratio in zip(pressure, ratios, strict=True)])
+            balance = carried + loads[:, None] * equilibrium.resultant
             error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)
         return errors

@@ -130,7 +130,10 @@ class PhaseStep:
             except ConvergenceError:  # in turn they may come together yet
                 pass
             else:
-                passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
+                if self.system.edges is None:
+                    passing = self._taken(conditions.pressed(contact.pressure[0]), worn, ended=True)
+                else:
+                    passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
                 self._remember(before, contact)
                 return self._end(contact, None, None, before, passing, worn)
 
@@ -167,6 +170,8 @@ class PhaseStep:
         assert isinstance(self._contact, CondensedContact)
         mu = self.system.friction.by_pressure(conditions)
         self._contact.follow(mu, self._bare, self._along)
+        if self.system.layers.hardness == np.inf:
+            return self._contact.solve(gap, start, self._passing.step(worn, implicit=self.implicit))
         solve = self._capped if self._contact.most < np.inf else partial(self._flowing, self._contact)
         contact, _, _ = solve(None, gap, start, self._passing, worn)
         return contact
@@ -185,12 +190,12 @@ class PhaseStep:
         known = self._known
         if before is None or len(known) < 2 or before is not known[0]:
             return before
-        hardness, shares = self.system.layers.hardness, ONWARDS[len(known) - 1]
-        further = sum((share * one.pressure for share, one in zip(shares, known, strict=True)), np.zeros(()))
+        hardness, shares = self.system.layers.hardness, np.array(ONWARDS[len(known) - 1], dtype=float)
+        further = (shares @ np.concatenate([one.pressure for one in known]))[None]
         kept = (before.pressure > 0) & (further > 0)
         if hardness < np.inf:
             kept &= (before.pressure < hardness) & (further < hardness)
-        rigid = sum((share * one.rigid for share, one in zip(shares, known, strict=True)), np.zeros(()))
+        rigid = (shares @ np.concatenate([one.rigid for one in known]))[None]
         return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(
@@ -209,11 +214,15 @@ class PhaseStep:
         Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
         that touch, by default those that carry this pressure.
         """
-        system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
-        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
+        conditions = self.system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
+        return self._taken(conditions, worn, ended=ended)
+
+    def _taken(self, conditions: ContactConditions, worn: WornDepths, *, ended: bool) -> LayerEvolution:
+        """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""
+        system = self.system
         evolution = system.evolution([conditions], worn, [self.phase])
         end: Held | None = None
         if evolution is not None:  # coefficients are those of the states in the middle of the phase

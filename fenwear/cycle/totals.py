@@ -115,28 +115,28 @@ class PhaseMeter:
         bare, along = (in_model(one, normal.shape[1]) for one in (self._bare, self._along))
         self._carried = self._areas * np.einsum("id,id->i", normal + bare, self._approach)
         self._dragged = self._areas * np.einsum("id,id->i", along, self._approach)
-        self._take(mu, wear)
+        areas = self._areas[:, None]
+        self._drag_bare, self._drag_along = areas * self._bare, areas * self._along
+        self._rows = np.zeros((len(SUMS), len(none)))
+        self._rows[LOAD_PATH] = self._areas * self._path
+        self._take(mu)
+        self._wear(wear)
 
     def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
         """Return the same at other coefficients."""
         found = object.__new__(PhaseMeter)
         found.__dict__.update(self.__dict__)
-        if mu is self._mu:
-            found._rows = self._rows.copy()
-            found._wear(wear)
-        else:
-            found._take(mu, wear)
+        found._rows = self._rows.copy()
+        if mu is not self._mu:
+            found._take(mu)
+        found._wear(wear)
         return found
 
-    def _take(self, mu: Array, wear: PhasesWear) -> None:
-        areas = self._areas
+    def _take(self, mu: Array) -> None:
         self._mu, self._energy = mu, mu * self._path
-        self._rows = np.zeros((len(SUMS), len(areas)))
-        self._rows[LOAD_PATH] = areas * self._path
-        self._rows[WORK] = areas * self._energy
+        np.multiply(self._areas, self._energy, out=self._rows[WORK])
         self._load = self._carried + mu * self._dragged
-        self._drag = areas[:, None] * (self._bare + mu[:, None] * self._along)
-        self._wear(wear)
+        self._drag = self._drag_bare + mu[:, None] * self._drag_along
 
     def _wear(self, wear: PhasesWear) -> None:
         self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
@@ -144,7 +144,7 @@ class PhaseMeter:
             if own is None:
                 self._rows[first + 1] = 0.0 * weigh[1]
             elif own.linear:
-                self._rows[first : first + 2] = weigh * own.rate[0]
+                np.multiply(weigh, own.rate[0], out=self._rows[first : first + 2])
             else:
                 self._curved.append((slice(first, first + 2), weigh, own))
 

@@ -53,6 +53,13 @@ class RigidEquilibrium:
         traction = self.pair.normal + friction_ratio
         return np.einsum("id,idm->mi", traction, self.motion) * self.pair.weights
 
+    def of(self, pressure: Array, friction_ratio: Array | float) -> Array:
+        """Return the load on each mode (modes,) that pressures (n,) balance; arguments as of `equilibrium`."""
+        traction = self.pair.normal + friction_ratio
+        traction *= (pressure * self.pair.weights)[:, None]
+        found: Array = traction.ravel() @ self.motion.reshape(traction.size, -1)
+        return found
+
     @property
     def mean_pressure(self) -> float:
         """Load over the nominal contact, MPa; 1 where supports and not the contact carry the load."""

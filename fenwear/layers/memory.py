@@ -102,8 +102,10 @@ class Memory:
     def known(self, values: Array) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return the states (Q, n) at the contact's nodes by name, as laws of punch and strip know them."""
         q = len(self.contact)
-        contact = {name: np.asarray(row) for name, row in zip(self.contact, values[:q], strict=True)}
-        strip = {name: np.asarray(row) for name, row in zip(self.strip, values[q:], strict=True)}
+        contact: dict[str, Array] = dict(zip(self.contact, values[:q], strict=True))
+        if not self.strip:
+            return contact, contact
+        strip: dict[str, Array] = dict(zip(self.strip, values[q:], strict=True))
         return {**strip, **contact}, {**contact, **strip}
 
     def by_name(self, held: Held) -> dict[str, Array]:
@@ -255,7 +257,7 @@ class Evolution:
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
             begin = held.at_contact(pair)
             middle, end, z = self._over(begin, float(tau), self._under(k))
-            middles.append(replace(self.conditions[k], states=self.memory.known(middle)))
+            middles.append(self.conditions[k].remembering(self.memory.known(middle)))
             strip, z_strip = held.strip, np.zeros((held.strip.shape[1], len(held.strip), len(held.strip)))
             if len(strip):
                 onto = pair.wear_projection
@@ -407,13 +409,13 @@ class Evolution:
                     if parts > 2:  # else the same, which it is where r is linear
                         own = rates.slope(now, rate, dt)
                         growth = _phi(dt * own)
-                    z = z + dt * own
+                    z += dt * own
                 now = now + _increment(rate, growth, dt)
                 if 2 * (part + 1) == parts:
                     middle = now
             missing, end = now - end, now
-            scale = np.abs(end).max(axis=1, initial=0) + np.abs(end - start).max(axis=1, initial=0)
-            if (np.abs(missing).max(axis=1, initial=0) <= AGREE * scale).all():
+            largest = np.abs([missing, end, end - start]).max(axis=2, initial=0)
+            if (largest[0] <= AGREE * (largest[1] + largest[2])).all():
                 return middle, end + missing / 3, z
         raise ConvergenceError(f"{self._told()} change too fast within a half-cycle: expected rates that are smoother")
 

@@ -137,7 +137,7 @@ def covering(
         pair: The surfaces opposite each other.
         depths: Worn off both bodies at their own nodes, mm; None where all is worn through.
     """
-    if depths is None:
+    if depths is None or (coatings[0] is None and coatings[1] is None):
         return None, None
     punch, strip = (
         None if thickness is None else covered(thickness, depth)

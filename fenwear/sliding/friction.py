@@ -70,6 +70,28 @@ class ContactConditions:
         """Shape of nodal values."""
         return self.pressure.shape
 
+    def pressed(self, pressure: Array) -> Self:
+        """Return the same under another pressure (n,), MPa, and all else as it is."""
+        changes = {"p": pressure, "pm": pressure} if self.cycle is None else {"p": pressure}
+        found = self._but(pressure=pressure)
+        found._known.update({body: {**own, **changes} for body, own in self._known.items()})
+        return found
+
+    def remembering(self, states: tuple[Mapping[str, Array], Mapping[str, Array]]) -> Self:
+        """Return the same where laws remember these states, as those of punch and strip know them."""
+        found = self._but(states=states)
+        for body, own in self._known.items():
+            found._known[body] = {**own, **states[1 if body == "strip" else 0]}
+        return found
+
+    def _but(self, **changes: object) -> Self:
+        """Return the same with some attributes changed; nothing is known of it yet."""
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__)
+        found.__dict__.pop("derived", None)
+        found.__dict__.update(changes, _known={})
+        return found
+
     def of(self, body: Literal["punch", "strip", "mean"]) -> Mapping[str, Array]:
         """Return the variables of laws, of a body; or of the punch, with the mean temperature of both."""
         if (known := self._known.get(body)) is not None:
@@ -97,7 +119,7 @@ class ContactConditions:
         return found
 
     @cached_property
-    def _known(self) -> dict[str, Mapping[str, Array]]:
+    def _known(self) -> dict[str, dict[str, Array]]:
         """What has been asked for by body."""
         return {}
 
@@ -132,9 +154,9 @@ class Friction:
         """Whether the share of the load that asperities carry changes with more than the place."""
         return self.contact.lubrication is not None and self.contact.lubrication.varies
 
-    def asks(self, *names: str) -> bool:
-        """Return whether mu depends on one of these variables of coefficients."""
-        lubrication = self.contact.lubrication
+    def asks(self, *names: str, of_share: bool = True) -> bool:
+        """Return whether mu, or that of asperities alone, depends on one of these variables of coefficients."""
+        lubrication = self.contact.lubrication if of_share else None
         given = (self.contact.friction, None if lubrication is None else lubrication.given[1])
         return any(isinstance(one, Dependence) and any(map(one.depends_on, names)) for one in given)
 
@@ -146,13 +168,18 @@ class Friction:
     def by_pressure(self, conditions: ContactConditions) -> Callable[[Array], Array]:
         """Return mu (n,) by the pressure (n,), as `values`, where all else is as in these conditions."""
         state, with_cycle, lubrication = dict(conditions.of("mean")), conditions.cycle is None, self.contact.lubrication
+        shape, fluid = conditions.shape, 0.0 if lubrication is None else lubrication.fluid_friction
+        alike = not self.asks("p", "pm", of_share=False)
+        more = self._of_asperities(state, conditions) - fluid if alike else None  # than the fluid, of asperities
 
         def values(pressure: Array) -> Array:
             state["p"] = pressure
             if with_cycle:
                 state["pm"] = pressure
-            share = 1.0 if lubrication is None else asperity_share(lubrication, state, conditions.shape)
-            return self._values(state, conditions, share)
+            share = 1.0 if lubrication is None else asperity_share(lubrication, state, shape, checked=False)
+            if more is None:
+                return self._values(state, conditions, share, checked=False)
+            return fluid + share * more
 
         return values
 
@@ -169,9 +196,11 @@ class Friction:
             conditions.derived["share"] = asperity_share(lubrication, conditions.of("mean"), conditions.shape)
         return conditions.derived["share"]
 
-    def _values(self, state: Mapping[str, Array], conditions: ContactConditions, share: Array | float) -> Array:
+    def _values(
+        self, state: Mapping[str, Array], conditions: ContactConditions, share: Array | float, *, checked: bool = True
+    ) -> Array:
         """Return mu at the nodes (n,) by the variables of laws, a share, and of conditions what coatings are left."""
-        found, lubrication = self._of_asperities(state, conditions), self.contact.lubrication
+        found, lubrication = self._of_asperities(state, conditions, checked=checked), self.contact.lubrication
         if lubrication is None:
             return found
         return np.asarray(lubrication.fluid_friction + share * (found - lubrication.fluid_friction))
@@ -192,12 +221,16 @@ class Friction:
         """
         return self._of_asperities(conditions.of("mean"), conditions)
 
-    def _of_asperities(self, state: Mapping[str, Array], conditions: ContactConditions) -> Array:
+    def _of_asperities(
+        self, state: Mapping[str, Array], conditions: ContactConditions, *, checked: bool = True
+    ) -> Array:
         mu = self.contact.friction
         if isinstance(mu, Dependence):
-            found = mu.values(state, conditions.shape, 1.0, "contact.friction")
+            found = mu.values(state, conditions.shape, 1.0, "contact.friction", checked=checked)
         else:
             found = np.full(conditions.shape, float(mu))
+        if self.of_coatings == (None, None):
+            return found
         for of_coating, share in zip(reversed(self.of_coatings), reversed(conditions.covered), strict=True):
             if of_coating is not None and share is not None:  # the punch's before the strip's, where both have one
                 found = found + share * (of_coating - found)

@@ -20,13 +20,16 @@ from fenwear.case.lubrication import Lubrication
 from fenwear.errors import CaseError, InputError
 
 
-def asperity_share(lubrication: Lubrication, state: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
+def asperity_share(
+    lubrication: Lubrication, state: Mapping[str, Array], shape: tuple[int, ...], *, checked: bool = True
+) -> Array:
     """Return X at nodes (n,).
 
     Args:
         lubrication: Its table.
         state: Variables of laws at the nodes, by name.
         shape: Of nodal values.
+        checked: Whether values of a law are: not on the way to a solution.
 
     Raises:
         CaseError: it is not between 0 and 1 somewhere, or the film is not positive.
@@ -37,10 +40,11 @@ def asperity_share(lubrication: Lubrication, state: Mapping[str, Array], shape: 
         found = np.full(shape, float(value))
     else:
         of_film = name == "film"
-        found = value.values(state, shape, value.scale("mm") if of_film else 1.0, key, 1e-300 if of_film else 0.0)
+        factor, least = (value.scale("mm"), 1e-300) if of_film else (1.0, 0.0)
+        found = value.values(state, shape, factor, key, least, checked=checked)
     if name == "film":
         return np.asarray(np.interp(found / (lubrication.roughness or 1.0), *np.array(lubrication.share_over_lambda).T))
-    if np.maximum.reduce(found) > 1:
+    if checked and np.maximum.reduce(found) > 1:
         at = int(found.argmax())
         told = ", ".join(f"{one} = {np.broadcast_to(state[one], shape)[at]:g}" for one in ("p", "v", "T"))
         raise CaseError(InputError(key, f"expected at most 1, got {found[at]:g} at {told}"))

@@ -116,6 +116,7 @@ def check_command(
     from fenwear.optimum import motion_words
 
     number = stability_number(system)
+    system.passing(system.phases_wear)  # with a look at the life of debris, as at all other laws
     system.check_touching()
     warnings = [
         *position_warnings(system),

@@ -112,8 +112,8 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "fretting-partial-slip",
         (
             *SMALL,
-            "wear={punch={coefficient='2e-7 1/MPa', coating={thickness='1e-7 mm', coefficient='1e-7 1/MPa', "
-            "friction=0.69, modulus='500 MPa'}}}",
+            "wear={punch={coefficient={expression='2e-7 * (1 + p / 1000)', unit='1/MPa'}, "
+            "coating={thickness='1e-7 mm', coefficient='1e-7 1/MPa', friction=0.69, modulus='500 MPa'}}}",
         ),
     ),
     "laws with memory": (  # registered in `test_combinations.py`

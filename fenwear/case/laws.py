@@ -225,7 +225,12 @@ class Coating(OfPlace):
         default=None, description="volume of the coating worn over the energy of friction"
     )
     per_area: Annotated[Number, Field(gt=0)] | None = Field(
-        default=None, description="k_A of the coating, above a base that wears per_area, too, with its touching_from"
+        default=None, description="k_A of the coating, depth over length wherever surfaces touch; above any base"
+    )
+    touching_from: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None,
+        description="with per_area: pressure from which on a place of the coating counts as touching; by default that "
+        "of the base",
     )
     modulus: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None,
@@ -246,6 +251,8 @@ class Coating(OfPlace):
             raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
+        if self.touching_from is not None and self.per_area is None:
+            raise ValueError("touching_from: expected with per_area")
         if self.coefficient is not None and not (math.isfinite(self.coefficient) and self.coefficient > 0):
             raise ValueError("coefficient: expected a finite number above zero")
         return self
@@ -355,8 +362,6 @@ class WearLaw(Part):
                 convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
             except ValueError as error:
                 raise ValueError(f"coefficient: unit: {error}") from None
-        if self.coating is not None and (self.coating.per_area is None) != (self.per_area is None):
-            raise ValueError("coating.per_area: expected where the base wears per_area, and only there")
         if self.coating is not None and self.coating.coefficient is None and self._exponents != (1.0, 1.0):
             raise ValueError("coating: expected a coefficient with other exponents than 1")
         return self
@@ -376,7 +381,12 @@ class WearLaw(Part):
         own = self.coating
         if own is None:
             return None
-        changes = {key: getattr(own, key) for key in ("coefficient", "archard", "hardness", "energy", "per_area")}
+        keys = ("coefficient", "archard", "hardness", "energy", "per_area")
+        changes: dict[str, Any] = {key: getattr(own, key) for key in keys}
+        if own.per_area is not None:
+            changes |= {"pressure_threshold": 0.0, "pressure_cap": None}
+        if own.touching_from is not None:
+            changes["touching_from"] = own.touching_from
         return self.model_copy(update={**changes, "beta": None, "coating": None})
 
     @property

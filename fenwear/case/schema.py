@@ -20,7 +20,7 @@ from fenwear.case.course import Output, Program, Run
 from fenwear.case.creep import creep_problems
 from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
-from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
+from fenwear.case.laws import Dependence, Stick, Wear
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
 from fenwear.case.names import ROLES, Names, renamed
@@ -472,9 +472,6 @@ class Case(Part):
                 table and self.model.kind == "plane" and any(name.endswith("shift_y") for name in columns)
             ),
             "stick.force: expected none in a cycle, whose forces are columns,": table and self.stick.force is not None,
-            "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
-                law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
-            ),
             "grid.across: expected grid.nodes, of a grid that stays,": (
                 self.grid is not None and self.grid.across is not None
             ),
@@ -483,17 +480,6 @@ class Case(Part):
             ),
         }
         return [problem for problem, so in wrong.items() if so]
-
-    def _one_ratio(self, law: WearLaw) -> bool:
-        """Return whether the coefficients of a base and its coating have a ratio that stays."""
-        above, given = law.of_coating, law.given_coefficient
-        if above is None or (isinstance(given, Dependence) and given.varies):
-            return False
-        own = law.coating is not None and law.coating.friction is not None
-        changes = own or (isinstance(self.contact.friction, Dependence) and self.contact.friction.varies)
-        changes = changes or any(one.coating is not None and one.coating.friction is not None for one in self.wear.laws)
-        by_friction = [(one.beta, one.energy) != (None, None) for one in (law, above)]
-        return not changes or by_friction[0] == by_friction[1]
 
     @property
     def varies(self) -> bool:

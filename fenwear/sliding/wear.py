@@ -97,17 +97,17 @@ class _BodyWear:
             pressure: MPa.
             worn: What of coating and base there; by default of the base alone.
         """
-        return self._rate(worn, slope=False) * self.law.value(pressure)
+        if worn is None or self.coating is None:
+            return self.rate * self.law.value(pressure)
+        of_coating = self.coating.rate * worn.coating * self.coating.law.value(pressure)
+        return of_coating + self.rate * worn.base * self.law.value(pressure)
 
     def slope(self, pressure: Array, worn: Shares | None = None) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
-        return self._rate(worn, slope=True) * self.law.slope(pressure)
-
-    def _rate(self, worn: Shares | None, *, slope: bool) -> Array:
         if worn is None or self.coating is None:
-            return self.rate
-        of = (worn.by_coating, worn.by_base) if slope else (worn.coating, worn.base)
-        return self.coating.rate * of[0] + self.rate * of[1]
+            return self.rate * self.law.slope(pressure)
+        of_coating = self.coating.rate * worn.by_coating * self.coating.law.slope(pressure)
+        return of_coating + self.rate * worn.by_base * self.law.slope(pressure)
 
     @property
     def linear(self) -> bool:
@@ -121,12 +121,14 @@ class _CoatingWear:
 
     Attributes:
         rate: Of the coating.
+        law: What of the pressure wears it.
         thickness: At the body's own contact nodes, mm.
         left: Of it where a step begins; None where it is worn through everywhere.
         cycles: Length of the step, by which what is worn in a cycle is that of the whole step over it.
     """
 
     rate: Array
+    law: PressureLaw
     thickness: Array
     left: Array | None = None
     cycles: float = 1.0
@@ -192,13 +194,14 @@ class PhasesWear:
         """Return what is worn of coating and base of a body, at its own nodes; None where all is of the base."""
         if body is None or body.coating is None or body.coating.left is None:
             return None
-        felt, own, left = body.law.value(pressure), body.coating, body.coating.left
+        own, left = body.coating, body.coating.left
+        worn = (own.rate * own.law.value(pressure), body.rate * body.law.value(pressure))
         if body is self.punch:
-            coating, base = (np.asarray((rate * felt).sum(axis=0)) for rate in (own.rate, body.rate))
+            coating, base = (np.asarray(one.sum(axis=0)) for one in worn)
         else:
             coating, base = (
-                np.sum([pair.wear_projection @ one for pair, one in zip(self.pairs, rate * felt, strict=True)], axis=0)
-                for rate in (own.rate, body.rate)
+                np.sum([pair.wear_projection @ part for pair, part in zip(self.pairs, one, strict=True)], axis=0)
+                for one in worn
             )
         return shares(own.cycles * coating, own.cycles * base, left)
 
@@ -233,7 +236,7 @@ class PhasesWear:
             for k, (pair, depth) in enumerate(zip(self.pairs, self.strip.depth(pressure), strict=True)):
                 of_base = pair.wear_projection @ depth
                 if worn is not None and coating is not None:
-                    of_coating = pair.wear_projection @ (coating.rate[k] * self.strip.law.value(pressure[k]))
+                    of_coating = pair.wear_projection @ (coating.rate[k] * coating.law.value(pressure[k]))
                     of_base = worn.coating * of_coating + worn.base * of_base
                 strip += of_base
         punch = self.depth(pressure)
@@ -270,7 +273,7 @@ class PhasesWear:
             onto = self.pairs[k].wear_projection
             of_base = csr_array(onto @ diags_array(slope))
             if worn is not None and coating is not None:
-                of_coating = onto @ diags_array(coating.rate[k] * self.strip.law.slope(pressure)[k])
+                of_coating = onto @ diags_array(coating.rate[k] * coating.law.slope(pressure)[k])
                 of_base = csr_array(diags_array(worn.by_coating) @ of_coating + diags_array(worn.by_base) @ of_base)
             found.append(of_base)
         return found
@@ -411,7 +414,11 @@ class Wear:
                 return found[0][None] if len(found) == 1 else np.array(found)
 
             above = law.of_coating
-            coating = None if above is None or thickness is None else _CoatingWear(rates(above), thickness)
+            coating = (
+                None
+                if above is None or thickness is None
+                else _CoatingWear(rates(above), PressureLaw.of(above), thickness)
+            )
             bodies.append(_BodyWear(rates(law), self._of_pressure[key], coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 

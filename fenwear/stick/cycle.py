@@ -18,7 +18,7 @@ from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
-from fenwear.sliding.coating import CoatedBody, covering
+from fenwear.sliding.coating import CoatedBody, Shares, covering, left_of, shares
 from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.screw import Screw
@@ -35,6 +35,9 @@ from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalLaws, LocalWear
 
 T = TypeVar("T")
+_Both = tuple[Array, Array]  # of punch and strip
+_Parts = tuple[Shares | None, Shares | None]
+_PerLayer = tuple[tuple[Array, Array], tuple[Array, Array]]  # of punch and strip, of coating and base each
 MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
 
 
@@ -56,6 +59,7 @@ class TimeStepRecords:
             with it.
         punch_depth, strip_depth: Worn off each body in the step, at the contact nodes (k, n), mm; of a coated one as if
             all of it were of the coating.
+        punch_base, strip_base: The same as if all coatings were worn through.
         strain: Of the strip's surface opposite each node, along and across the sliding (k, n, m).
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
@@ -80,6 +84,8 @@ class TimeStepRecords:
     closing: Array
     punch_depth: Array
     strip_depth: Array
+    punch_base: Array
+    strip_base: Array
     strain: Array
     iterations: Array
     unique: Mask
@@ -207,7 +213,8 @@ class PartialSlipProblem:
         watch: Called before every time step: may raise InterruptedRunError.
         expanded: What loads do with a thermal expansion that stays as it is, at an offset of the strip.
         laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
-        coatings: Of both bodies, whose `wear` is then that of the coating; None for a body without.
+        coatings: Of both bodies, whose `wear` is then that of the coating, by the ratio of coefficients where nothing
+            tells another one; None for a body without.
     """
 
     def __init__(
@@ -519,22 +526,85 @@ class PartialSlipProblem:
             rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps: of a
                 coated body then as if all of it were of the coating.
         """
+        worn = self.worn_of(records, first)
+        if self.coatings == (None, None):
+            parts: _Parts = (None, None)
+        else:
+            bases = self.worn_of(records, first, of_bases=True)
+            parts = self._parts(before.worn) if rate else self._parts(before.worn, worn, bases)
+            if not rate:
+                punch, strip = parts
+                worn = WornDepths(
+                    worn.punch if punch is None else punch.coating * worn.punch + punch.base * bases.punch,
+                    worn.strip if strip is None else strip.coating * worn.strip + strip.base * bases.strip,
+                )
+        return self._with_between(worn, parts, records, first, before, rate=rate)
+
+    def worn_of(self, records: TimeStepRecords, first: int, *, of_bases: bool = False) -> WornDepths:
+        """Return what the steps of a record, the first of this number, wear off at the nodes of punch and strip.
+
+        Of coated bodies that is as if all of them were of the coating; or `of_bases`, as if it were worn through.
+        """
         pair, steps = self.interface.middle.pair, self.program.steps
+        punch, below = (
+            (records.punch_base, records.strip_base) if of_bases else (records.punch_depth, records.strip_depth)
+        )
         strip = np.zeros(len(pair.strip.weights))
         if self.wear.strip is not None:
             places = [steps[(first + k) % len(steps)].offset for k in range(len(records))]
             for place in dict.fromkeys(places):
-                depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
+                depth = below[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
-        worn = WornDepths(records.punch_depth.sum(axis=0), strip)
-        return self._with_between(worn if rate else self.through(worn, before.worn), records, first, before, rate=rate)
+        return WornDepths(punch.sum(axis=0), strip)
 
-    def through(self, more: WornDepths, before: WornDepths) -> WornDepths:
-        """Return what is worn from depths on where coatings would lose so much more if they went on."""
-        punch, strip = self.coatings
-        if punch is not None:
-            more = replace(more, punch=punch.after(before.punch, more.punch))
-        return more if strip is None else replace(more, strip=strip.after(before.strip, more.strip))
+    def _parts(
+        self, before: WornDepths, more: WornDepths | None = None, bases: WornDepths | None = None
+    ) -> tuple[Shares | None, Shares | None]:
+        """Return what of coatings and bases is worn at the nodes of punch and strip; None for a body without coating.
+
+        Args:
+            before: Depths where it begins.
+            more, bases: What would be worn of coatings that go on, and of bases; by default so little that no coating
+                ends.
+        """
+        found: list[Shares | None] = []
+        for name, coated in zip(("punch", "strip"), self.coatings, strict=True):
+            if coated is None:
+                found.append(None)
+                continue
+            left = left_of(coated.thickness, getattr(before, name))
+            of_coating, of_base = (
+                np.zeros_like(left) if one is None else np.asarray(getattr(one, name)) for one in (more, bases)
+            )
+            found.append(shares(of_coating, of_base, left))
+        return found[0], found[1]
+
+    def worn_like(self, records: TimeStepRecords, first: int) -> PartialSlipProblem:
+        """Return the same whose coatings have the ratios of what a cycle's steps would wear of bases and of them."""
+        if self._one_ratio:
+            return self
+        worn, bases = self.worn_of(records, first), self.worn_of(records, first, of_bases=True)
+        found = [
+            None if coated is None else coated.by(getattr(worn, name), getattr(bases, name))
+            for name, coated in zip(("punch", "strip"), self.coatings, strict=True)
+        ]
+        other = copy(self)
+        other.coatings = found[0], found[1]
+        return other
+
+    def measured_rate(self, rate: WornDepths, bases: WornDepths, worn: WornDepths) -> WornDepths:
+        """Return rates of depths as those of `measured`, where these depths are worn.
+
+        Args:
+            rate, bases: Of coatings that go on, and of bases.
+            worn: Depths.
+        """
+        found = {
+            name: coated.measured_rate(getattr(worn, name), getattr(rate, name), getattr(bases, name))
+            for name, coated in zip(("punch", "strip"), self.coatings, strict=True)
+            if coated is not None
+        }
+        return replace(rate, **found)
 
     def measured(self, worn: WornDepths) -> WornDepths:
         """Return depths as what coatings would have lost if they went on: it grows evenly through their end."""
@@ -551,8 +621,26 @@ class PartialSlipProblem:
             np.ones_like(worn.strip) if strip is None else strip.slope(worn.strip),
         )
 
+    def layers_of_wear(self, worn: WornDepths) -> tuple[_PerLayer, _PerLayer]:
+        """Return for punch and strip what of coating and base wears at their nodes, and over what `measured` counts it.
+
+        Args:
+            worn: Depths.
+        """
+        there: list[tuple[Array, Array]] = []
+        counted: list[tuple[Array, Array]] = []
+        for name, coated in zip(("punch", "strip"), self.coatings, strict=True):
+            depth = getattr(worn, name)
+            lies = np.zeros(len(depth)) if coated is None else np.where(depth < coated.thickness, 1.0, 0.0)
+            there.append((lies, 1 - lies))
+            by_ratio = 1 - lies if coated is None else coated.measured_rate(depth, np.zeros_like(lies), 1 - lies)
+            counted.append((lies, by_ratio))
+        return (there[0], there[1]), (counted[0], counted[1])
+
     def changes_between(self, before: WornDepths, after: WornDepths) -> bool:
         """Return whether coefficients change with depths from some to others, or with what is slid meanwhile."""
+        if not self._one_ratio and self._ends_between(before, after):
+            return True
         if self.laws is None:
             return False
         pair = self.interface.middle.pair
@@ -566,20 +654,53 @@ class PartialSlipProblem:
             )
         )
 
-    def _taken(self, punch: Array, strip: Array, at: PartialSlipState) -> Array:
-        """Return what both bodies lose at the contact's nodes, by depths (..., n) of coatings that are those there."""
-        of_punch, of_strip = self.slopes(at.worn)
-        return np.asarray(punch * of_punch + strip * (self.interface.middle.pair.wear_interpolation @ of_strip))
+    @cached_property
+    def _one_ratio(self) -> bool:
+        """Whether what bases and coatings wear has a ratio that stays; so it has where nothing is coated."""
+        laws = [pair for pair in self.wear.layers if pair[0] is not None]
+        alike = all(coating is not None and base is not None and coating.law == base.law for coating, base in laws)
+        return not laws or (self.laws is None and alike)
+
+    def _ends_between(self, before: WornDepths, after: WornDepths) -> bool:
+        """Return whether a coating ends somewhere between these depths."""
+        return any(
+            coated is not None
+            and bool(((getattr(before, name) < coated.thickness) & (getattr(after, name) >= coated.thickness)).any())
+            for name, coated in zip(("punch", "strip"), self.coatings, strict=True)
+        )
+
+    def _taken(self, coatings: _Both, bases: _Both, parts: _Parts) -> Array:
+        """Return what both bodies lose at the contact's nodes (..., n).
+
+        Args:
+            coatings, bases: What of punch and strip would be worn there of coatings that go on, and of bases.
+            parts: What is worn of both, at the nodes of punch and strip.
+        """
+        onto = self.interface.middle.pair.wear_interpolation
+        of_punch, of_strip = parts[0], None if parts[1] is None else parts[1].at(onto)
+        found = [
+            of_coating if part is None else part.coating * of_coating + part.base * of_base
+            for part, of_coating, of_base in zip((of_punch, of_strip), coatings, bases, strict=True)
+        ]
+        return np.asarray(found[0] + found[1])
 
     def _with_between(
-        self, worn: WornDepths, records: TimeStepRecords, first: int, before: PartialSlipState, *, rate: bool
+        self,
+        worn: WornDepths,
+        parts: _Parts,
+        records: TimeStepRecords,
+        first: int,
+        before: PartialSlipState,
+        *,
+        rate: bool,
     ) -> WornDepths:
-        """Return what is worn with what steps do to what lies between; arguments as of `worn_in`."""
+        """Return what is worn with what steps do to what lies between; arguments as of `worn_in` and `_taken`."""
         layers, now = self.interface.layers, before.worn
         changes = np.zeros_like(now.between)
         if layers.debris is not None:
             over = self.debris_over(records, replace(before, next_step=first))
-            taken = self._taken(records.punch_depth, records.strip_depth, before)
+            coatings, bases = (records.punch_depth, records.strip_depth), (records.punch_base, records.strip_base)
+            taken = self._taken(coatings, bases, parts)
             rows = [layers.row(name) for name in DEBRIS]
             thickness = now.between[rows[0]]
             changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
@@ -611,11 +732,12 @@ class PartialSlipProblem:
         memory, laws = self.interface.layers.memory, self.laws
         if memory is None or laws is None:
             return None
+        parts = self._parts(before.worn)
 
         def wearing(k: int, at: ContactConditions) -> Array:
             tau = float(slips.duration[k])
-            punch, strip = laws.wear_at(at).depths(at.pressure, slips.slid[k], tau)
-            return np.asarray(self._taken(punch, strip, before) / tau)
+            coatings, bases = laws.wear_at(at).both(at.pressure, slips.slid[k], tau)
+            return np.asarray(self._taken(coatings, bases, parts) / tau)
 
         conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
         return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)
@@ -671,7 +793,7 @@ class PartialSlipProblem:
         work += float((f * position.weights) @ carried)
         stored += weights @ (state.pressure * closed)
         slipped = np.linalg.norm(state.slip, axis=1)
-        punch, strip = wear.depths(state.pressure, slipped, step.duration)
+        coatings, bases = wear.both(state.pressure, slipped, step.duration)
         values = (
             state.displacement,
             state.force,
@@ -683,8 +805,8 @@ class PartialSlipProblem:
             stored,
             state.heat,
             weights @ (state.pressure * state.approach),
-            punch,
-            strip,
+            *coatings,
+            *bases,
             surface_strain(position, self._gradient, state.on_strip),
             float(state.iterations),
             state.unique,

@@ -9,7 +9,8 @@ Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20,
 which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
 near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
 What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
-lost if they went on, which grows evenly through their end (`fenwear.sliding.coating.CoatedBody`).
+lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
+through their end (`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere.
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
 Both look at begin and end alone: where coefficients change with the depth, as where a coating's friction ends,
 Simpson's rule with the wear of one more cycle, at the shape halfway, gives it, too.
@@ -56,7 +57,8 @@ class FrettingCycle:
         number: Of cycles done before it.
         worn: Depths at its shape.
         half_cycles: Records of its half-cycles.
-        rate: Depths that a cycle wears there.
+        rate: Depths that a cycle wears there, of coated bodies as if coatings went on.
+        bases: The same as if coatings were worn through.
         error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
@@ -69,6 +71,7 @@ class FrettingCycle:
     worn: WornDepths
     half_cycles: list[TimeStepRecords]
     rate: WornDepths
+    bases: WornDepths
     error: float
     first_step: int
     end: PartialSlipState
@@ -168,7 +171,8 @@ def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepth
     rate = problem.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     if creep is not None:
         rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
-    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, 0.0, first, at, warm=warm)
+    bases = problem.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
+    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, at, warm=warm)
 
 
 def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
@@ -180,6 +184,7 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
 
 def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
+    problem = problem.worn_like(now.records, now.first_step)
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
     between, layers = depths + now.worn.between.size, problem.interface.layers
     size = between + now.worn.carried.size
@@ -197,7 +202,10 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     def whole(worn: WornDepths) -> Array:
         return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
 
-    begin, rate = whole(problem.measured(now.worn)), whole(now.rate)
+    def rate_of(cycle: FrettingCycle) -> Array:
+        return whole(problem.measured_rate(cycle.rate, cycle.bases, cycle.worn))
+
+    begin, rate = whole(problem.measured(now.worn)), rate_of(now)
 
     def risen(y: Array) -> Array:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
@@ -208,16 +216,16 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     first = solve(rate)
     start = _slid_on(now, cycles)
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
-    second = solve(whole(middle.rate) - 2 * first)
+    second = solve(rate_of(middle) - 2 * first)
     worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     end = whole(problem.measured(worn))
     then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
-    missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
+    missing = solve(end - begin - cycles / 2 * (rate + rate_of(then)))
     if cycles > 1 and problem.changes_between(now.worn, worn):
-        halfway = (begin + end) / 2 + cycles / 8 * (rate - whole(then.rate))  # cubic by Hermite
+        halfway = (begin + end) / 2 + cycles / 8 * (rate - rate_of(then))  # cubic by Hermite
         shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
         between_them = _rate(problem, _slid_on(now, cycles / 2), shape, now.number + cycles // 2, now)
-        simpson = cycles / 6 * (rate + 4 * whole(between_them.rate) + whole(then.rate))
+        simpson = cycles / 6 * (rate + 4 * rate_of(between_them) + rate_of(then))
         seen = solve(end - begin - simpson)
         missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
     pair = problem.interface.middle.pair
@@ -361,8 +369,9 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
     debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
     remembered = _Remembered.of(problem, now, depths)
     of_punch, of_strip = problem.slopes(now.worn)
+    parts, measured = problem.layers_of_wear(now.worn)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
-    slid, groups = records.slip_magnitude, dict[tuple[float | Placement, bytes], list[int]]()
+    groups = dict[tuple[float | Placement, bytes], list[int]]()
     over = None if debris is None else problem.debris_over(records, _begun(now))
     fed, found = None if over is None else over.fed, list[Answering]()
     answering = np.array([_answering(layers, pressure) for pressure in records.pressure])
@@ -373,25 +382,26 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
     for (place, _), members in groups.items():
         position = problem.interface.position(place)
         closed = np.flatnonzero(answering[members].any(axis=0))
-        slopes, kept = np.zeros((2, n)), np.zeros(n)
-        lost = np.array([of_punch, position.pair.wear_interpolation @ of_strip])
-        for row, law in enumerate((problem.wear.punch, problem.wear.strip)):
-            if law is not None:
-                for k in members:
-                    step = steps[(now.first_step + k) % len(steps)]
-                    own = law.slope(records.pressure[k], slid[k], step.duration) * answering[k]
-                    slopes[row] += own
-                    kept += 0.0 if fed is None else fed[k] * own * lost[row]
-        left = [(closed, slopes[0])]
+        slopes = _wear_slopes(problem, now, members, answering)
+        of_steps, (by_punch, by_strip) = slopes.sum(axis=2), measured
+        left = [(closed, of_steps[0, 0] * by_punch[0] + of_steps[0, 1] * by_punch[1])]
         fills = [] if debris is None else [(stored, 1.0)]
-        if debris is not None:
-            left += [(stored + closed, kept), (ejected + closed, (slopes * lost).sum(axis=0) - kept)]
+        if fed is not None:
+            there = np.array([parts[0], [position.pair.wear_interpolation @ part for part in parts[1]]])
+            lost = np.einsum("blkn,bln->kn", slopes, there)
+            kept = np.einsum("kn,kn->n", fed[members], lost)
+            left += [(stored + closed, kept), (ejected + closed, lost.sum(axis=0) - kept)]
         if remembered is not None:
             for rows, filled, rate in remembered.filling(members):
                 left.append((rows.start + closed, rate))
                 fills.append((rows.start, filled))
         count, every = len(closed), np.arange(len(closed))
-        put = csr_array(position.pair.wear_projection)[:, closed] @ diags_array(slopes[1, closed])
+        onto_strip = csr_array(position.pair.wear_projection)[:, closed]
+        of_coating, of_base = (
+            diags_array(own) @ onto_strip @ diags_array(slope[closed])
+            for own, slope in zip(by_strip, of_steps[1], strict=True)
+        )
+        put = csr_array(of_coating + of_base)
         onto = [csr_array((rate[closed], (rows, every)), shape=(total, count)) for rows, rate in left]
         onto.append(csr_array(vstack([csr_array((n, count)), put, csr_array((total - depths, count))])))
         read = diags_array(of_strip)
@@ -412,6 +422,26 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
         for row, rate in ((stored, -lost), (ejected, lost)):
             itself = itself + csr_array((rate, (row + at, stored + at)), shape=(total, total))
     return found, csr_array(itself if remembered is None else itself + remembered.slopes(total))
+
+
+def _wear_slopes(problem: PartialSlipProblem, now: FrettingCycle, members: list[int], answering: Mask) -> Array:
+    """Return how what time steps wear follows their pressures (2, 2, m, n), of both bodies, of coating and base each.
+
+    Args:
+        problem: The bodies and what is done to them.
+        now: The cycle of the steps.
+        members: Which of them.
+        answering: Nodes whose pressures answer in each step of the cycle (k, n).
+    """
+    records, found = now.records, np.zeros((2, 2, len(members), answering.shape[1]))
+    for body, laws in enumerate(problem.wear.layers):
+        for layer, law in enumerate(laws):
+            if law is None:
+                continue
+            for row, k in enumerate(members):
+                slope = law.slope(records.pressure[k], records.slip_magnitude[k], float(records.duration[k]))
+                found[body, layer, row] = slope * answering[k]
+    return found
 
 
 def _begun(now: FrettingCycle) -> PartialSlipState:

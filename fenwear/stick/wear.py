@@ -49,18 +49,36 @@ class BodyRate:
 
 @dataclass(frozen=True)
 class LocalWear:
-    """The wear laws of punch and strip; None where a body does not wear."""
+    """The wear laws of punch and strip; None where a body does not wear.
+
+    Attributes:
+        punch, strip: Of a coated body as if all of it were of the coating.
+        bases: Of both bodies as if all coatings were worn through; None where nothing is coated.
+    """
 
     punch: BodyRate | None
     strip: BodyRate | None
+    bases: LocalWear | None = None
 
     def depths(self, pressure: Array, slid: Array, duration: float) -> tuple[Array, Array]:
-        """Return the depths worn off punch and strip at the contact nodes (n,) each, mm."""
+        """Return the depths worn off punch and strip at the contact nodes (n,) each, mm, of coatings that go on."""
         none = np.zeros_like(pressure)
         return (
             none if self.punch is None else self.punch.depth(pressure, slid, duration),
             none if self.strip is None else self.strip.depth(pressure, slid, duration),
         )
+
+    @property
+    def layers(self) -> tuple[tuple[BodyRate | None, BodyRate | None], tuple[BodyRate | None, BodyRate | None]]:
+        """Of punch and strip, the laws of coating and base each; of a body without coating that of the base alone."""
+        if self.bases is None:
+            return (None, self.punch), (None, self.strip)
+        return (self.punch, self.bases.punch), (self.strip, self.bases.strip)
+
+    def both(self, pressure: Array, slid: Array, duration: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Return `depths`, and those of the bases."""
+        found = self.depths(pressure, slid, duration)
+        return found, found if self.bases is None else self.bases.depths(pressure, slid, duration)
 
 
 @dataclass(frozen=True)
@@ -150,25 +168,31 @@ class LocalLaws:
         )
 
     def wear_at(self, conditions: ContactConditions) -> LocalWear:
-        """Return the wear by local slip; of a coated body as if all of it were of the coating.
+        """Return the wear by local slip; of a coated body as if all of it were of the coating, and the base's.
 
         Raises:
             CaseError: a coefficient is negative or not finite there.
         """
-        found = [
-            None
-            if law is None
-            else BodyRate(
-                coefficient(law.of_coating or law, self.friction, conditions, key),
-                PressureLaw.of(law),
-                law.speed_exponent,
-            )
-            for law, key in zip(self.wear, ("wear.punch", "wear.strip"), strict=True)
-        ]
-        return LocalWear(found[0], found[1])
+
+        def rate(law: WearLaw | None, key: str) -> BodyRate | None:
+            if law is None:
+                return None
+            return BodyRate(coefficient(law, self.friction, conditions, key), PressureLaw.of(law), law.speed_exponent)
+
+        punch, strip = self.wear
+        bases = LocalWear(rate(punch, "wear.punch"), rate(strip, "wear.strip"))
+        above = [None if law is None else law.of_coating for law in self.wear]
+        if above == [None, None]:
+            return bases
+        of_punch, of_strip = above
+        return LocalWear(
+            bases.punch if of_punch is None else rate(of_punch, "wear.punch"),
+            bases.strip if of_strip is None else rate(of_strip, "wear.strip"),
+            bases,
+        )
 
     def coated(self, pair: ContactPair, conditions: ContactConditions) -> tuple[CoatedBody | None, CoatedBody | None]:
-        """Return the coatings of both bodies with the ratio of their base's coefficient to theirs; None without.
+        """Return the coatings of both bodies with the ratio of their base's coefficient to theirs there; None without.
 
         Raises:
             CaseError: a coefficient is negative or not finite there.
@@ -180,10 +204,8 @@ class LocalLaws:
                 found.append(None)
                 continue
             base, coating = (coefficient(one, self.friction, conditions, key) for one in (law, above))
-            if key == "wear.punch":
-                ratio = base / coating
-            else:
+            if key == "wear.strip":
                 base, coating = (pair.wear_projection @ one for one in (base, coating))
-                ratio = np.divide(base, coating, out=np.ones_like(base), where=coating > 0)
+            ratio = np.divide(base, coating, out=np.ones_like(base), where=coating > 0)
             found.append(CoatedBody(thickness, np.asarray(ratio)))
         return found[0], found[1]

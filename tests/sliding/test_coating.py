@@ -153,6 +153,51 @@ def test_per_area(law: str) -> None:
         assert np.abs(last.wear[-1] - marched.wear[-1]).max() < 1e-5 * marched.wear[-1].max()
 
 
+BASE = "coefficient={expression='2e-7 * (1 + p / 200)', unit='1/MPa'}"
+UNLIKE = {
+    "base by its pressure": f"wear.punch={{{BASE}, coating={{thickness=%s, coefficient='1e-7 1/MPa'}}}}",
+    "per area, then by pressure": "wear.punch={coefficient='4e-7 1/MPa', coating={thickness=%s, per_area=4e-5, "
+    "touching_from='5 MPa'}}",
+    "by pressure, then per area": "wear.punch={per_area=8e-5, touching_from='5 MPa', coating={thickness=%s, "
+    "coefficient='1e-7 1/MPa'}}",
+}
+
+
+@pytest.mark.parametrize(
+    ("law", "name"), [*(("coulomb", name) for name in UNLIKE), *(("gross-sliding", name) for name in list(UNLIKE)[1:])]
+)
+def test_a_coating_whose_law_is_another_one(law: str, name: str) -> None:
+    """In a march by hand, of pressures and slips of each half-cycle; jumps the same, falling with the tolerance."""
+    thickness = (1 if "area" in name else 1.5) * (3e-5 if law == "gross-sliding" else 3e-7)
+    cycles, stick = 100, STICK if law == "coulomb" else ("stick={}",)
+    wear = UNLIKE[name] % (UNEVEN % thickness)
+    system = assemble(load_case("fretting-partial-slip", [*SMALLEST, f"contact.law='{law}'", *stick, wear]))
+    thick = system.coatings[0]
+    assert thick is not None
+    rates = {
+        "base by its pressure": (lambda p: 1e-7 * p, lambda p: 2e-7 * (1 + p / 200) * p),
+        "per area, then by pressure": (lambda p: 4e-5 * np.minimum(p / 5, 1), lambda p: 4e-7 * p),
+        "by pressure, then per area": (lambda p: 1e-7 * p, lambda p: 8e-5 * np.minimum(p / 5, 1)),
+    }[name]
+    blocks = list(march(system, 2 * cycles))
+    exact, depth = blocks[-1].wear[-1], np.zeros_like(thick)
+    assert 0.05 < (exact >= thick).mean() < 0.95
+    for records in (steps.records for block in blocks for steps in block.steps):
+        slip = np.linalg.norm(records.slip, axis=2)
+        coating, base = ((rate(records.pressure) * slip).sum(axis=0) for rate in rates)
+        left = np.maximum(thick - depth, 0.0)
+        beyond = np.divide(coating - left, coating, out=(left == 0).astype(float), where=coating > 0)
+        depth = depth + np.minimum(coating, left) + np.maximum(beyond, 0.0) * base
+    if law == "coulomb":
+        np.testing.assert_allclose(depth, exact, rtol=1e-9, atol=1e-9 * exact.max())
+    errors = []
+    for tolerance in (0.3, 0.03, 0.003):
+        *_, last = jump(system, 2 * cycles, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
+        assert errors[-1] < tolerance  # that of the march, which is explicit, is about a thousandth
+    assert errors[2] <= errors[0]
+
+
 def test_the_end_is_that_of_the_base(assembled: Assemble) -> None:
     """Pressures of the steady state, friction of the coating or not; growth rates alike."""
     own = "wear.punch={coefficient=5e-6, coating={thickness=0.05, coefficient=1e-6, friction=0.1}}"
@@ -183,7 +228,7 @@ def test_friction_of_a_coating_holds_until_it_is_through(assembled: Assemble) ->
         ("{thickness={expression='p', unit='mm'}, coefficient=1e-9}", "place x, y, z alone, got p"),
         ("{thickness='0.1 m', coefficient=1e-9}", r"wear.punch.coating.thickness: expected less than the body"),
         ("{thickness=1e-3}", "wear.punch.coating: give one of coefficient, archard, energy and per_area, got none"),
-        ("{thickness=1e-3, per_area=1e-9}", r"coating.per_area: expected where the base wears per_area"),
+        ("{thickness=1e-3, coefficient=1e-9, touching_from=1}", r"coating.touching_from: expected with per_area"),
         ("{thickness=1e-3, per_area=0}", r"wear.punch.coating.per_area: expected"),
         ("{thickness=1e-3, coefficient=0}", "wear.punch.coating.coefficient: expected a finite number above zero"),
         ("{thickness=1e-3, coefficient='1 mm'}", "coating.coefficient"),

@@ -230,8 +230,9 @@ def test_bounds_that_exclude_the_data_are_told(small: Callable[..., Case]) -> No
 def test_a_posterior_of_one_unknown_is_that_of_least_squares(small: Callable[..., Case]) -> None:
     """Linear in k with normal noise: the posterior is normal with the mean and the error of least squares."""
     pytest.importorskip("emcee", reason="emcee is optional")
-    work = LOAD * 4 * AMPLITUDE * np.array([10.0, 20.0, 30.0])
-    case, data = small("example2"), [volumes([10.0, 20.0, 30.0], BETA * work, 0.05 * BETA * work)]
+    after = [10.0] * 3  # measured three times: one stop of each of some thousand runs
+    work = LOAD * 4 * AMPLITUDE * np.array(after)
+    case, data = small("example2"), [volumes(after, BETA * work, 0.05 * BETA * work)]
     found = calibrate(case, data, [K])
     sample = posterior(LeastSquares(case, data, [Unknown(K)]), found, 100).values[:, 0]
     assert sample.mean() == pytest.approx(BETA, rel=0.015)

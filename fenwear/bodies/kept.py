@@ -68,7 +68,7 @@ def files() -> list[Path]:
 
 def size() -> int:
     """Return the number of bytes of all that is kept."""
-    return sum(_bytes(path) for path in files())
+    return sum(_bytes(path) for path in folder().glob("*.npz"))
 
 
 def summary() -> dict[str, Any]:
@@ -195,7 +195,7 @@ def _write(path: Path, arrays: Mapping[str, Array]) -> str | None:
 def _prune() -> None:
     """Remove the longest unused files above the limit, and what killed processes have left."""
     now, rest = time.time(), size() - limit()
-    for path in files():
+    for path in files() if rest > 0 else ():  # which looks at each once more, to sort them
         if rest <= 0:
             break
         rest -= _bytes(path)

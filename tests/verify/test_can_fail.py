@@ -240,7 +240,6 @@ def forgotten_heat(patch: Patch) -> None:
         ("open-strip", material_the_other_way),
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
-        ("burton", other_share),
         ("solid-burton", other_share),
         ("square-source", material_the_other_way),
         ("energy", half_speed),

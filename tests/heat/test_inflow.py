@@ -125,7 +125,6 @@ def test_steps_are_as_many_as_the_tolerance_asks_for() -> None:
     assert fine < 0.005 < coarse
 
 
-@pytest.mark.mpi
 def test_stages_have_the_same_steps() -> None:
     """They are chosen once, by the fastest stage; all stages share their bases, too."""
     small: dict[str, Any] = {"sizes": {"elements_along_contact": 6}, "heat": {"reduction_tolerance": 1e-3}}

@@ -247,9 +247,14 @@ class Surface:
         if nodes is None:
             nodes = self.part == 0 if self.overlaps else np.ones(len(self.x), dtype=bool)
         kept = kept[nodes[kept].all(axis=1)]
-        plane = Triangulation(self.sliding[:, free], self.sliding[:, fixed], kept)
         places = np.linspace(self.sliding[nodes, free].min(), self.sliding[nodes, free].max(), POINTS)
-        found: Any = LinearTriInterpolator(plane, values)(places, np.full(POINTS, at[fixed]))
+        over = self.sliding[kept, fixed]
+        kept = kept[(over.min(axis=1) <= at[fixed]) & (over.max(axis=1) >= at[fixed])]  # to search all takes seconds
+        if not len(kept):
+            return places, np.full(POINTS, np.nan)
+        corners, kept = np.unique(kept, return_inverse=True)
+        plane = Triangulation(*self.sliding[corners][:, [free, fixed]].T, kept.reshape(-1, 3))
+        found: Any = LinearTriInterpolator(plane, values[corners])(places, np.full(POINTS, at[fixed]))
         return places, np.asarray(found.filled(np.nan))
 
 

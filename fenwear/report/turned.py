@@ -78,6 +78,11 @@ def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[s
         trace.visible = k == 0
     figure = go.Figure(data=last, layout=_layout(shown, half_cycles))
     found: dict[str, Any] = json.loads(figure.to_json())
+    surfaces = {body: _corners(history, body) for body in {quantity.body for quantity in shown}}
+    for trace, quantity in zip(found["data"], shown, strict=True):  # plotly would look at every number by itself
+        heights = _short(_raised(history, quantity.body, half_cycles[-1]))
+        trace |= {**surfaces[quantity.body], "z": heights}
+        trace["intensity"] = _short(_values(history, quantity, half_cycles[-1]))
     # What changes from half-cycle to half-cycle alone, so that the chosen quantity stays.
     for step, n in zip(found["layout"]["sliders"][0]["steps"], half_cycles, strict=True):
         heights = {body: _short(_raised(history, body, n)) for body in {quantity.body for quantity in shown}}
@@ -113,23 +118,27 @@ def _layout(shown: Sequence[Quantity], half_cycles: Sequence[int]) -> dict[str, 
 
 
 def _mesh(history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int]) -> Any:
-    """Return a quantity on its surface at the last of some half-cycles, whose worn depth is raised so that it shows."""
+    """Return a mesh without its numbers, coloured by a quantity from its least to its largest value."""
     import plotly.graph_objects as go
 
-    x, triangles, _ = _solid_or_rings(history, quantity.body)
     values = quantity.factor * history[quantity.variable]
     low, high = float(values.min()), float(values.max())
     if quantity.variable == "pressure":
         low, high = 0.0, min(high, pressure_top(history, half_cycles))
-    i, j, k = triangles.T
     return go.Mesh3d(
-        x=_short(x[:, 0]), y=_short(x[:, 1]), z=_short(_raised(history, quantity.body, half_cycles[-1])),
-        i=i.tolist(), j=j.tolist(), k=k.tolist(), intensity=_short(_values(history, quantity, half_cycles[-1])),
         cmin=low, cmax=high if high > low else low + 1.0, colorscale=COLOURS[quantity.colours],
         colorbar={"title": quantity.unit, "len": 0.7}, name=quantity.title, showscale=True,
         hovertemplate=f"%{{intensity:.4g}} {quantity.unit}<br>x = %{{x:.4g}} mm, y = %{{y:.4g}} mm",
         lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
     )  # fmt: skip
+
+
+def _corners(history: xarray.Dataset, body: str) -> dict[str, list[Any]]:
+    """Return where the points of a surface lie in its plane, and the corners of its triangles."""
+    x, triangles, _ = _solid_or_rings(history, body)
+    return {"x": _short(x[:, 0]), "y": _short(x[:, 1])} | {
+        name: corner.tolist() for name, corner in zip("ijk", triangles.T, strict=True)
+    }
 
 
 def _raised(history: xarray.Dataset, body: str, half_cycle: int) -> Array:

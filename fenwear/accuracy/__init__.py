@@ -4,7 +4,8 @@ In the words of ASME V&V 20 the error of a number against a measurement has part
 numerics; here it is the last of these alone, u_num, estimated after the run (solution verification, V&V 10). Each
 source is a contribution of its own, and their sum bounds what they come to together, whatever their signs:
 
-    mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements;
+    mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements; of a
+                 contact grid, with every second or fourth of its nodes;
     wear steps   of marched half-cycles or of jumps, from the same run in longer ones, or by what they wear;
     positions    of the strip in a half-cycle, from the same run with half as many;
     following    of meshes that follow the wear, from the same run in which they follow half as often;
@@ -13,7 +14,7 @@ source is a contribution of its own, and their sum bounds what they come to toge
     solver       what is left of equilibrium, and rounding.
 
 The runs that are compared are made on the coarser elements, so that all of them together take less than the set-up of
-the bodies does; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one
+the bodies does in solids; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one
 and r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
 
     u = 1.25 d / (r^q - 1),    d = |phi_h - phi_H| or, if that is more, what their fields differ by (`Value.apart`).

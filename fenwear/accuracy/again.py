@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from fenwear.accuracy.values import Values, values_of
-from fenwear.assembly import Tribosystem, renewed, with_case, with_reduced_heat
+from fenwear.arrays import Array
+from fenwear.assembly import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
 from fenwear.case import Case
 from fenwear.cycle import Block, Span, follow_program, jump, march
 from fenwear.cycle.driver import Watch, unwatched
@@ -18,6 +21,7 @@ LONGEST = 400  # phases that are marched again one by one; longer runs go by jum
 TOLERANCE = 1e-3  # of these jumps
 FEWEST = 9  # nodes of a contact grid that is coarsened
 LEAST = 8  # nodes across a contact whose grid grows
+PLENTY = 12  # nodes across a contact on a grid that is a quarter as fine
 
 
 @dataclass(frozen=True)
@@ -85,15 +89,48 @@ class Again:
             yield from march(system, span.until, implicit=True, start=state, **shared)
 
 
-def coarser(case: Case) -> Case | None:
-    """Return the case on elements of the next lower degree, on a grid with half the nodes; None where there is none."""
-    grid = case.grid
-    if grid is not None and grid.across is not None:
-        return changed(case, grid={"across": grid.across // 2}) if grid.across >= 2 * LEAST else None
-    if grid is not None and grid.nodes is not None:
-        return changed(case, grid={"nodes": (grid.nodes - 1) // 2 + 1}) if grid.nodes >= FEWEST else None
-    degree = case.geometry.degree
-    return None if degree == 1 else changed(case, geometry={"degree": degree - 1})
+@dataclass(frozen=True)
+class Coarser:
+    """A case on coarser elements, or on a coarser grid.
+
+    Attributes:
+        case: Itself.
+        ratio: How many times as far apart its nodes are.
+    """
+
+    case: Case
+    ratio: float
+
+
+def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser | None:
+    """Return the case on elements of the next lower degree, on a grid half or a quarter as fine; None for none.
+
+    Args:
+        case: The problem.
+        placed: Its bodies.
+        across: Nodes across the contact.
+    """
+    degree, grid, wanted = case.geometry.degree, placed.pair.punch.grid, case.grid
+    if wanted is None or grid is None:
+        return None if degree == 1 else Coarser(changed(case, geometry={"degree": degree - 1}), degree / (degree - 1))
+    rough = any(body.topography is not None for body in case.bodies.values())  # which is another one on other nodes
+    every = 4 if (wanted.across or across) >= 4 * PLENTY and not rough else 2
+    if wanted.across is not None:
+        few = wanted.across < every * LEAST
+        return None if few else Coarser(changed(case, grid={"across": wanted.across // every}), every)
+    if max(grid.counts) < FEWEST:
+        return None
+    fewer = grid.thinned(every)
+    numbers = {"nodes": max(fewer.counts), "size": tuple(fewer.sides), "middle": tuple(fewer.middle)}
+    return Coarser(changed(case, grid=numbers), every)
+
+
+def nodes_across(placed: ContactSetup, pressure: Array) -> int:
+    """Return how many nodes of a grid there are across the contact by pressures (..., n); 0 without a grid."""
+    grid, touched = placed.pair.punch.grid, (pressure > 0).any(axis=tuple(range(pressure.ndim - 1)))
+    if grid is None or not touched.any():
+        return 0
+    return int(np.ptp(grid.places[touched], axis=0).max()) + 1
 
 
 def changed(case: Case, **tables: Mapping[str, Any]) -> Case:
@@ -111,16 +148,21 @@ def in_few_steps(case: Case, phases: int) -> Case:
     return changed(case, run=run)
 
 
-def set_up(case: Case, system: Tribosystem) -> Tribosystem:
+def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:
     """Return the bodies of a case; where its curved elements are too coarse, those with straight ones; collective.
+
+    What answers on any grid is not made again for a coarser one.
 
     Args:
         case: The run's on other elements.
         system: Of the run, whose steps of slip it takes.
+        by: How it is coarser; None where it is not.
 
     Raises:
         CaseError: neither goes.
     """
+    if by is not None and answers_anywhere(system):
+        return relaid(system, case, int(by.ratio))
     try:
         return renewed(replace(system, made_from=case))
     except CaseError as error:

@@ -7,6 +7,7 @@ from typing import Any
 from fenwear.accuracy.told import Uncertainty
 from fenwear.accuracy.values import Contribution, Quantity
 from fenwear.assembly import Tribosystem
+from fenwear.case import Case
 from fenwear.results.degrees import degrees_of
 
 KEYS = {"depth": "largest_depth_mm", "volume": "worn_volume_mm3"}
@@ -57,15 +58,13 @@ def remedies(system: Tribosystem, found: Uncertainty) -> dict[str, str]:
 
 def _remedy(system: Tribosystem, source: str) -> str:
     case, positions = system.case, system.motion.positions
-    degree, follow = case.geometry.degree, case.geometry.follow_wear or 0.0
+    follow = case.geometry.follow_wear or 0.0
     fineness = None if system.exchange is None else system.exchange.fineness
     jumps = case.run.integration == "jump"
     steps = 0 if fineness is None else 2 * fineness.steps
     tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"
     return {
-        "mesh": f"geometry.degree = {degree + 1}, or more elements at the contact"
-        if degree < HIGHEST
-        else "more elements",
+        "mesh": _finer(case),
         "wear steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
         if jumps
         else 'run.integration = "jump"',
@@ -75,6 +74,16 @@ def _remedy(system: Tribosystem, source: str) -> str:
         "heat steps": f"heat.steps = {steps}",
         "heat basis": tolerance,
     }.get(source, "")
+
+
+def _finer(case: Case) -> str:
+    """Return which key has nodes lie closer."""
+    grid, degree = case.grid, case.geometry.degree
+    if grid is not None and grid.across is not None:
+        return f"grid.across = {2 * grid.across}"
+    if grid is not None and grid.nodes is not None:
+        return f"grid.nodes = {2 * grid.nodes - 1}"
+    return f"geometry.degree = {degree + 1}, or more elements at the contact" if degree < HIGHEST else "more elements"
 
 
 def text(system: Tribosystem, found: Uncertainty) -> str:

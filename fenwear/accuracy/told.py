@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fenwear.accuracy.again import Again, coarser, in_few_steps, set_up
+from fenwear.accuracy.again import Again, coarser, in_few_steps, nodes_across, set_up
 from fenwear.accuracy.heat import of_heat, of_steady_heat
 from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of, values_of_steady
 from fenwear.assembly import Tribosystem
@@ -73,16 +73,16 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
     values, until = values_of(last), int(last.half_cycle[-1])
     found: dict[str, Contribution] = {}
     untold: dict[str, str] = {}
-    lower = coarser(case)
+    lower = coarser(case, last.system, nodes_across(last.system, last.pressure[-last.system.motion.half_cycles :]))
     if lower is None:
         untold["mesh"] = NOTHING_BELOW
     try:
-        base = in_few_steps(lower or case, until * last.system.motion.positions)
-        again = Again(set_up(base, last.system), until, watch)
+        base = in_few_steps(case if lower is None else lower.case, until * last.system.motion.positions)
+        again = Again(set_up(base, last.system, lower), until, watch)
         first, end = again.ends()
         before = values_of(end)
         if lower is not None:
-            found["mesh"] = of_mesh(values, before, fineness_of(case))
+            found["mesh"] = of_mesh(values, before, lower.ratio)
         for source, contribution in _steps(again, before, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
@@ -92,19 +92,13 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
     return Uncertainty(values, found, untold, time.perf_counter() - begin)
 
 
-def of_mesh(values: Values, coarse: Values, degree: int) -> Contribution:
-    """Return what is left to the limit of small elements, from the same numbers on elements of a degree less."""
-    ratio = degree / (degree - 1)
+def of_mesh(values: Values, coarse: Values, ratio: float) -> Contribution:
+    """Return what is left to the limit of small elements, from the same numbers on some times as large ones."""
     return {
         quantity: SAFETY * value.apart(coarse[quantity]) / (ratio ** order_of(quantity, value) - 1)
         for quantity, value in values.items()
         if quantity in coarse
     }
-
-
-def fineness_of(case: Case) -> int:
-    """Return p where the run that is compared has elements, or spacings, p / (p - 1) times as large."""
-    return case.geometry.degree if case.grid is None else 2
 
 
 def order_of(quantity: Quantity, value: Value) -> float:
@@ -117,8 +111,10 @@ def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[
     case = last.system.case
     positions, follow = last.system.motion.positions, case.geometry.follow_wear
     if case.run.integration == "jump":
-        longer = again.otherwise(run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)}).values()
+        again = again.otherwise(run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)})
+        longer = again.values()
         yield "wear steps", _apart(before, longer, 1.0)
+        before = longer  # what follows is compared in longer steps, too: there are fewer of them
     else:
         yield "wear steps", _of_half_cycles(before, first, last)
     if last.system.sticks:
@@ -176,17 +172,16 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     """
     begin = time.perf_counter()
     case, until = system.case, system.case.run.half_cycles
-    degree = fineness_of(case)
-    below = coarser(case) if degree > 2 or case.grid is not None else None
-    base = in_few_steps(below or case, until * system.motion.positions)
+    below = coarser(case, system) if case.geometry.degree > 2 or case.grid is not None else None
+    base = in_few_steps(case if below is None else below.case, until * system.motion.positions)
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles
-    one = replace(system, made_from=base) if below is None else set_up(base, system)
+    one = replace(system, made_from=base) if below is None else set_up(base, system, below)
     _, last = Again(one, until, watch).ends()
     found = uncertainty(base, last, watch)
     if below is not None and "mesh" in found.contributions:
         mesh = {
-            quantity: own * ((degree - 1) / degree) ** order_of(quantity, found.values[quantity])
+            quantity: own / below.ratio ** order_of(quantity, found.values[quantity])
             for quantity, own in found.contributions["mesh"].items()
         }
         found = replace(found, contributions={**found.contributions, "mesh": mesh})
@@ -202,13 +197,14 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     begin = time.perf_counter()
     system, values = state.system, values_of_steady(state)
     case = system.case
-    lower, found, untold = coarser(case), dict[str, Contribution](), dict[str, str]()
+    lower = coarser(case, system, nodes_across(system, np.array(state.pressure)))
+    found, untold = dict[str, Contribution](), dict[str, str]()
     if lower is None:
         untold["mesh"] = NOTHING_BELOW
     else:
         try:
-            before = values_of_steady(steady(set_up(lower, system)))
-            found["mesh"] = of_mesh(values, before, case.geometry.degree)
+            before = values_of_steady(steady(set_up(lower.case, system, lower)))
+            found["mesh"] = of_mesh(values, before, lower.ratio)
         except (CaseError, ConvergenceError) as error:
             untold["mesh"] = str(error)
     found |= of_steady_heat(system, values)

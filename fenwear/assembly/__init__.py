@@ -16,6 +16,7 @@ from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import Clock, ContactSetup, place, place_at_rest
 from fenwear.assembly.creep import Creep, CreepStage
 from fenwear.assembly.growing import (
+    answers_anywhere,
     at_rim,
     carried,
     grows,
@@ -25,6 +26,7 @@ from fenwear.assembly.growing import (
     on_nodes,
     outgrown,
     regridded,
+    relaid,
 )
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.resource_report import body_lines, resources_text
@@ -62,6 +64,7 @@ __all__ = [
     "Resources",
     "Sliding",
     "Tribosystem",
+    "answers_anywhere",
     "assemble",
     "at_rim",
     "body_lines",
@@ -94,6 +97,7 @@ __all__ = [
     "property_change",
     "register_contact_law",
     "regridded",
+    "relaid",
     "renewed",
     "resources_of",
     "resources_text",

@@ -19,8 +19,10 @@ from fenwear.assembly.bodies import with_surfaces
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.grids import on_grid
+from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.bodies.grid import RegularGrid
+from fenwear.case import CONDENSED, Case
 from fenwear.sliding.wear import WornDepths
 
 ROOM, NEAR = 0.25, 0.08  # of the contact's width beside it: what a new grid has, and below which a larger one is due
@@ -56,6 +58,28 @@ def regridded(system: Tribosystem, grid: RegularGrid) -> Tribosystem:
     punch, strip = on_grid(system.case, system.sliding, before.punch, before.strip, grid)
     law: ContactLaw = system.contact_law
     return law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
+
+
+def relaid(system: Tribosystem, case: Case, every: int = 1) -> Tribosystem:
+    """Return the system of a case whose grid or motion alone is another one, on the same bodies; collective.
+
+    Args:
+        system: Whose bodies answer on any grid, on meshes as they were made.
+        case: The other one.
+        every: How many times as far apart the nodes of a grid are that stays.
+    """
+    reach, grid = system.bodies.punch.reach, system.pair.punch.grid
+    assert grid is not None
+    first = grid.thinned(every) if reach is None else reach.grid
+    return on_first_contact(regridded(replace(system, made_from=case, sliding=make_sliding(case)), first))
+
+
+def answers_anywhere(system: Tribosystem) -> bool:
+    """Return whether the bodies of a system answer on any grid, on meshes as they were made."""
+    case, bodies = system.made_from, system.bodies
+    if case is None or case.grid is None or bodies.followed is not None or bodies.warmed is not None:
+        return False
+    return all(body.operator != CONDENSED for body in case.bodies.values())
 
 
 def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:

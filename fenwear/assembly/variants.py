@@ -10,7 +10,7 @@ from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup, place
-from fenwear.assembly.growing import on_first_contact
+from fenwear.assembly.growing import answers_anywhere, on_first_contact, relaid
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
@@ -119,7 +119,12 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         CaseError: the punch would tip over.
     """
     law: ContactLaw = law_named(case.contact.law)
-    if law is not system.contact_law or set_up_by(system.case) != set_up_by(case):
+    made, wanted = set_up_by(system.case), set_up_by(case)
+    if law is system.contact_law and made != wanted and answers_anywhere(system):
+        as_before = case.model_copy(update={"motion": system.case.motion})
+        if set_up_by(as_before) == made:
+            return relaid(law.varied(system, as_before), case)
+    if law is not system.contact_law or made != wanted:
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     return law.varied(system, case)
 

@@ -192,16 +192,15 @@ def fine(request: Request) -> FineBody:
     )
     direction = np.ascontiguousarray(half.directions[0])
     found = elastic.known.get(direction.tobytes())
-    if found is None:
+    if found is None or not found[2].holds(ground.grid):
         correction, unresolved = _resolved(elastic, ground, direction.T, key)
         guided = _guided(request, correction, at_nodes(correction, ground.grid, half.places, x, grid.spacing))
-        found = _held(replace(correction, guided=guided), direction), unresolved
+        found = _held(replace(correction, guided=guided), direction), unresolved, ground.grid
         elastic.free_factor()
-        if elastic.reach is not None:  # it stays while the grid grows
-            elastic.known[direction.tobytes()] = found
-    correction, unresolved = found
-    weights = at_nodes(correction, ground.grid, half.places, x, grid.spacing)
-    return FineBody(half, ground.grid, correction, weights, unresolved, by_loads(elastic, correction, direction))
+        elastic.known[direction.tobytes()] = found  # it stays on other grids
+    correction, unresolved, over = found
+    weights = at_nodes(correction, over, half.places, x, grid.spacing)
+    return FineBody(half, over, correction, weights, unresolved, by_loads(elastic, correction, direction))
 
 
 def _guided(

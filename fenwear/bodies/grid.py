@@ -103,6 +103,23 @@ class RegularGrid:
             whole = np.where(known, np.add.outer(whole * count, at), -1).ravel()
         return whole
 
+    def thinned(self, every: int) -> RegularGrid:
+        """Return a grid of every so manieth node of this one, in its middle as far as there is one."""
+        left = [(count - 1) % every // 2 for count in self.counts]
+        return replace(
+            self,
+            corner=tuple(low + k * step for low, k, step in zip(self.corner, left, self.spacing, strict=True)),
+            spacing=tuple(every * step for step in self.spacing),
+            counts=tuple((count - 1) // every + 1 for count in self.counts),
+        )
+
+    def holds(self, other: RegularGrid) -> bool:
+        """Return whether another grid in its plane reaches no further, a coarser one than to its next whole spacing."""
+        low, high, spacing = np.array(self.corner), np.array(other.corner), np.array(other.spacing)
+        apart = np.where(spacing > (1 + SNAP) * np.array(self.spacing), spacing, SNAP * self.sides)
+        within = (high >= low - apart).all() and (high + other.sides <= low + self.sides + apart).all()
+        return bool(within and self.normal == other.normal)
+
     @property
     def facets(self) -> NDArray[np.int64]:
         """Nodes of each interval or square, in the order of basix (f, 2 or 4)."""

@@ -289,13 +289,13 @@ class _Change:
         first, last, changed, idle = 0.0, np.inf, closed.sum(), False
         solver: _Closed | None = None
         for number in range(SETS):
-            size = float(np.sqrt((gaps[closed] ** 2).sum() + (forces**2).sum()))
+            wrong = closed | (gaps < -below)  # as of what asks for the change
+            size = float(np.sqrt((gaps[wrong] ** 2).sum() + (forces**2).sum()))
             first = max(first, size)
-            wanted = max(SHARE * enough, DIGITS * first)
-            done = size <= wanted or size > FALLS * last
-            if number and done and (idle or not changed):
+            wanted, stays = max(SHARE * enough, DIGITS * first), size > FALLS * last
+            if number and (size <= wanted or (stays and (idle or not changed))):
                 break
-            last, idle = size, done
+            last, idle = size, stays
             solver = _Closed(self.on, self.slopes, closed, all_motions, solver)
             final = changed <= FEW * closed.sum()
             by_p, by_a, _ = solver.solve(-gaps, -forces, max(wanted / size, 0.0 if final else ROUGH))

@@ -70,6 +70,13 @@ def solid(base: str, counts: dict[str, tuple[int, int]], *settings: str, fine: S
 PUNCH_ONLY = ("unset=wear.strip", "motion.positions=1", "run.jump_tolerance=3e-3")
 BALL = {"core_elements": (2, 4), "across": (4, 8), "ball_layers": (3, 5), "flat_layers": (4, 6)}
 PAD = {"across": (3, 6), "along": (3, 6), "pad_layers": (2, 3), "disc_layers": (2, 3)}
+FINE = ("punch.operator='fine'", "strip.operator='fine'")
+ON_GRID = (
+    *FINE,
+    "geometry.parameters.core=0",
+    "geometry.parameters.core_elements=0",
+    "grid.size=['0.36 mm', '0.36 mm']",
+)
 TRIALS = {
     "flat punch, 40 half-cycles": along("example1", 8, 32, "run.half_cycles=40"),
     "flat punch, 2000": along("example1", 8, 32, "run.half_cycles=2000", JUMPS, fine=(SMALL,)),
@@ -93,6 +100,12 @@ TRIALS = {
     "partial slip, 1000": along("fretting-partial-slip", 24, 60, "run.half_cycles=1000", fine=(SMALL,)),
     "ball, 20": solid("ball-on-flat", BALL, "run.half_cycles=20", "motion.positions=3", fine=("motion.positions=7",)),
     "pin, 100": solid("pin-on-disc", {}, "run.half_cycles=100", fine=("geometry.degree=3",)),
+    "ball on a grid, 200": Trial(
+        "ball-on-flat", (*ON_GRID, "grid.nodes=65", "run.half_cycles=200", "motion.positions=3"),
+        ("grid.nodes=129", "motion.positions=7", "run.jump_tolerance=1e-3")),
+    "stick on a grid, 20": Trial(
+        "fretting-sphere", (*FINE, "geometry.parameters.across=4", "grid.nodes=33", "run.half_cycles=20"),
+        ("grid.nodes=65",)),
     "pad, 200": solid("brake-pad", PAD, "run.half_cycles=200", "unset=heat"),
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Errors of half-spaces on contact grids against closed forms by the nodes across the contact: Hertz and Cattaneo.
+"""Errors of contact grids against closed forms by the nodes across the contact: Hertz, Cattaneo, Spence, a layer.
 
 Errors are over the largest value; "at nodes" is the largest of any node inside, two spacings from borders, where
 pressures and tractions turn with a root.
@@ -16,6 +16,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "bodies"))
+
+from test_fine import on_layer
 
 from fenwear.arrays import Array
 from fenwear.stick import Imposed, StickState, advance, untouched
@@ -24,9 +27,10 @@ from fenwear.stick.final import final_shape
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.wear import BodyRate, LocalWear
 from fenwear_verify.half_space_stick import Elastic, on_grid
-from fenwear_verify.stick_solids import to_and_fro
+from fenwear_verify.stick_solids import RIGID, to_and_fro
 
 YOUNG, LOAD, RADIUS, FRICTION, PULLED = 210_000.0, 100.0, 10.0, 0.5, 0.7
+SPENCE = 0.2986  # friction by which half of the contact's radius sticks, with a rigid plane and nu = 0
 HALF_AXES, TOP = (0.2080002, 0.1311640), 1750.100  # mm, MPa: crossed cylinders of 10 and 5 mm
 WIDER, WORN = 1.08, 1.75  # grid over the contact, and over that before it has worn
 AMPLITUDE, DEPTH, VOLUME = 1.58597e-3, 1.83246e-3, 2.55879e-4  # mm, mm³: to and fro, and where its wear ends
@@ -70,6 +74,36 @@ def worn(nodes: int) -> None:
     print(f"37 end of partial slip: {nodes} nodes, depth {depth:.1e}, volume {volume:.1e}, {seconds:.1f} s", flush=True)
 
 
+def spence(nodes: int) -> None:
+    """Print stick over contact and the largest pressure of a sphere held by a rigid plane, row 36: half, and 1.31."""
+    begin, a = time.process_time(), (3 * LOAD * RADIUS / (4 * YOUNG)) ** (1 / 3)
+    step, count, steps = 2 * a / nodes, 2 * round(WIDER * nodes / 2), nodes // 2
+    bodies = on_grid(Elastic(YOUNG / 2, 0.0), RIGID, step, (count, count), LOAD, RADIUS)
+    pair, state, load = bodies.middle.pair, untouched(bodies), bodies.loaded(None)
+    start, friction = Imposed(load.times(0), pair.initial_gap), np.full(len(pair.weights), SPENCE)
+    ratios = []
+    for k in range(1, steps + 1):
+        end = replace(start, loaded=load.times((k / steps) ** 3))  # the contact grows evenly
+        state, start = advance(bodies, state, start, end, friction), end
+        ratios.append(float(np.sqrt(pair.weights @ state.sticking / (pair.weights @ state.closed))))
+    upper, top = np.array(ratios[steps // 2 :]), 1.5 * LOAD / (np.pi * a**2)
+    seconds = time.process_time() - begin
+    print(
+        f"36 sphere held by a rigid plane: {nodes} nodes, stick over contact {upper.mean():.4f} in the mean of loads, "
+        f"at most {np.abs(upper - 0.5).max():.1e} off, pressure {state.pressure.max() / top:.4f}, {seconds:.1f} s",
+        flush=True,
+    )
+
+
+def layer_pressed(nodes: int) -> None:
+    """Print the errors of a sphere on a bonded layer against its exact kernel, row 55: a contact of 0.6 thicknesses."""
+    begin, wide = time.process_time(), 1.9
+    ours, exact, x = on_layer(0.6, 1.1, round(wide / 1.2 * nodes) + 1, wide)
+    r, a = np.hypot(x[:, 0], x[:, 1]), np.hypot(x[:, 0], x[:, 1])[exact[0] > 0].max()
+    told("55 sphere on a layer: pressure", nodes, begin, ours[0], exact[0], r < a - 2 * wide / nodes)
+    print(f"{'':34} {'':4} approach {ours[1] / exact[1] - 1:.1e}", flush=True)
+
+
 def main() -> None:
     """Print the table."""
     print(f"{'':34} {'':4} {'largest':>9} {'mean square':>12} {'at nodes':>9} {'time (s)':>8}")
@@ -100,6 +134,8 @@ def main() -> None:
         inner = r < 1 - 2 * step / HALF_AXES[1]
         told("20 crossed cylinders, pressure", nodes, begin, state.pressure, TOP * cap(r), inner)
         worn(nodes)
+        spence(nodes)
+        layer_pressed(nodes)
 
 
 if __name__ == "__main__":

@@ -14,12 +14,12 @@ from scipy.interpolate import CubicSpline
 from scipy.special import j0
 from ufl.algorithms import extract_coefficients
 
-from fenwear import Case, CaseError, assemble, load_case, march
+from fenwear import Case, CaseError, assemble, load_case, march, vary
 from fenwear.arrays import Array
-from fenwear.assembly import build_bodies, elastic, grids, make_sliding, place
+from fenwear.assembly import build_bodies, elastic, grids, make_sliding, place, relaid
 from fenwear.bodies import operators
 from fenwear.bodies.correction import Ground
-from fenwear.bodies.fine import FineBody, fine
+from fenwear.bodies.fine import RESOLVED, FineBody, fine
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.half_space import HalfSpace, influence
 from fenwear.bodies.half_space import half_space as as_half_space
@@ -28,6 +28,7 @@ from fenwear.bodies.operators import OPERATORS
 from fenwear.bodies.response import Request, identity
 
 NU = 0.3
+Pressed = tuple[Array, float]  # pressures (n,) and how far the bodies come
 BALL = (
     "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",
     "contact.friction=0", "wear.punch.coefficient=0", "wear.strip.coefficient=0", "motion.positions=2",
@@ -236,6 +237,26 @@ def test_ball_on_flat_is_the_contact_of_hertz() -> None:
     assert errors[1] < 0.003
 
 
+def test_other_positions_and_coarser_grids_share_what_bodies_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is solved again where another motion or grid reaches no further, and contacts are those of new bodies."""
+    settings = [*BALL, "grid.nodes=33", "motion.positions=6"]
+    system = assemble(load_case("ball-on-flat", settings))
+    fresh = assemble(load_case("ball-on-flat", [*settings, "motion.positions=2"]))
+    with monkeypatch.context() as patch:
+        patch.setattr("fenwear.bodies.fine.correct", None)
+        found = vary(system, "motion.positions=2")
+        rough = relaid(system, system.case, 2)
+    ours, theirs = (one.phase_contact([0]).solve(one.gap(0, one.unworn())).pressure[0] for one in (found, fresh))
+    assert ours == pytest.approx(theirs, abs=RESOLVED * theirs.max())
+    every, grid = rough.pair.punch.grid, system.pair.punch.grid
+    assert every is not None
+    assert grid is not None
+    assert every.counts == (17, 17)
+    assert grid.flat[every.of_other(grid)] == pytest.approx(every.flat, abs=1e-12)  # its nodes are some of those before
+    few = rough.phase_contact([0]).solve(rough.gap(0, rough.unworn()))
+    assert few.pressure[0] @ rough.pair.weights == pytest.approx(20, rel=1e-9)
+
+
 @pytest.mark.slow
 def test_each_body_for_itself() -> None:
     """One body fine, the other condensed on the same grid: on meshes as fine as the grid pressures are near."""
@@ -263,37 +284,42 @@ class ExactLayer(HalfSpace):
         return super().table(traction) + more * traction[2]
 
 
-@pytest.fixture
-def exact_layer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the exact layer known by a name."""
-
-    def make(request: Request) -> HalfSpace:
-        half = as_half_space(request)
-        return ExactLayer(**{field.name: getattr(half, field.name) for field in fields(half)})
-
-    monkeypatch.setattr(operators, "OPERATORS", {**OPERATORS, "exact-layer": make})
+def as_exact_layer(request: Request) -> HalfSpace:
+    """Return the layer by its kernel."""
+    half = as_half_space(request)
+    return ExactLayer(**{field.name: getattr(half, field.name) for field in fields(half)})
 
 
-@pytest.mark.usefixtures("exact_layer")
-@pytest.mark.parametrize("radius", [0.3, 0.6, 0.85])
-def test_sphere_on_a_layer(radius: float) -> None:
-    """Row 55: a rigid sphere of 20 H pressed on the layer, pressures node by node and the approach."""
-    near = 4 / 3 * (1 / (1 - NU**2)) * radius**3 / 20  # of a half-space: a layer of that load has a smaller contact
-    load = near * {0.3: 1.0, 0.6: 1.1, 0.85: 1.2}[radius]
-    found = []
-    for operator in ("fine", "exact-layer"):
-        case = layer(12, 3, grid={"nodes": 65, "size": [1.9, 1.9]})
-        strip = case.strip.model_copy(update={"operator": operator, "profile": None})
+def on_layer(radius: float, larger: float, nodes: int, wide: float) -> tuple[Pressed, Pressed, Array]:
+    """Return a rigid sphere of 20 H on the layer, fine and by the exact kernel: pressures and approach; and the nodes.
+
+    Args:
+        radius: Of the contact over the thickness H.
+        larger: The load over that of a half-space, whose contact is larger.
+        nodes: Along the sides of the grid.
+        wide: Its sides, H.
+    """
+    load, found = larger * 4 / 3 * (1 / (1 - NU**2)) * radius**3 / 20, []
+    case = layer(12, 3, grid={"nodes": nodes, "size": [wide, wide]})
+    for make in (fine, as_exact_layer):
         loads = [one.model_copy(update={"force": (0.0, 0.0, -load)}) for one in case.punch.loads]
-        case = case.model_copy(update={"strip": strip, "punch": case.punch.model_copy(update={"loads": tuple(loads)})})
+        case = case.model_copy(update={"punch": case.punch.model_copy(update={"loads": tuple(loads)})})
         bodies = build_bodies(case)
         x = bodies.punch.surface.x
         sphere = (x[:, 0] ** 2 + x[:, 1] ** 2) / 40
         bodies.punch.surface = replace(bodies.punch.surface, profile=sphere)
-        system = elastic(place(bodies, make_sliding(case), case=case))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(operators, "OPERATORS", {**OPERATORS, "fine": make})
+            system = elastic(place(bodies, make_sliding(case), case=case))
         contact = system.phase_contact([0]).solve(system.gap(0, system.unworn()))
-        found.append((contact.pressure[0], contact.rigid[0, 0]))
-    (ours, approach), (exact, exact_approach) = found
+        found.append((contact.pressure[0], float(contact.rigid[0, 0])))
+    return found[0], found[1], x
+
+
+@pytest.mark.parametrize(("radius", "larger"), [(0.3, 1.0), (0.6, 1.1), (0.85, 1.2)])
+def test_sphere_on_a_layer(radius: float, larger: float) -> None:
+    """Row 55: a rigid sphere of 20 H pressed on the layer, pressures node by node and the approach."""
+    (ours, approach), (exact, exact_approach), x = on_layer(radius, larger, 65, 1.9)
     r = np.hypot(x[:, 0], x[:, 1])
     assert r[exact > 0].max() == pytest.approx(radius, abs=0.06)
     assert np.abs(ours - exact).max() < 0.01 * exact.max()

@@ -14,8 +14,8 @@ source is a contribution of its own, and their sum bounds what they come to toge
     solver       what is left of equilibrium, and rounding.
 
 The runs that are compared are made on the coarser elements, so that all of them together take less than the set-up of
-the bodies does in solids; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one
-and r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
+solids does; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one and
+r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
 
     u = 1.25 d / (r^q - 1),    d = |phi_h - phi_H| or, if that is more, what their fields differ by (`Value.apart`).
 

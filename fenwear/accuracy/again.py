@@ -11,6 +11,7 @@ import numpy as np
 from fenwear.accuracy.values import Values, values_of
 from fenwear.arrays import Array
 from fenwear.assembly import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
+from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case
 from fenwear.cycle import Block, Span, follow_program, jump, march
 from fenwear.cycle.driver import Watch, unwatched
@@ -96,10 +97,12 @@ class Coarser:
     Attributes:
         case: Itself.
         ratio: How many times as far apart its nodes are.
+        grid: Its grid, where it has one that stays.
     """
 
     case: Case
     ratio: float
+    grid: RegularGrid | None = None
 
 
 def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser | None:
@@ -120,9 +123,9 @@ def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser | None
         return None if few else Coarser(changed(case, grid={"across": wanted.across // every}), every)
     if max(grid.counts) < FEWEST:
         return None
-    fewer = grid.thinned(every)
+    fewer = grid.thinned(every, less=int(wanted.size is None))  # by default a spacing is left at each end
     numbers = {"nodes": max(fewer.counts), "size": tuple(fewer.sides), "middle": tuple(fewer.middle)}
-    return Coarser(changed(case, grid=numbers), every)
+    return Coarser(changed(case, grid=numbers), every, fewer)
 
 
 def nodes_across(placed: ContactSetup, pressure: Array) -> int:
@@ -156,13 +159,13 @@ def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:
     Args:
         case: The run's on other elements.
         system: Of the run, whose steps of slip it takes.
-        by: How it is coarser; None where it is not.
+        by: What it is coarser by; None where it is not.
 
     Raises:
         CaseError: neither goes.
     """
     if by is not None and answers_anywhere(system):
-        return relaid(system, case, int(by.ratio))
+        return relaid(system, case, by.grid)
     try:
         return renewed(replace(system, made_from=case))
     except CaseError as error:

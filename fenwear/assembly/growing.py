@@ -60,17 +60,17 @@ def regridded(system: Tribosystem, grid: RegularGrid) -> Tribosystem:
     return law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
 
 
-def relaid(system: Tribosystem, case: Case, every: int = 1) -> Tribosystem:
+def relaid(system: Tribosystem, case: Case, grid: RegularGrid | None = None) -> Tribosystem:
     """Return the system of a case whose grid or motion alone is another one, on the same bodies; collective.
 
     Args:
         system: Whose bodies answer on any grid, on meshes as they were made.
         case: The other one.
-        every: How many times as far apart the nodes of a grid are that stays.
+        grid: Its grid, where it stays; by default the same.
     """
-    reach, grid = system.bodies.punch.reach, system.pair.punch.grid
-    assert grid is not None
-    first = grid.thinned(every) if reach is None else reach.grid
+    reach = system.bodies.punch.reach
+    first = (grid or system.pair.punch.grid) if reach is None else reach.grid
+    assert first is not None
     return on_first_contact(regridded(replace(system, made_from=case, sliding=make_sliding(case)), first))
 
 

@@ -103,14 +103,19 @@ class RegularGrid:
             whole = np.where(known, np.add.outer(whole * count, at), -1).ravel()
         return whole
 
-    def thinned(self, every: int) -> RegularGrid:
-        """Return a grid of every so manieth node of this one, in its middle as far as there is one."""
-        left = [(count - 1) % every // 2 for count in self.counts]
+    def thinned(self, every: int, less: int = 0) -> RegularGrid:
+        """Return a grid of every so manieth node of this one, in its middle as far as there is one.
+
+        Args:
+            every: How many times as far apart nodes are.
+            less: Spacings that it ends before this one at each end.
+        """
+        left = [(count - 1) % every // 2 + less * every for count in self.counts]
         return replace(
             self,
             corner=tuple(low + k * step for low, k, step in zip(self.corner, left, self.spacing, strict=True)),
             spacing=tuple(every * step for step in self.spacing),
-            counts=tuple((count - 1) // every + 1 for count in self.counts),
+            counts=tuple((count - 1) // every + 1 - 2 * less for count in self.counts),
         )
 
     def holds(self, other: RegularGrid) -> bool:

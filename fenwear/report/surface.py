@@ -253,7 +253,7 @@ class Surface:
         if not len(kept):
             return places, np.full(POINTS, np.nan)
         corners, kept = np.unique(kept, return_inverse=True)
-        plane = Triangulation(*self.sliding[corners][:, [free, fixed]].T, kept.reshape(-1, 3))
+        plane = Triangulation(self.sliding[corners, free], self.sliding[corners, fixed], kept.reshape(-1, 3))
         found: Any = LinearTriInterpolator(plane, values[corners])(places, np.full(POINTS, at[fixed]))
         return places, np.asarray(found.filled(np.nan))
 

@@ -79,10 +79,10 @@ def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[s
     figure = go.Figure(data=last, layout=_layout(shown, half_cycles))
     found: dict[str, Any] = json.loads(figure.to_json())
     surfaces = {body: _corners(history, body) for body in {quantity.body for quantity in shown}}
-    for trace, quantity in zip(found["data"], shown, strict=True):  # plotly would look at every number by itself
-        heights = _short(_raised(history, quantity.body, half_cycles[-1]))
-        trace |= {**surfaces[quantity.body], "z": heights}
-        trace["intensity"] = _short(_values(history, quantity, half_cycles[-1]))
+    for drawn, quantity in zip(found["data"], shown, strict=True):  # plotly would look at every number by itself
+        drawn.update(surfaces[quantity.body])
+        drawn["z"] = _short(_raised(history, quantity.body, half_cycles[-1]))
+        drawn["intensity"] = _short(_values(history, quantity, half_cycles[-1]))
     # What changes from half-cycle to half-cycle alone, so that the chosen quantity stays.
     for step, n in zip(found["layout"]["sliders"][0]["steps"], half_cycles, strict=True):
         heights = {body: _short(_raised(history, body, n)) for body in {quantity.body for quantity in shown}}

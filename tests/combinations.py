@@ -157,7 +157,6 @@ AROUND = "the model of rings has no displacement around the axis, along which th
 PASSES = "changes as long as a run goes on: a cyclic steady state does not exist"
 DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
 FLOWS = "what flows beyond the hardness depends on the way there: no end is known without it"
-STEPS = "taken anew in steps of a run: what comes of it is no smooth function of other keys"
 
 # Closed cells, by feature, law and way; None for all of them.
 CLOSED: dict[tuple[str, str | None, str | None], str] = {
@@ -167,8 +166,6 @@ CLOSED: dict[tuple[str, str | None, str | None], str] = {
     ("wear by depth and distance", "gross sliding", "steady"): PASSES,
     ("both bodies worn", "gross sliding", "steady"): DEEPENS,
     ("all that lies between", "stick (Coulomb)", "steady"): FLOWS,
-    ("properties of T", None, "sensitivity"): STEPS,
-    ("properties of T", None, "calibrate"): STEPS,
 }
 
 

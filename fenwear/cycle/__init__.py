@@ -7,7 +7,7 @@ here, whose wear is taken off in `phase` and over many cycles in `jump_step`; `f
 
 from fenwear.cycle.block import Block
 from fenwear.cycle.evolve import evolve, integrate
-from fenwear.cycle.follow import follow
+from fenwear.cycle.follow import Renewal, follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
@@ -26,6 +26,7 @@ from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 __all__ = [
     "Block",
     "Monotonic",
+    "Renewal",
     "Span",
     "SteadyState",
     "at_step",

@@ -6,12 +6,16 @@ place in space: theta(x + s) = theta + grad theta . s at a node that moves by s.
 
 Where properties of materials depend on the temperature, the bodies are made anew, on the same meshes, at the end of a
 cycle after which one has changed by more than heat.property_tolerance: see `fenwear.assembly.warmed`.
+
+When all that happens is found by thresholds. A run may be told instead when another one did, so that what comes of it
+is a smooth function of what the two differ by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from enum import Enum
 from functools import partial
 
 import dolfinx
@@ -40,11 +44,23 @@ from fenwear.heat.field import HeatState
 Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
 
 
+class Renewal(Enum):
+    """What is made anew."""
+
+    MESHES = "meshes"
+    PROPERTIES = "properties"
+    GRID = "grid"
+
+
 def follow(
     system: Tribosystem,
     integrate: Integrate,
     start: RunState | None = None,
     adapt: Callable[[Tribosystem], Tribosystem] = lambda system: system,
+    *,
+    given: Mapping[int, Renewal] | None = None,
+    heights_of: Tribosystem | None = None,
+    told: Callable[[int, Renewal], None] = lambda half_cycle, renewal: None,
 ) -> Iterator[Block]:
     """Yield the blocks of a run whose bodies follow large wear and temperature; collective. Each knows its system.
 
@@ -53,26 +69,22 @@ def follow(
         integrate: Yields the blocks on one system, such as `march` with its arguments.
         start: Where to go on from; by default the beginning.
         adapt: What is to be made of the system of the case on moved meshes, such as another motion; collective.
+        given: After which half-cycles something is made anew, and nothing else is; by default where it is large.
+        heights_of: Another system on the same meshes, whose elements' heights are known.
+        told: Called with every half-cycle after which something is made anew.
 
     Raises:
         ConvergenceError: as `integrate`.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    state = start
+    state, leave = start, _Leaving(system, given, heights_of)
     while True:
-        if state is not None and _Leaving(system).is_worn(state):  # a run may also go on from just there
-            warmed = None if state.temperature is None else state.temperature.temperatures()
-            again = renewed(system, state.worn, warmed)
-            moved = adapt(again)
-            state = replace(state, temperature=_carried(state.temperature, moved))
-            system = moved
-        elif state is not None and state.temperature is not None and _is_warm(system, state):
-            system = adapt(warmed_system(system, state.temperature))
-        elif state is not None and (grid := _Leaving(system).larger(state)) is not None:
-            before, system = system, regridded(system, grid)
-            state, system = on_other_grid(state, before, system), adapt(system)
-
-        leave = _Leaving(system)
+        renewal = None if state is None else leave.renewal(state)  # a run may also go on from just there
+        if state is not None and renewal is not None:
+            told(state.half_cycle, renewal)
+            system, state = _renewed(system, state, renewal, adapt)
+            given = None if given is None else {k: one for k, one in given.items() if k > state.half_cycle}
+            leave = _Leaving(system, given)
         for block in integrate(system, state, leave):
             yield block
             state = block.end
@@ -80,24 +92,59 @@ def follow(
             return
 
 
-class _Leaving:
-    """Asks whether a run is to leave its system."""
+def _renewed(
+    system: Tribosystem, state: RunState, renewal: Renewal, adapt: Callable[[Tribosystem], Tribosystem]
+) -> tuple[Tribosystem, RunState]:
+    """Return the system with what is made anew, and the state on it; collective."""
+    if renewal is Renewal.MESHES:
+        warmed = None if state.temperature is None else state.temperature.temperatures()
+        moved = adapt(renewed(system, state.worn, warmed))
+        return moved, replace(state, temperature=_carried(state.temperature, moved))
+    if renewal is Renewal.PROPERTIES and state.temperature is not None:
+        return adapt(warmed_system(system, state.temperature)), state
+    grid = outgrown(system, carried_by(state))
+    if grid is None:  # of a run that follows another one, and needs less
+        return system, state
+    larger = regridded(system, grid)
+    return adapt(larger), on_other_grid(state, system, larger)
 
-    def __init__(self, system: Tribosystem) -> None:
-        self.system = system
+
+class _Leaving:
+    """Asks whether a run is to leave its system, and for what."""
+
+    def __init__(
+        self,
+        system: Tribosystem,
+        given: Mapping[int, Renewal] | None = None,
+        heights_of: Tribosystem | None = None,
+    ) -> None:
+        self.system, self.given, self._heights_of = system, given, heights_of or system
         system.team.serve(self)
-        system.mesh_update_due(system.unworn())  # before rank 0 leads: the elements' heights take all ranks
+        if given is None:  # before rank 0 leads: the elements' heights take all ranks
+            self._heights_of.mesh_update_due(system.unworn())
 
     def __call__(self, state: RunState) -> bool:
         """Return whether wear or warmth is large; collective, or for rank 0 that leads."""
+        if self.given is not None:
+            return state.half_cycle in self.given
         team = self.system.team
         if self.is_worn(state) or self.larger(state) is not None:
             return True
         return bool(warming_key(self.system)) and team.each(self, "is_warm", state)
 
+    def renewal(self, state: RunState) -> Renewal | None:
+        """Return what is to be made anew; collective."""
+        if self.given is not None:
+            return self.given.get(state.half_cycle)
+        if self.is_worn(state):
+            return Renewal.MESHES
+        if state.temperature is not None and self.is_warm(state):
+            return Renewal.PROPERTIES
+        return None if self.larger(state) is None else Renewal.GRID
+
     def is_worn(self, state: RunState) -> bool:
         """Return whether the meshes are to follow the wear; collective, or for rank 0 that leads."""
-        return self.system.team.lead(partial(self.system.mesh_update_due, state.worn))
+        return self.system.team.lead(partial(self._heights_of.mesh_update_due, state.worn))
 
     def larger(self, state: RunState) -> RegularGrid | None:
         """Return the grid that the contact asks for, None where it has room; collective, or for rank 0 that leads."""

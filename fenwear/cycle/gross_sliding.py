@@ -115,7 +115,7 @@ class Jumps:
     def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
         stepper, tolerance = self.stepper, self.tolerance
-        strokes = stepper.system.motion.half_cycles
+        strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
         length, left = state.jump_length, (until - state.half_cycle) // strokes
         while True:
             tried = min(length, left)
@@ -132,7 +132,7 @@ class Jumps:
                 continue
             largest = estimate.largest
             factor = SAFETY * estimate.longer(tolerance)
-            warmed = tried > 1 and stepper.system.team.each(self, "change", end.temperature) > WARMED
+            warmed = tried > 1 and not given and stepper.system.team.each(self, "change", end.temperature) > WARMED
             if (largest <= tolerance and not warmed) or tried == 1:
                 break
             # A half is half made already.

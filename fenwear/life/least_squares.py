@@ -55,7 +55,6 @@ class LeastSquares:
         self.case, self.comm, self.team = case, comm, Team.of(comm)
         self.team.serve(self)
         self.model = Model(case)
-        self.model.check_constant()
         self.data = list(data)
         self.series = [series for one in data for series in one.series]
         self.unknowns = [scaled(case, unknown) for unknown in unknowns]

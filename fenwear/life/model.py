@@ -17,7 +17,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case, Dependence
-from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
+from fenwear.cycle import Block, Renewal, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.cycle.totals import SUMS, Totals, cycle_totals
@@ -39,12 +39,31 @@ NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
 
 
 @dataclass(frozen=True)
+class Course:
+    """What a run follows so that its results are smooth functions of the values of keys: what another one did.
+
+    Attributes:
+        ends: Cycles at whose ends jumps end, and nowhere else.
+        renewals: After which half-cycles meshes, properties or grids were made anew.
+    """
+
+    ends: tuple[int, ...]
+    renewals: Mapping[int, Renewal] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, snapshots: Sequence[Snapshot]) -> Course:
+        """Return that of a run of these snapshots."""
+        made = {half_cycle: renewal for one in snapshots for half_cycle, renewal in one.renewals}
+        return cls(tuple(int(one.cycle) for one in snapshots), made)
+
+
+@dataclass(frozen=True)
 class RunSamples:
-    """A run: its first and last snapshots, and the cycles at the ends of its jumps."""
+    """A run: its first and last snapshots, and its course."""
 
     first: Snapshot
     last: Snapshot
-    ends: tuple[int, ...]
+    course: Course
 
 
 @dataclass
@@ -62,7 +81,7 @@ class Model:
     evaluations: int = 0
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
-    _courses: dict[tuple[object, ...], RunSamples] = field(default_factory=dict, repr=False)
+    _runs: dict[tuple[object, ...], RunSamples] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a test program.
@@ -101,19 +120,15 @@ class Model:
                 )
                 raise CaseError(InputError(key, message))
 
-    def check_constant(self) -> None:
-        """Refuse properties of the temperature where they are followed in steps.
+    def _check_constant(self, quantity: str) -> None:
+        """Refuse properties of the temperature for what is told of bodies as they are at the start.
 
         Raises:
             CaseError: there are some.
         """
         for name, material in self.case.materials.items():
             for key in material.dependent:
-                message = (
-                    "depends on the temperature, and is taken anew step by step in a run: what comes of it is no "
-                    "smooth function of other keys; expected a quantity of the steady state, or a constant, such as "
-                    "its value where `steady` finds the heat"
-                )
+                message = f"depends on the temperature, and the {quantity} is told of constant properties; expected one"
                 raise CaseError(InputError(f"materials.{name}.{key}", message))
 
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
@@ -157,7 +172,7 @@ class Model:
         *,
         settings: Sequence[str] = (),
         stops: Sequence[int] = (),
-        sequence: Sequence[int] | None = None,
+        course: Course | None = None,
         until: Callable[[Snapshot], bool] = lambda _: False,
     ) -> Iterator[Snapshot]:
         """Yield the end of every jump, from the first to the last.
@@ -167,8 +182,7 @@ class Model:
             cycles: How many at most.
             settings: Overrides `key.path=value` besides.
             stops: Cycles at whose end a jump ends in any case.
-            sequence: Cycles at whose ends the jumps end, and nowhere else: with the sequence of another run the
-                results are smooth functions of the values.
+            course: Of another run, which this one is to follow.
             until: Ends the run at the first snapshot for which it is true.
 
         Raises:
@@ -178,49 +192,49 @@ class Model:
         system = self.system(values, settings)
         self.evaluations += 1
         strokes, case = system.motion.half_cycles, system.case
-        tolerance = case.run.jump_tolerance if sequence is None else np.inf
-        ends = frozenset(strokes * end for end in (stops if sequence is None else sequence))
+        tolerance = case.run.jump_tolerance if course is None else np.inf
+        ends = frozenset(strokes * end for end in (stops if course is None else course.ends))
+        renewals: list[tuple[int, Renewal]] = []
 
         def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
             start = reached
-            if sequence is not None:
+            if course is not None:
                 start = start or beginning(on, None if on.exchange is None else on.exchange.initial())
                 start = replace(start, jump_length=ONE_STEP)
             return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
 
         # The elements' heights are the base's wherever the geometry is: no need to measure them anew.
         base = self._base(tuple(settings))
-        watch = base if base.case.geometry == case.geometry else system
-        reached: RunState | None = None
-        for block in integrate(system, None, lambda now: watch.mesh_update_due(now.worn)):
-            reached = block.end
-            snapshot = _of_block(block)
-            yield snapshot
-            if until(snapshot):
-                return
-        if reached is None or reached.half_cycle >= strokes * cycles:
-            return
-        for block in follow(system, integrate, reached):
-            snapshot = _of_block(block)
+        blocks = follow(
+            system,
+            integrate,
+            given=None if course is None else course.renewals,
+            heights_of=base if base.case.geometry == case.geometry else system,
+            told=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),
+        )
+        for block in blocks:
+            snapshot = replace(_of_block(block), renewals=tuple(renewals))
+            renewals.clear()
             yield snapshot
             if until(snapshot):
                 return
 
-    def course(
+    def samples(
         self,
         values: Mapping[str, float],
         cycles: int,
         settings: Sequence[str] = (),
-        sequence: Sequence[int] | None = None,
+        course: Course | None = None,
     ) -> RunSamples:
         """Return a run to its end, as `run`; kept, so that several quantities of it cost one."""
-        key = (tuple(sorted(values.items())), cycles, tuple(settings), None if sequence is None else tuple(sequence))
-        if key not in self._courses:
-            while len(self._courses) >= KEPT:
-                self._courses.pop(next(iter(self._courses)))
-            taken = list(self.run(values, cycles, settings=settings, sequence=sequence))
-            self._courses[key] = RunSamples(taken[0], taken[-1], tuple(int(one.cycle) for one in taken))
-        return self._courses[key]
+        followed = None if course is None else (course.ends, tuple(course.renewals.items()))
+        key = (tuple(sorted(values.items())), cycles, tuple(settings), followed)
+        if key not in self._runs:
+            while len(self._runs) >= KEPT:
+                self._runs.pop(next(iter(self._runs)))
+            taken = list(self.run(values, cycles, settings=settings, course=course))
+            self._runs[key] = RunSamples(taken[0], taken[-1], Course.of(taken))
+        return self._runs[key]
 
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
         """Return the cyclic steady state, with properties of its own temperatures where they depend on them.
@@ -243,7 +257,7 @@ class Model:
         Raises:
             ConvergenceError: there is no steady state.
         """
-        self.check_constant()
+        self._check_constant("run-in")
         self._check_stays()
         system = self._sliding("run_in", values, settings)
         self.evaluations += 1
@@ -257,7 +271,7 @@ class Model:
         Raises:
             CaseError: the case has no heat.
         """
-        self.check_constant()
+        self._check_constant("critical speed")
         system = self._sliding("critical_speed", values, settings)
         self.evaluations += 1
         return min(critical_speed(system, d) for d in sorted(set(system.motion.directions)))

@@ -9,7 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.life.data import DataSet, Series
-from fenwear.life.model import Model
+from fenwear.life.model import Course, Model
 from fenwear.life.quantities import UNITS, Quantity, cycles_of
 from fenwear.life.snapshot import Snapshot
 
@@ -19,16 +19,13 @@ class Predictor:
 
     def __init__(self, model: Model, data: Sequence[DataSet]) -> None:
         self.model, self.data = model, list(data)
-        self._sequences: dict[tuple[str, ...], tuple[int, ...]] = {}
+        self._courses: dict[tuple[str, ...], Course] = {}
 
     def keep_jumps(self, values: Mapping[str, float]) -> bool:
         """Let the runs from now on jump as those at these values do; return whether that is otherwise than before."""
-        before, self._sequences = self._sequences, {}
-        made = {}
-        for settings, snapshots in self._runs(values).items():
-            made[settings] = tuple(int(s.cycle) for s in snapshots)
-        self._sequences = made
-        return made != before
+        before, self._courses = self._courses, {}
+        self._courses = {settings: Course.of(snapshots) for settings, snapshots in self._runs(values).items()}
+        return self._courses != before
 
     def __call__(self, values: Mapping[str, float], *, strict: bool = False) -> list[Array]:
         """Return the predictions of every series, in the order of the data sets.
@@ -56,11 +53,9 @@ class Predictor:
                 stops |= {max(1, round(cycles_of((a, series.counted), *measures))) for a in np.unique(series.after)}
         runs = {}
         for settings, stops in wanted.items():
-            sequence = self._sequences.get(settings)
-            last = max(stops) if sequence is None else sequence[-1]
-            runs[settings] = list(
-                self.model.run(values, last, settings=settings, stops=sorted(stops), sequence=sequence)
-            )
+            course = self._courses.get(settings)
+            last = max(stops) if course is None else course.ends[-1]
+            runs[settings] = list(self.model.run(values, last, settings=settings, stops=sorted(stops), course=course))
         return runs
 
 

@@ -21,7 +21,7 @@ from fenwear.case import Case
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.life.model import Model
+from fenwear.life.model import Course, Model
 from fenwear.life.snapshot import Snapshot, WornSurface
 from fenwear.results.scar import extents
 
@@ -332,13 +332,13 @@ class Path:
     """How a quantity is computed again for other values, so that its values are smooth.
 
     Attributes:
-        sequence: The ends of the jumps.
+        course: Of the run; None of what is not one.
         rough: Whether values are smooth as long as the same nodes are in contact, and no further: an edge of contact or
             scar has moved on the way to them and lies within the mesh, or they are the place of one.
         grain: The smallest step of a value that is counted in nodes.
     """
 
-    sequence: tuple[int, ...] = ()
+    course: Course | None = None
     rough: bool = False
     grain: float = 0.0
 
@@ -380,11 +380,11 @@ def evaluate(
         wanted = float(max(1, model.case.run.half_cycles // half_cycles))
     else:
         wanted = cycles_of(quantity.after, distance, period)
-    last = max(1, round(wanted)) if path is None else path.sequence[-1]
-    sequence = None if path is None else path.sequence
-    course = model.course(values, last, settings, sequence)
-    made = Path(course.ends, course.last.grown_from(course.first), _grain(quantity, course.last))
-    return quantity.of_snapshot(course.last.at_cycle(wanted)), made
+    course = None if path is None else path.course
+    last = max(1, round(wanted)) if course is None else course.ends[-1]
+    run = model.samples(values, last, settings, course)
+    made = Path(run.course, run.last.grown_from(run.first), _grain(quantity, run.last))
+    return quantity.of_snapshot(run.last.at_cycle(wanted)), made
 
 
 def _grain(quantity: Quantity, snapshot: Snapshot) -> float:
@@ -422,21 +422,19 @@ def _until(
     """Run until all levels are passed, and count to where a cubic through values and rates meets each."""
     taken = [[(0.0, 0.0, float("nan"))] for _ in quantities]
     levels, passed = np.array([one.level for one in quantities]), np.zeros(len(quantities), dtype=int)
-    sequence = None if path is None else path.sequence
-    grows = False
-    first: Snapshot | None = None
+    course = None if path is None else path.course
+    run: list[Snapshot] = []
 
     def enough(_: Snapshot) -> bool:
         return bool((passed > 1).all())  # one jump more, so that values nearby find their level on the same path
 
-    for snapshot in model.run(values, limit if path is None else path.sequence[-1], settings=settings,
-                              sequence=sequence, until=enough):  # fmt: skip
+    cycles = limit if course is None else course.ends[-1]
+    for snapshot in model.run(values, cycles, settings=settings, course=course, until=enough):
         for rows, one in zip(taken, quantities, strict=True):
             rows.append((snapshot.cycle, one.of_snapshot(snapshot), one.rate(snapshot)))
         passed += np.array([rows[-1][1] for rows in taken]) >= levels
-        first = first or snapshot
-        grows = snapshot.grown_from(first)
-    made = Path(tuple(int(cycle) for cycle, _, _ in taken[0][1:]), grows)
+        run.append(snapshot)
+    made = Path(Course.of(run), run[-1].grown_from(run[0]))
     factors = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}
     found = [
         _crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)

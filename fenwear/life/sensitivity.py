@@ -1,7 +1,8 @@
 """Derivatives of quantities of interest to keys of a case.
 
 Of a steady state by implicit differentiation; of a run, and of what is not differentiable so, such as a steady
-state whose materials depend on its temperatures, by central differences of runs with the same jumps. Every
+state whose materials depend on its temperatures, by central differences of runs with the same jumps, whose meshes,
+grids and properties of materials are made anew after the same half-cycles. Every
 difference is taken with two steps, h and h / 2, and extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the
 error that is told is |D(h/2) - D(h)|, of the coarser order. Where it is too large the step is reduced.
 
@@ -145,8 +146,6 @@ def sensitivity(
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
     model = Model(case)
-    if any(quantity.kind != "steady" for quantity in wanted):
-        model.check_constant()
     bases = everywhere(comm, lambda: [evaluate(model, quantity, {}) for quantity in wanted])
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):

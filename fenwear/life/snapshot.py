@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.cycle import Renewal
 from fenwear.errors import CaseError, InputError
 
 
@@ -79,6 +80,7 @@ class Snapshot:
         distance: Slid in a cycle, mm.
         period: Duration of a cycle, s.
         contacts: Which nodes are those of each named contact (n,); empty where none has a name.
+        renewals: What a run made anew since the last one, each after a half-cycle.
     """
 
     cycle: float
@@ -92,6 +94,7 @@ class Snapshot:
     distance: float
     period: float
     contacts: Mapping[str, Mask] = field(default_factory=dict)
+    renewals: tuple[tuple[int, Renewal], ...] = ()
 
     def within(self, contact: str, asked: str) -> Snapshot:
         """Return the snapshot of one named contact, or of all for "".

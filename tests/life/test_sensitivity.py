@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, ConvergenceError, load_case
+from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, jump, load_case
+from fenwear.cycle import Block, follow
+from fenwear.cycle.state import RunState
 from fenwear.life import Model, evaluate, parse_quantity, sensitivity
 
 ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
@@ -186,3 +188,32 @@ def test_laws_that_pass_are_refused(small: Callable[..., Case], of: str) -> None
     law = f"wear.punch.coefficient={{table=[[0, 1e-8], [1, 2e-8]], of='{of}', unit='1/MPa'}}"
     with pytest.raises(CaseError, match=r"wear.punch.coefficient: depends on the worn depth or the distance slid"):
         sensitivity(small("example1", law), ["steady lambda_F"], ["contact.friction"], spread=0, comm=MPI.COMM_SELF)
+
+
+@pytest.mark.slow
+def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
+    """A run in which properties follow the temperature is that of `follow`; runs beside it take them anew when it does.
+
+    Differences of small steps agree, where thresholds that each run passes by itself would leave steps in between.
+    """
+    conducting = "materials.composite.conductivity={expression='5 + 0.2 * T', unit='W/(m K)'}"
+    case = small("example1-heat", conducting, "run.jump_tolerance=0.03", "heat.property_tolerance=0.2")
+    cycles, quantity = 400, parse_quantity("temperature after 400 cycles")
+
+    def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
+        return jump(on, 2 * cycles, tolerance=0.03, start=start, leave=leave)
+
+    *_, last = follow(assemble(case, MPI.COMM_SELF, heat="reduced"), integrate)
+    model = Model(case)
+    run = list(model.run({}, cycles))
+    assert sum(len(one.renewals) for one in run) > 1
+    assert run[-1].surfaces["punch"].depth == pytest.approx(last.end.worn.punch, rel=1e-12)
+    value, path = evaluate(model, quantity, {})
+    slopes = []
+    for h in (1e-4, 1e-5):
+        friction = case.contact.friction
+        assert isinstance(friction, float)
+        ends = [evaluate(model, quantity, {"contact.friction": friction * (1 + s * h)}, path=path)[0] for s in (-1, 1)]
+        slopes.append((ends[1] - ends[0]) / (2 * h * value))
+    assert slopes[0] == pytest.approx(slopes[1], rel=1e-5)
+    assert 0.5 < slopes[0] < 1.0  # a warmer surface conducts better

@@ -102,7 +102,7 @@ for number, (name, (history, _)) in enumerate(runs.items()):
     scars.plot(x, -1e3 * history.wear[-1], **style)
     depths.plot(history.half_cycle / 2, 1e3 * history.wear.max("x"), **style)
 first.set(ylabel="pressure in the first half-cycle (MPa)", xlabel="x (µm)")
-last.set(ylabel="in the last one (MPa)", xlabel="x (µm)")
+last.set(ylabel="pressure in the last one (MPa)", xlabel="x (µm)")
 scars.set(ylabel="scar (µm)", xlabel="x (µm)")
 depths.set(ylabel="largest depth (µm)", xlabel="cycle")
 depths.axhline(1e3 * LIFE, color="grey", lw=0.8, ls=":")
@@ -123,7 +123,7 @@ print(f"plastic depth  {1e3 * runs['hardness'][1]['largest_plastic_depth_mm']:8.
 print(f"crept          {1e3 * runs['creep'][1]['punch']['largest_creep_depth_mm']:8.3f} µm")
 coating = runs["coating"][1]
 print(f"coating through first in cycle {coating['punch_coating_first_through_half_cycle'] / 2:.0f}", end=", ")
-print(f"at x = {1e3 * coating['punch_coating_first_through_at_x_mm']:.1f} µm")
+print(f"at x = {round(1e3 * coating['punch_coating_first_through_at_x_mm'], 1) + 0:.1f} µm")
 
 fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")
 history = runs["coating"][0]
@@ -167,7 +167,7 @@ left.semilogx(ratio, friction, "o-", ms=4, color="black", label="friction")
 left.set(xlabel="lambda, film over roughness", ylabel="coefficient of friction", ylim=(0, None))
 right = left.twinx()
 right.semilogx(ratio, 1e9 * worn, "s--", ms=4, color="C3", label="wear")
-right.set(ylabel="worn over 1 m (µm² over 1 mm)", ylim=(0, None))
+right.set(ylabel="worn volume over way (µm³/mm)", ylim=(0, None))
 fig.legend(loc="outside upper center", ncols=2, frameon=False)
 plt.show()
 

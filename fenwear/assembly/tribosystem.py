@@ -140,11 +140,16 @@ class Tribosystem(ContactSetup):
         ratios = self.friction_ratios()
         return self._contact([SlidingContact(self.interfaces[k], ratios[k]) for k in phases])
 
-    def passed_contact(self, phase: int, *, capped: bool = True) -> ContactSolver:
-        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can."""
+    def passed_contact(self, phase: int, *, capped: bool = True, following: bool = False) -> ContactSolver:
+        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can.
+
+        Friction may be `following` the pressure (see `CondensedContact.follow`).
+        """
         interface = self.interfaces[phase] if self.creep is None else self.creep.grown[phase]
         return self._contact(
-            [SlidingContact(interface, self.friction_ratios()[phase])], self.layers.hardness if capped else np.inf
+            [SlidingContact(interface, self.friction_ratios()[phase])],
+            self.layers.hardness if capped else np.inf,
+            following=following,
         )
 
     def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
@@ -163,10 +168,10 @@ class Tribosystem(ContactSetup):
         found = super().unworn()
         return found if self.creep is None else replace(found, crept=self.creep.beginning())
 
-    def _contact(self, phases: list[SlidingContact], most: float = np.inf) -> ContactSolver:
+    def _contact(self, phases: list[SlidingContact], most: float = np.inf, *, following: bool = False) -> ContactSolver:
         if self.solver == "full":
             return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
-        return CondensedContact(phases, self.remedies, self.team, most)
+        return CondensedContact(phases, self.remedies, self.team, most, following=following)
 
     @told_by_name
     def check_touching(self) -> None:

@@ -47,6 +47,7 @@ from fenwear.remedies import (
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
+WHOLE = 2000  # the same where friction follows the pressure, whose Newton's method asks for all of them at once
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 NUDGE = 1e-6  # of the largest pressure, for differences
@@ -147,11 +148,14 @@ class CondensedContact:
         remedies: Remedies | None = None,
         team: Team | None = None,
         most: float = np.inf,
+        *,
+        following: bool = False,
     ) -> None:
         """Take the phases, where to note that a contact was solved in another way than usual, and ranks that have it.
 
         By default every rank has a contact of its own, unless they share its rows. Of one phase of few nodes no
         pressure exceeds `most`, MPa: there the surfaces flow, and the gap is what they have to, below zero.
+        Friction may be `following` the pressure.
         """
         self.phases = list(phases)
         self._remedies = remedies or Remedies()
@@ -170,7 +174,8 @@ class CondensedContact:
         if self._shared:
             self._team.serve(self)
         gridded = interface.pair.punch.grid is not None and interface.cost is not None
-        self._many = n > MANY or (n > SOME and m * n > TOGETHER) or self._shared or gridded
+        few = WHOLE if following else MANY
+        self._many = n > few or (n > SOME and m * n > TOGETHER) or self._shared or gridded
         self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []

@@ -40,7 +40,8 @@ EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave o
 SETS = 30  # that are gone through before SNES starts
 AGAIN = 3  # times that a set may come again, where its derivative is another one
 CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor still serves
-SERVES = 3  # such steps, after which the next solve has a factor of its own
+SERVES = 3  # such steps, after which the next solve has a factor of its own: of as many unknowns, by what it costs,
+STEP_COSTS = 50  # one more each
 MOST_SHARE = 0.5  # of a step along the last one, that is corrected
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 LINEARISED = 10  # times, where pivots look for the set
@@ -136,6 +137,7 @@ class Inequality:
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
+        self._serves = max(SERVES, len(lower) // STEP_COSTS)
         self._stepped: Array | None = None  # where the first step from the last start led to, on its own set
 
     @cached_property
@@ -290,7 +292,7 @@ class Inequality:
                 size = math.sqrt(rest @ rest)
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
                 if small and same and (wanted if self.iterations else self._wanted(x, f, kept)) == key:
-                    self.residual, self._worn_out = f, self.iterations > SERVES
+                    self.residual, self._worn_out = f, self.iterations > self._serves
                     return x
                 if size > FALLS * before:
                     steps, kept = [], self._factor(self._jacobian(x), key)

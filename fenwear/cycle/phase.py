@@ -56,7 +56,14 @@ class PhaseStep:
         self._constant, self._load = system.constant_coefficients, 1.0
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
-        self._contact = system.passed_contact(phase)
+        # Explicitly, wear and what remembers follow the pressure, and do not change it.
+        friction = system.friction
+        apart = not self._constant and not implicit and not friction.remembers and not friction.asks("edge")
+        self._wears_after = apart and friction.constant
+        self._slides_before = apart and not friction.constant and not friction.asks("p", "pm")
+        follows = apart and exchange is None and friction.asks("p", "pm")
+        self._contact = system.passed_contact(phase, following=follows)
+        self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
         self._mu = system.friction.values(conditions)
@@ -64,13 +71,6 @@ class PhaseStep:
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
-        # Explicitly, wear and what remembers follow the pressure, and do not change it.
-        friction = system.friction
-        apart = not self._constant and not implicit and not friction.remembers and not friction.asks("edge")
-        self._wears_after = apart and friction.constant
-        self._slides_before = apart and not friction.constant and not friction.asks("p", "pm")
-        condensed = isinstance(self._contact, CondensedContact) and self._contact.can_follow
-        self._follows = apart and exchange is None and friction.asks("p", "pm") and condensed
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
         self._known: list[ContactState] = []  # of the last cycles, the last one first

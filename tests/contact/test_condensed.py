@@ -11,7 +11,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from fenwear import ConvergenceError, Tribosystem, assemble
+from fenwear import ConvergenceError, Tribosystem, assemble, march
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.full import FullContact
@@ -164,6 +164,22 @@ def test_a_steel_ball_on_a_few_nodes_of_a_steel_cup(assembled: Callable[..., Tri
         np.testing.assert_allclose(rigid.equilibrium(ratio) @ pressure, -rigid.resultant, rtol=0, atol=1e-6)
         assert 3 <= (pressure > 0).sum() < 8
     assert ways[SOFTER_START] > 0
+
+
+def test_friction_follows_the_pressure_of_many_nodes(
+    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One Newton's method finds what rounds of pressures and coefficients come to, node by node."""
+    friction = "contact.friction={expression='0.2 + 0.1 * exp(-p / 50)'}"
+    system = assembled("example1", "geometry.degree=2", "geometry.parameters.elements_along_contact=210", friction)
+    contact = system.passed_contact(0, following=True)
+    assert isinstance(contact, CondensedContact)
+    assert contact.can_follow
+    *_, last = march(system, 3)
+    monkeypatch.setattr("fenwear.contact.condensed.WHOLE", 0)
+    *_, by_rounds = march(system, 3)
+    np.testing.assert_allclose(last.pressure, by_rounds.pressure, rtol=0, atol=1e-9 * last.pressure.max())
+    np.testing.assert_allclose(last.wear, by_rounds.wear, rtol=0, atol=1e-9 * last.wear.max())
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, reduce
-from itertools import accumulate
+from itertools import accumulate, groupby
 
 import numpy as np
 import scipy.linalg
@@ -19,7 +19,7 @@ from fenwear.arrays import Array
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.step_map import StepMap
 
-KEPT, MEMORY = 8, 5 * 10**8  # cycles of different conducting nodes that are kept, and bytes that they may take
+KEPT, MEMORY = 8, 10**9  # cycles of different conducting nodes that are kept, and bytes that they may take
 
 
 class PhaseMap:
@@ -35,7 +35,9 @@ class PhaseMap:
     @cached_property
     def propagator(self) -> Array:
         """From the state at its start (dim, dim)."""
-        return reduce(lambda through, step: step[0].propagator @ through, self.steps[1:], self.steps[0][0].propagator)
+        alike = [list(own) for _, own in groupby(self.steps, lambda step: id(step[0]))]
+        powers = [np.linalg.matrix_power(own[0][0].propagator, len(own)) for own in alike]
+        return np.asarray(reduce(lambda through, power: power @ through, powers))
 
     @cached_property
     def source(self) -> Array:
@@ -69,6 +71,14 @@ class Cycle:
 
     def __init__(self, maps: Sequence[PhaseMap]) -> None:
         self.maps = maps
+        self._end: JumpEnd | None = None  # the last one
+
+    def end(self, cycles: float) -> JumpEnd:
+        """Return what the end of a jump over so many cycles goes by; the last one is kept: jumps try it again."""
+        if self._end is None or self._end.cycles != cycles:
+            self._end = None  # its memory first
+            self._end = JumpEnd(self.propagator, cycles)
+        return self._end
 
     @cached_property
     def propagator(self) -> Array:
@@ -102,14 +112,48 @@ class Cycle:
         return found
 
 
+class JumpEnd:
+    """The end of a jump as far as it does not depend on its begin.
+
+    Args:
+        propagator: State after a cycle from that at its start (dim, dim).
+        cycles: How many; infinitely many lead to the periodic state.
+    """
+
+    def __init__(self, propagator: Array, cycles: float) -> None:
+        self.cycles, one, endless = cycles, np.eye(len(propagator)), np.isinf(cycles)
+        self._weight = 1.0 if endless else cycles
+        self._factor = scipy.linalg.lu_factor(one - propagator if endless else one + cycles * (one - propagator))
+        self._coupling: Array | None = None
+
+    def state(self, start: Array, brought: Array) -> Array:
+        """Return the state there (dim,) from that at the begin (dim,), and what a cycle brings to none (dim,)."""
+        begun = np.zeros_like(start) if np.isinf(self.cycles) else start
+        return np.asarray(scipy.linalg.lu_solve(self._factor, begun + self._weight * brought))
+
+    def coupling(self, cycle: Cycle, gap_rows: Sequence[Array]) -> Array:
+        """Return the thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa; made once.
+
+        Args:
+            cycle: Its own.
+            gap_rows: Thermal gap of the coordinates at the end of each phase (n, dim), mm.
+        """
+        if self._coupling is None:
+            m, n, responses = len(cycle.maps), len(gap_rows[0]), cycle.responses
+            end = scipy.linalg.lu_solve(self._factor, self._weight * responses[-1])
+            found = zip(gap_rows, cycle.through, responses, strict=True)
+            gaps = np.array([rows @ (through @ end + own) for rows, through, own in found])
+            self._coupling = gaps.reshape(m, n, m, n)
+        return self._coupling
+
+
 class CycleJump:
     """Where a jump ends, as a function of the pressures of its phases.
 
     Args:
-        start: What the end solves for without pressure and without what cycles bring (dim,).
-        weight: How many cycles bring it.
-        matrix: Of the end (dim, dim).
+        start: The state at its begin (dim,).
         cycle: The cycle.
+        cycles: How many; infinitely many lead to the periodic state.
         gap_rows: Thermal gap of the coordinates at the end of each phase (n, dim), mm.
         gap_constants: The same where they are zero (n,), mm.
     """
@@ -117,20 +161,17 @@ class CycleJump:
     def __init__(
         self,
         start: Array,
-        weight: float,
-        matrix: Array,
         cycle: Cycle,
+        cycles: float,
         gap_rows: Sequence[Array],
         gap_constants: Sequence[Array],
     ) -> None:
-        self._start, self._weight, self._cycle = start, weight, cycle
+        self._start, self._cycle, self._end = start, cycle, cycle.end(cycles)
         self._gap_rows, self._gap_constants = gap_rows, gap_constants
-        self._factor = scipy.linalg.lu_factor(matrix)
 
     def state(self, pressure: Array) -> Array:
         """Return the state at the end of the jump (dim,) for pressures (m, n)."""
-        brought = self._cycle.states(np.zeros(len(self._start)), pressure)[-1]
-        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
+        return self._end.state(self._start, self._cycle.states(np.zeros(len(self._start)), pressure)[-1])
 
     def gaps(self, pressure: Array) -> Array:
         """Return the thermal gap at the end of each phase of the cycle that starts there (m, n), mm, at pressures."""
@@ -143,13 +184,10 @@ class CycleJump:
         """The thermal gaps without pressure."""
         return self.gaps(np.zeros((len(self._cycle.maps), len(self._gap_constants[0]))))
 
-    @cached_property
+    @property
     def coupling(self) -> Array:
         """Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa."""
-        m, n, responses = len(self._cycle.maps), len(self._gap_constants[0]), self._cycle.responses
-        end = scipy.linalg.lu_solve(self._factor, self._weight * responses[-1])
-        found = zip(self._gap_rows, self._cycle.through, responses, strict=True)
-        return np.array([rows @ (through @ end + own) for rows, through, own in found]).reshape(m, n, m, n)
+        return self._end.coupling(self._cycle, self._gap_rows)
 
 
 class CycleHeat:
@@ -181,7 +219,7 @@ class CycleHeat:
         if key not in self._cycles:
             (m, n), dim = conductances.shape, self.dim
             steps = len({(plan.punch, plan.strip) for plans in self.exchange.plans for plan in plans})
-            each = 8 * dim * (2 * m * dim + steps * (dim + n))
+            each = 8 * dim * ((2 * m + 1) * dim + steps * (dim + n))
             if len(self._cycles) > min(KEPT, MEMORY // each):
                 self._cycles.clear()
             self._cycles[key] = Cycle([self._phase_map(phase, conductances[phase]) for phase in range(m)])
@@ -200,9 +238,4 @@ class CycleHeat:
 
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
-        cycle = self.cycle(conductances)
-        changes = np.eye(len(state)) - cycle.propagator
-        if np.isinf(cycles):
-            return CycleJump(np.zeros(len(state)), 1.0, changes, cycle, self.gap_rows, self._gap_constants)
-        matrix = np.eye(len(state)) + cycles * changes
-        return CycleJump(state, cycles, matrix, cycle, self.gap_rows, self._gap_constants)
+        return CycleJump(state, self.cycle(conductances), cycles, self.gap_rows, self._gap_constants)

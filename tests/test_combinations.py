@@ -13,10 +13,11 @@ from combinations import CLOSED, FEATURES, LAWS, STICK, WAYS, closed
 from mpi4py import MPI
 
 import fenwear
-from fenwear import Case, CaseError, ConvergenceError, State, assemble, load_case, march, register_law, steady
+from fenwear import Case, CaseError, ConvergenceError, State, assemble, jump, load_case, march, register_law, steady
 from fenwear.case import Dependence
 from fenwear.case.own_laws import forget_laws
 from fenwear.cycle import Block, evolve
+from fenwear.cycle.state import joined
 from fenwear.life import (
     DataSet,
     Model,
@@ -262,3 +263,20 @@ def test_what_is_closed_is_refused_with_a_reason(cell: tuple[str, str | None, st
     feature, law, way = cell
     with pytest.raises((CaseError, ConvergenceError)):
         WALKED[way or "march"](feature, law or "gross sliding", tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layer", ["exponential", "rough"])
+def test_all_that_lies_between_ends_where_long_runs_do(layer: str) -> None:
+    """The pressures of the steady state, node by node, are those of a run, the nearer the longer it is."""
+    rough = "contact.layer={kind='rough', roughness='0.2 um', asperity_radius='50 um', asperity_density='1000 1/mm^2'}"
+    case = case_of("all that lies between", "gross sliding", *([rough] if layer == "rough" else []))
+    system = assemble(case)
+    state, apart = steady(system), []
+    for cycles in (3_000, 30_000):
+        *_, last = jump(system, 2 * cycles, tolerance=1e-2)
+        found = joined(last.end.contacts)
+        assert found is not None
+        apart.append(float(np.abs(found.pressure - state.phase_pressure).max() / state.phase_pressure.max()))
+    assert apart[1] < 1e-5
+    assert apart[1] < 0.1 * apart[0]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenwear import Case, CaseError, assemble, load_case
-from fenwear.cycle import critical_speed
+from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case
+from fenwear.cycle import Block, critical_speed, follow
+from fenwear.cycle.state import RunState
 from fenwear.life import Model, evaluate, parse_quantity
 from fenwear.life.quantities import of_case
 
@@ -132,3 +134,22 @@ def test_what_a_case_does_not_know_is_refused(small: Callable[..., Case]) -> Non
             of_case(parse_quantity(text), small("example2"))
     with pytest.raises(CaseError, match="not on the contact"):
         value(small("example2"), "depth at 31 mm after 10 cycles")
+
+
+@pytest.mark.slow
+def test_a_grid_that_grows() -> None:
+    """A quantity of a run is that of the run, which goes over to a larger grid on its way."""
+    case = load_case("ball-on-flat", [
+        "punch.operator=fine", "strip.operator=fine", "geometry.parameters.core=0",
+        "geometry.parameters.core_elements=0", "geometry.parameters.across=4", "grid.across=16", "motion.positions=2",
+    ])  # fmt: skip
+    system, cycles = assemble(case, MPI.COMM_SELF), 300
+
+    def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
+        last = cycles * on.motion.half_cycles
+        return jump(on, last, tolerance=case.run.jump_tolerance, start=start, leave=leave)
+
+    *_, last = follow(system, integrate)
+    *_, found = Model(case).run({}, cycles)
+    assert len(found.x) == len(last.system.pair.weights) > len(system.pair.weights)
+    assert found.surfaces["punch"].depth == pytest.approx(last.end.worn.punch, rel=1e-12)

@@ -44,7 +44,7 @@ SERVES = 3  # such steps, after which the next solve has a factor of its own: of
 STEP_COSTS = 50  # one more each
 MOST_SHARE = 0.5  # of a step along the last one, that is corrected
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
-LINEARISED = 10  # times, where pivots look for the set
+PIVOTS_COST = 10  # iterations of SNES, as which pivots are counted that look for the set
 ROUNDS = 40  # of some digits each, where the derivative changes
 CLOSE = 1e-9  # of residuals, where solutions cost by their digits
 
@@ -225,13 +225,14 @@ class Inequality:
     def solve_by_pivots(self, start: Array) -> Array:
         """Return the solution (size,) by Lemke's method, of the derivative at the start, at its solution, and so on.
 
-        Where there are lower bounds alone, and they are zero.
+        Where there are lower bounds alone, and they are zero. It is as often as a tenth of the iterations that SNES may
+        take where it tries again: options that limit those limit this.
 
         Raises:
             ConvergenceError: pivots find none, or their solutions do not settle.
         """
         x, free = start, np.isneginf(self._lower)
-        for _ in range(LINEARISED):
+        for _ in range(self._searching.getTolerances()[3] // PIVOTS_COST):
             operator = self._jacobian(x)
             matrix = np.array([operator.multiply(unit) for unit in np.eye(len(x))]).T
             x = complementary(matrix, self._function(x) - operator.multiply(x), free)

@@ -129,7 +129,7 @@ for name, number in zip(drum.contact.attrs["flag_meanings"].split(), drum.contac
     own = drum.contact.values == number
     colour = {"right": "C0", "left": "C1"}[name]
     for n, style in ((0, ":"), (-1, "-")):
-        label = f"{'leading' if name == 'right' else 'trailing'}, {int(drum.half_cycle[n]):,} turns"
+        label = f"{'leading' if name == 'right' else 'trailing'}, turn {int(drum.half_cycle[n]):,}"
         ax.plot(theta[own], drum.pressure[n][own], style, color=colour, label=label)
     largest = float((drum.pressure[-1][own] / np.sin(np.radians(theta[own]))).mean())
     ax.plot(theta[own], largest * np.sin(np.radians(theta[own])), "k--", linewidth=0.8)

@@ -499,10 +499,8 @@ class CondensedContact:
         yield FULL_START_SEARCH, partial(solve, full.ravel(), line_search=True)
         if even:
             yield SOFTER_START, self._from_softer_bodies
-        monotone = (
-            self._coupling is None
-        )  # where heat bulges the surfaces, there may be solutions that time does not lead to
-        if self.size <= PIVOTED and not self._many and monotone and self.most == np.inf:
+        # Not where heat bulges the surfaces: there may be solutions that time does not lead to.
+        if self.size <= PIVOTED and not self._many and self._coupling is None and self.most == np.inf:
             yield PIVOTS, partial(self.inequality.solve_by_pivots, (full if even else touching).ravel())
 
     def _from_softer_bodies(self) -> Array:

@@ -39,7 +39,7 @@ from fenwear.plausibility.thickness import thickness
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
-from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 from fenwear_verify.solid import STEEL, describe
 

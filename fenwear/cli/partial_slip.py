@@ -18,9 +18,9 @@ from fenwear.results.shakedown import shakedown_text
 from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.coulomb import touches
-from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.interface import meshed
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 
 

@@ -24,7 +24,7 @@ from fenwear.stick.strain import along_sliding, directions
 
 if TYPE_CHECKING:
     from fenwear.stick.coulomb import Steps
-    from fenwear.stick.cycle import TimeStepRecords
+    from fenwear.stick.records import TimeStepRecords
 
 S = TypeVar("S", Block, Tribosystem)
 T = TypeVar("T")

@@ -32,12 +32,14 @@ from fenwear.errors import CaseError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.jump import FrettingCycle, first_cycle, jumped
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import heated, unheated_problem
+from fenwear.stick.state import PartialSlipState
 
 
 @dataclass(frozen=True)
@@ -330,7 +332,7 @@ class HalfCycles(_Run):
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
-        lost = problem.worn_in(records, first, begin)
+        lost = problem.losses.worn_in(records, first, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)
         totals = state.totals + adds
@@ -389,7 +391,7 @@ class Jumps(_Run):
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
         ended = replace(then.end, worn=then.worn, held=None)
-        lost = [problem.worn_in(records, first, ended) for first, records in parts]
+        lost = [problem.losses.worn_in(records, first, ended) for first, records in parts]
         adds = [self.meter(records, first, own) for (first, records), own in zip(parts, lost, strict=True)]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])

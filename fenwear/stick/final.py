@@ -34,9 +34,10 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.errors import ConvergenceError
 from fenwear.layers.between import PLASTIC
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.edge import Edge, beside, stick_edges, zone_width
 from fenwear.stick.heat import HeatHistory
+from fenwear.stick.records import TimeStepRecords
 
 FAR = 1e3  # times the largest gap: never closes
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
@@ -384,8 +385,8 @@ def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
     """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    punch, strip = problem.coatings
-    if (punch is None and strip is None) or not 0 < share < 1:
+    punch, strip = problem.coatings.punch, problem.coatings.strip
+    if problem.coatings.none or not 0 < share < 1:
         return np.asarray(share * depth)
     strip = None if strip is None else strip.at(problem.interface.middle.pair.wear_interpolation)
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.sliding.screw import Screw
-from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.program import Program, make_program, steps_of
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import with_steps
 
 HALVINGS = 4  # of a step at most

@@ -30,6 +30,7 @@ from fenwear.stick.creep import StickCreep
 from fenwear.stick.position import LoadEffect, Position, along_tangents, position_of
 from fenwear.stick.program import steps_of
 from fenwear.stick.state import StickState
+from fenwear.stick.strain import surface_gradient
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
@@ -55,6 +56,11 @@ class OppositeBodies:
         self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load)
         self._positions: dict[float | Placement, Position] = {0.0: position_of(rigid, punch, strip, field)}
         self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
+
+    @cached_property
+    def gradient(self) -> csr_array:
+        """Takes values at the nodes to their derivatives along the surface there, see `strain.surface_gradient`."""
+        return surface_gradient(self.middle.pair.punch)
 
     @property
     def middle(self) -> Position:

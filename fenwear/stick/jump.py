@@ -38,9 +38,11 @@ from fenwear.layers.memory import Held
 from fenwear.layers.step import NUDGE
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
-from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.grid_jump import TOO_LARGE, Answering, GridJump
 from fenwear.stick.heat import HeatHistory
+from fenwear.stick.records import TimeStepRecords
+from fenwear.stick.state import PartialSlipState
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 GAMMA = 1 + np.sqrt(0.5)
@@ -139,7 +141,7 @@ def _rate(
     worn = problem.interface.layers.flown_as(worn, at.worn)
     at = problem.shaped(at, worn)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    settled = heat is None and own == (None, None) and not problem.asks_cycle
+    settled = heat is None and own == (None, None) and not problem.conditions.asks_cycle
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = problem.half_cycle(at)
     if heat is not None and before is None:
@@ -168,10 +170,10 @@ def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepth
     at = problem.shaped(at, layers.flown_as(worn, at.worn))
     first, warm, begin = at.next_step, at.temperature, at
     at, parts = problem.cycle(at)
-    rate = problem.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
+    rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     if creep is not None:
         rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
-    bases = problem.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
+    bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
     return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, at, warm=warm)
 
 
@@ -188,24 +190,20 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
     between, layers = depths + now.worn.between.size, problem.interface.layers
     size = between + now.worn.carried.size
-    punch, strip = problem.coatings
 
     def parted(y: Array) -> WornDepths:
         shapes = now.worn.between.shape, now.worn.carried.shape
         state, carried = y[depths:between].reshape(shapes[0]), y[between:size].reshape(shapes[1])
-        if punch is not None:
-            y = np.concatenate([punch.depth(y[:n]), y[n:]])
-        if strip is not None:
-            y = np.concatenate([y[:n], strip.depth(y[n:depths]), y[depths:]])
-        return layers.settled(WornDepths(y[:n], y[n:depths], state, y[size:], carried))
+        found = problem.coatings.depths(WornDepths(y[:n], y[n:depths], state, y[size:], carried))
+        return layers.settled(found)
 
     def whole(worn: WornDepths) -> Array:
         return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
 
     def rate_of(cycle: FrettingCycle) -> Array:
-        return whole(problem.measured_rate(cycle.rate, cycle.bases, cycle.worn))
+        return whole(problem.coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn))
 
-    begin, rate = whole(problem.measured(now.worn)), rate_of(now)
+    begin, rate = whole(problem.coatings.measured(now.worn)), rate_of(now)
 
     def risen(y: Array) -> Array:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
@@ -218,10 +216,10 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = solve(rate_of(middle) - 2 * first)
     worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
-    end = whole(problem.measured(worn))
+    end = whole(problem.coatings.measured(worn))
     then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + rate_of(then)))
-    if cycles > 1 and problem.changes_between(now.worn, worn):
+    if cycles > 1 and problem.losses.changes_between(now.worn, worn):
         halfway = (begin + end) / 2 + cycles / 8 * (rate - rate_of(then))  # cubic by Hermite
         shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
         between_them = _rate(problem, _slid_on(now, cycles / 2), shape, now.number + cycles // 2, now)
@@ -232,7 +230,7 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
     area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
     scale = area @ np.abs(whole(worn) - whole(now.worn)) + REST * (area @ whole(worn))
-    opened = np.concatenate([*problem.slopes(worn), np.ones(len(begin) - depths)])
+    opened = np.concatenate([*problem.coatings.slopes(worn), np.ones(len(begin) - depths)])
     error = float(area @ (opened * np.abs(missing))) / max(float(scale), 1e-300)
     remembered = _Remembered.of(problem, now, depths)
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
@@ -368,11 +366,11 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
     depths, layers = n + len(now.worn.strip), problem.interface.layers
     debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
     remembered = _Remembered.of(problem, now, depths)
-    of_punch, of_strip = problem.slopes(now.worn)
-    parts, measured = problem.layers_of_wear(now.worn)
+    of_punch, of_strip = problem.coatings.slopes(now.worn)
+    parts, measured = problem.coatings.layers_of_wear(now.worn)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     groups = dict[tuple[float | Placement, bytes], list[int]]()
-    over = None if debris is None else problem.debris_over(records, _begun(now))
+    over = None if debris is None else problem.losses.debris_over(records, _begun(now))
     fed, found = None if over is None else over.fed, list[Answering]()
     answering = np.array([_answering(layers, pressure) for pressure in records.pressure])
     for k in range(len(records)):
@@ -477,7 +475,7 @@ class _Remembered:
     def of(cls, problem: PartialSlipProblem, now: FrettingCycle, depths: int) -> _Remembered | None:
         """Return those of a cycle, behind so many depths; None without."""
         layers, pair, memory = problem.interface.layers, problem.interface.middle.pair, problem.interface.layers.memory
-        evolution = problem.evolution(now.records, _begun(now))
+        evolution = problem.losses.evolution(now.records, _begun(now))
         if memory is None or evolution is None:
             return None
         begin = depths + now.worn.between.size - len(pair.weights) * len(memory.contact)

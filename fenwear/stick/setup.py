@@ -12,6 +12,7 @@ from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.sliding.coating import coatings_of
+from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
@@ -93,7 +94,7 @@ def unheated_problem(
     )
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
     changing = None if laws.constant and not layers.varies else laws
-    coated = laws.coated(middle.pair, conditions)
+    coated = CoatedBodies(*laws.coated(middle.pair, conditions))
     return PartialSlipProblem(interface, make_program(case, steps), wear, mu, laws=changing, coatings=coated)
 
 

@@ -1,4 +1,4 @@
-"""What is imposed on a time step of contact with stick, and the state at its end."""
+"""What is imposed on a time step of contact with stick, the state at its end, and where a run is."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.layers.closure import Closure
-from fenwear.sliding.wear import STIFF
+from fenwear.layers.memory import Held
+from fenwear.sliding.wear import STIFF, WornDepths
 from fenwear.stick.position import LoadEffect
 
 
@@ -125,3 +126,59 @@ class StickState:
     def sticking(self) -> Mask:
         """Which nodes carry pressure and have not slipped (n,)."""
         return self.closed & ~self.slipping
+
+
+@dataclass(frozen=True)
+class PartialSlipState:
+    """Where a run is.
+
+    Attributes:
+        contact: With what it remembers.
+        imposed: On it, expansion by heat among it.
+        worn: Depths.
+        next_step: Its number in the cycle.
+        temperature: Of both bodies, on the bases of the rig's heat (dim,); None without heat.
+        heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
+        conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts; None without heat.
+        pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
+            was not: zones come back from cycle to cycle, so that Newton starts there. None before the first cycle.
+        load: Factor of all loads in the steps to come.
+        slid: What each node has slipped from the start (n,), mm, where a law depends on it; else None.
+        speed: Of the slip of each node in the last step (n,), mm/s, where a law depends on it; else None.
+        coupling: Iterations of contact and heat in the last step.
+        held: What laws remember after the last step, where that is not what `worn` has; the shape stays until the end
+            of a half-cycle.
+        slips: Of the nodes in each time step of the cycle (k, n, m), mm, as `trials`; None where no law depends on
+            what a whole cycle does.
+    """
+
+    contact: StickState
+    imposed: Imposed
+    worn: WornDepths
+    next_step: int = 0
+    temperature: Array | None = None
+    heating: Array | None = None
+    conductance: Array | None = None
+    pressures: Array | None = None
+    trials: Array | None = None
+    load: float = 1.0
+    coupling: int = 0
+    slid: Array | None = None
+    speed: Array | None = None
+    held: Held | None = None
+    slips: Array | None = None
+
+    @property
+    def near(self) -> tuple[Array, Array] | None:
+        """Pressure and trial of the next time step a cycle ago; None where there was none."""
+        if self.pressures is None or self.trials is None or np.isnan(self.pressures[self.next_step, 0]):
+            return None
+        return self.pressures[self.next_step], self.trials[self.next_step]
+
+    def then(self, state: StickState) -> tuple[Array | None, Array | None]:
+        """Return pressures and trials of the time steps with those of the next one."""
+        if self.pressures is None or self.trials is None:
+            return None, None
+        pressures, trials = self.pressures.copy(), self.trials.copy()
+        pressures[self.next_step], trials[self.next_step] = state.pressure, state.trial
+        return pressures, trials

@@ -10,9 +10,10 @@ import pytest
 
 from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.errors import ConvergenceError
-from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.fineness import HALVINGS, fine_enough
 from fenwear.stick.program import make_program
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem, with_steps
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
@@ -99,7 +100,7 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
     driven = problem()
     records = first_cycle(driven)
-    energy, worn = records.energy(driven.weights), driven.worn_in(records, 0, driven.beginning())
+    energy, worn = records.energy(driven.weights), driven.losses.worn_in(records, 0, driven.beginning())
     assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
     strip = driven.interface.middle.pair.strip.weights
     assert strip @ worn.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from fenwear import load_case
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.stick import Imposed, StickInterface, advance, untouched
-from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 
 MU = 0.5

@@ -18,7 +18,7 @@ from fenwear.interface import join
 from fenwear.plausibility.slip import unique_text
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.cone import project
-from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 
 RADIUS, LOAD = 200.0, 100.0

@@ -16,8 +16,8 @@ from fenwear.report.figures import all_figures
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import read_at
+from fenwear.stick.records import TimeStepRecords
 
 WARM = (
     "geometry.parameters={radius='10 mm', contact_width='0.4 mm', stroke='0.1 mm', stroke_elements=1, across=2,"

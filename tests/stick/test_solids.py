@@ -17,7 +17,8 @@ from fenwear.report.page import write_report
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 from fenwear.stick.strain import surface_gradient, surface_strain
 

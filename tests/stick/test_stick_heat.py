@@ -16,8 +16,8 @@ from fenwear.cli.partial_slip import final_of
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import balance_error
+from fenwear.stick.records import TimeStepRecords
 
 WARM = (
     "materials.steel={young='200 GPa', poisson=0.3, conductivity='45 W/(m K)', heat_capacity='460 J/(kg K)', "

@@ -10,7 +10,8 @@ import pytest
 from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.interface.placement import in_space
-from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.cycle import PartialSlipProblem
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 
 STEPS = 6

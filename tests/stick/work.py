@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 
 from fenwear import Tribosystem, march
-from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import balance_error
+from fenwear.stick.records import TimeStepRecords
 
 
 def half_cycles_whose_work_is_heat(warm: Tribosystem) -> Iterator[TimeStepRecords]:

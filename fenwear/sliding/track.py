@@ -8,6 +8,7 @@ off its own area w_i goes to the rings that this area crosses, by shares, and al
 
 A node of the counter-body takes the mean of the rings that its own area crosses; the track ends where the contact
 does. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
+What a pad feels beside the track's edge is the depth inside it: read through the step there, shape functions overshoot.
 
 Surfaces that turn beside each other without ever coming to the same place, as the two faces of a disc, are tracks
 of their own: parts of the strip's surface share one where they lie at the same height, measured square to s.
@@ -19,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
+from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
@@ -45,12 +47,22 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
     rate, count = field.rate(pair.strip.x, pair.strip.outward), len(pair.strip.weights)
     own = _tracks(pair.strip, field)
     opposite = np.array([pair.wear_projection[own == k].sum(axis=0) for k in range(own.max() + 1)]).argmax(axis=0)
-    found = csr_array((count, len(pair.weights)))
+    found, inward = csr_array((count, len(pair.weights))), np.arange(count)
     for k in range(own.max() + 1):
         on_strip, on_punch = own == k, opposite == k
         spread = _along_one if pair.punch.dim == 2 else _along_rings
-        found = csr_array(found + spread(pair, field, track * rate, on_strip, on_punch))
-    return replace(pair, wear_projection=found)
+        onto = spread(pair, field, track * rate, on_strip, on_punch)
+        inward[on_strip] = _inward(pair.strip, on_strip, np.diff(onto.indptr) > 0)
+        found = csr_array(found + onto)
+    read = csr_array((np.ones(count), (np.arange(count), inward)), shape=(count, count))
+    return replace(pair, wear_projection=found, wear_interpolation=csr_array(pair.wear_interpolation @ read))
+
+
+def _inward(strip: ContactSurface, on_strip: Mask, worn: Mask) -> Indices:
+    """Return which node's depth stands for each node of a track's surface: beyond its edges the nearest inside's."""
+    inside = np.flatnonzero(worn)
+    nearest = inside[cKDTree(strip.x[inside]).query(strip.x[on_strip])[1]]
+    return np.where(worn[on_strip], np.flatnonzero(on_strip), nearest)
 
 
 def _tracks(strip: ContactSurface, field: SlidingField) -> Indices:

@@ -117,6 +117,19 @@ def test_faces_of_a_disc_have_the_wear_of_their_own_pads(same_face: int) -> None
     assert errors[1] < errors[0] / 1.8, errors
 
 
+@pytest.mark.parametrize("across", [2, 3, 4])
+def test_edges_of_a_track_are_felt_as_deep_as_they_are(across: int) -> None:
+    """Where the rims of pads lie within elements of the disc, each node feels the depth of its ring, not the step's."""
+    sizes = {"across": across, "along": 2 * across, "around": 12 * across, "same_face": 1,
+             "pad_layers": 1, "disc_layers": 1, "hub_elements": 1, "front_angle": 60, "back_angle": 30}  # fmt: skip
+    told = ", ".join(f"{key}={value}" for key, value in sizes.items())
+    more = ("wear={punch={coefficient=1e-8}, strip={coefficient=1e-9}}", "punch.loads.1.force=[0, 0, -5000]")
+    pair = place_case(load_case("disc-brake-two-pads", [f"geometry.parameters={{{told}}}", *more])).pair
+    depth = pair.wear_projection @ np.ones(len(pair.weights))
+    felt = pair.opening(0 * pair.weights, depth)
+    assert np.abs(felt * 4 - 1).max() < 0.1 / across, felt
+
+
 def test_steady_state_is_the_optimum(assembled: Callable[..., Tribosystem]) -> None:
     """The punch's wear and the track's together are a rigid motion, in both."""
     system = assembled("pin-on-disc", *DISC)

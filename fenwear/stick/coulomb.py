@@ -36,8 +36,8 @@ from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import StickInterface, meshed
-from fenwear.stick.jump import FrettingCycle, first_cycle, jumped
-from fenwear.stick.records import TimeStepRecords
+from fenwear.stick.jump import first_cycle, jumped
+from fenwear.stick.records import FrettingCycle, TimeStepRecords
 from fenwear.stick.setup import heated, unheated_problem
 from fenwear.stick.state import PartialSlipState
 

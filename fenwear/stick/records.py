@@ -1,4 +1,4 @@
-"""Records of time steps of contact with stick: pressure, slip, friction's work, wear and energy of every node."""
+"""Records of time steps of contact with stick: pressure, slip, friction's work, wear and energy; cycles of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fenwear.arrays import Array, Mask
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.program import TimeStep
@@ -109,6 +110,41 @@ class TimeStepRecords:
     def joined(parts: Sequence[TimeStepRecords]) -> TimeStepRecords:
         """Return records one after the other."""
         return TimeStepRecords(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(TimeStepRecords)))
+
+
+@dataclass(frozen=True)
+class FrettingCycle:
+    """A cycle at the shape that so many cycles have worn.
+
+    Attributes:
+        number: Of cycles done before it.
+        worn: Depths at its shape.
+        half_cycles: Records of its half-cycles.
+        rate: Depths that a cycle wears there, of coated bodies as if coatings went on.
+        bases: The same as if coatings were worn through.
+        error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
+            of the contact temperatures over the warmest if that is more.
+        first_step: Number of the time step that its records begin with.
+        end: State at its end. What comes next follows from it.
+        length: Cycles of the next jump, as wished.
+        warm: Temperatures at the start of its records (dim,); None without heat.
+    """
+
+    number: int
+    worn: WornDepths
+    half_cycles: list[TimeStepRecords]
+    rate: WornDepths
+    bases: WornDepths
+    error: float
+    first_step: int
+    end: PartialSlipState
+    length: int = 1
+    warm: Array | None = None
+
+    @property
+    def records(self) -> TimeStepRecords:
+        """All time steps."""
+        return TimeStepRecords.joined(self.half_cycles)
 
 
 def record(

@@ -19,8 +19,9 @@ from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape
 from fenwear.stick.increment import _step
 from fenwear.stick.interface import OppositeBodies
-from fenwear.stick.jump import FrettingCycle, _Implicit, first_cycle, jumped
+from fenwear.stick.jump import _Implicit, first_cycle, jumped
 from fenwear.stick.products import CLOSE, GridStep
+from fenwear.stick.records import FrettingCycle
 from fenwear.stick.setup import partial_slip_problem
 from fenwear.stick.wear import BodyRate, LocalWear
 from fenwear_verify.half_space_stick import Elastic, on_grid

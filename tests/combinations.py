@@ -85,6 +85,15 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
         ),
     ),
+    "debris on the strip": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "wear={punch={coefficient='1e-7 1/MPa'}, strip={coefficient='1e-7 1/MPa'}}",
+            "motion.positions=3",
+            "contact.third_body={share=0.6, life='0.3 mm', carried_by='strip'}",
+        ),
+    ),
     "debris by laws": (
         "fretting-partial-slip",
         (
@@ -165,6 +174,7 @@ CLOSED: dict[tuple[str, str | None, str | None], str] = {
     ("in rings", "stick (Coulomb)", None): AROUND,
     ("wear by depth and distance", "gross sliding", "steady"): PASSES,
     ("both bodies worn", "gross sliding", "steady"): DEEPENS,
+    ("debris on the strip", "gross sliding", "steady"): DEEPENS,
     ("all that lies between", "stick (Coulomb)", "steady"): FLOWS,
 }
 

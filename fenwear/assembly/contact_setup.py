@@ -77,6 +77,7 @@ class ContactSetup:
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
+        passes: Whether the strip's material moves past the punch's; not where nodes stick and it stays opposite.
         passage: Where the punch is on a strip that conducts and passes under it to and fro; None where none does.
         remedies: What had to be solved in another way.
         clock: When its motion began.
@@ -91,6 +92,7 @@ class ContactSetup:
     loaded: tuple[Bodies, ...]
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
+    passes: bool = True
     passage: Passage | None = None
     remedies: Remedies = field(default_factory=Remedies)
     clock: Clock = Clock()
@@ -273,7 +275,7 @@ class ContactSetup:
         modulus = None if case is None else common_modulus(case, self.bodies.regions, self.pair)
         initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
         contact = self.friction.contact
-        carries = self.strip_carries and not self.sticks  # what sticks hardly moves: it lies where it is on either body
+        carries = self.strip_carries and self.passes  # else it lies where it is on either body
         found = layers_of(contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries)
         if found.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
@@ -656,7 +658,7 @@ def place(
 
 @told_by_name
 def place_at_rest(
-    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None
+    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None, *, passes: bool = False
 ) -> ContactSetup:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 
@@ -668,6 +670,7 @@ def place_at_rest(
         middle: The surfaces there.
         law: Of the contact, by its name.
         case: What they were made from.
+        passes: Whether the strip's material moves past the punch's.
     """
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
@@ -682,6 +685,7 @@ def place_at_rest(
         loaded=loaded,
         rigids=tuple(own),
         rigid=rigid,
+        passes=passes,
     )
 
 

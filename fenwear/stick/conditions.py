@@ -57,13 +57,12 @@ class StepConditions:
         if self.heat is not None and at.temperature is not None:
             punch, strip = self.heat.surfaces(at.temperature)
             warm = punch, strip
-        speed, debris = 0.0 if at.speed is None else at.speed, self.interface.layers.thickness(at.worn)
+        speed = 0.0 if at.speed is None else at.speed
         return {
             "temperatures": warm,
             "worn": at.worn,
             "slid": at.slid,
             "speed": speed,
-            "debris": debris,
             "cycle": self._shear(at),
         }
 
@@ -101,7 +100,7 @@ class StepConditions:
                 temperatures=warm[k],
                 worn=before.worn,
                 slid=slid[k],
-                debris=known["debris"],
+                debris=self.interface.layers.facing(pair, before.worn),
                 cycle=known["cycle"],
             )
             for k, pair in enumerate(self.pairs(slips, before))

@@ -212,7 +212,7 @@ def system_of(
     problem = unheated_problem(case, bodies, fresh=fresh, condensed=condensed)
     interface, fineness = meshed(problem.interface), None
     sliding = replace(interface.sliding, motion=_motion_at_rest(interface, case))
-    placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case)
+    placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case, passes=interface.moves)
     system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
     if ends is not None:
         problem = with_ends(problem, case, ends)

@@ -181,7 +181,10 @@ class PartialSlipProblem:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
         moved = self.interface.moved
         rest = worn if moved is None else worn - moved
-        between = self.interface.layers.opening(worn.between)
+        layers = self.interface.layers
+        between = layers.opening(worn.between)
+        if (lies := layers.on_strip(worn)) is not None:
+            between = between - position.pair.wear_interpolation @ lies
         return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
     def imposed(self, step: TimeStep, at: PartialSlipState) -> tuple[Position, Imposed]:
@@ -234,13 +237,16 @@ class PartialSlipProblem:
     def _stepped(self, at: PartialSlipState, step: TimeStep) -> PartialSlipState:
         if self.laws is None or not self.laws.changes():
             return self._advanced(at, step, self.friction)
-        laws, position = self.laws, self.interface.position(step.offset)
+        laws, layers, position = self.laws, self.interface.layers, self.interface.position(step.offset)
         pressure = at.contact.pressure if at.near is None else at.near[0]
         for _ in range(MOST_FRICTIONS):
-            states = self.interface.layers.known(position.pair, at.worn, at.held)
-            touching = at.contact.pressure > 0  # in the step before: nodes that open and close in turn end nowhere
             conditions = laws.conditions(
-                position.pair, pressure, **self.conditions.at_start(at), states=states, touching=touching
+                position.pair,
+                pressure,
+                **self.conditions.at_start(at),
+                states=layers.known(position.pair, at.worn, at.held),
+                debris=layers.facing(position.pair, at.worn),
+                touching=at.contact.pressure > 0,  # in the step before: nodes that open and close in turn end nowhere
             )
             after = self._advanced(at, step, laws.friction.values(conditions))
             change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure

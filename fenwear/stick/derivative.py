@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
 from fenwear.interface.placement import Placement
 from fenwear.layers import Evolution, Layers
 from fenwear.layers.between import DEBRIS
+from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
 from fenwear.layers.step import NUDGE
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.grid_jump import Answering
+from fenwear.stick.position import Position
 from fenwear.stick.records import FrettingCycle
 from fenwear.stick.state import PartialSlipState
 
@@ -28,64 +31,157 @@ def derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[An
     the time steps in one place with the same nodes closed, on grids with any closed, the part by their pressures; and
     what states do to themselves.
     """
-    records, steps, n = now.records, problem.program.steps, len(now.worn.punch)
-    depths, layers = n + len(now.worn.strip), problem.interface.layers
-    debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
-    remembered = Remembered.of(problem, now, depths)
-    of_punch, of_strip = problem.coatings.slopes(now.worn)
-    parts, measured = problem.coatings.layers_of_wear(now.worn)
-    stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
+    records, steps, interface = now.records, problem.program.steps, problem.interface
     groups = dict[tuple[float | Placement, bytes], list[int]]()
-    over = None if debris is None else problem.losses.debris_over(records, _begun(now))
-    fed, found = None if over is None else over.fed, list[Answering]()
-    answering = np.array([_answering(layers, pressure) for pressure in records.pressure])
+    answering = np.array([_answering(interface.layers, pressure) for pressure in records.pressure])
     for k in range(len(records)):
-        place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0
-        gridded = problem.interface.position(place).compliance.on_grid is not None
+        place = steps[(now.first_step + k) % len(steps)].offset if interface.moves else 0.0
+        gridded = interface.position(place).compliance.on_grid is not None
         groups.setdefault((place, b"" if gridded else answering[k].tobytes()), []).append(k)
-    for (place, _), members in groups.items():
-        position = problem.interface.position(place)
+    cycle = _Cycle.of(problem, now)
+    found = [cycle.answering(interface.position(place), own, answering) for (place, _), own in groups.items()]
+    return found, cycle.itself()
+
+
+@dataclass(frozen=True)
+class _Cycle:
+    """A cycle whose wear is differentiated.
+
+    Attributes:
+        problem: The bodies and what is done to them.
+        now: The cycle.
+        debris: What it does to debris; None without.
+        stored, ejected: Where thickness and ejected depth of debris begin among all unknowns; 0 without.
+        remembered: The states of laws; None without.
+        depths, total: Number of the depths, and of all unknowns.
+    """
+
+    problem: PartialSlipProblem
+    now: FrettingCycle
+    debris: DebrisCycle | None
+    stored: int
+    ejected: int
+    remembered: Remembered | None
+    depths: int
+    total: int
+
+    @classmethod
+    def of(cls, problem: PartialSlipProblem, now: FrettingCycle) -> _Cycle:
+        """Return it with what its debris and the states of laws do."""
+        worn, layers = now.worn, problem.interface.layers
+        depths = len(worn.punch) + len(worn.strip)
+        debris = None if layers.debris is None else problem.losses.debris_over(now.records, _begun(now))
+        stored, ejected = rows_of_debris(layers, len(worn.punch), len(worn.strip))
+        total = depths + worn.between.size + worn.carried.size
+        return cls(problem, now, debris, stored, ejected, Remembered.of(problem, now, depths), depths, total)
+
+    def answering(self, position: Position, members: list[int], answering: Mask) -> Answering:
+        """Return what pressures of some time steps add to the cycle's wear, and what opens the gap there.
+
+        Args:
+            position: The place of the strip in all of them.
+            members: Which of them.
+            answering: Nodes whose pressures answer in each step of the cycle (k, n).
+        """
+        layers, records = self.problem.interface.layers, self.now.records
         closed = np.flatnonzero(answering[members].any(axis=0))
-        slopes = _wear_slopes(problem, now, members, answering)
-        of_steps, (by_punch, by_strip) = slopes.sum(axis=2), measured
-        left = [(closed, of_steps[0, 0] * by_punch[0] + of_steps[0, 1] * by_punch[1])]
-        fills = [] if debris is None else [(stored, 1.0)]
-        if fed is not None:
-            there = np.array([parts[0], [position.pair.wear_interpolation @ part for part in parts[1]]])
-            lost = np.einsum("blkn,bln->kn", slopes, there)
-            kept = np.einsum("kn,kn->n", fed[members], lost)
-            left += [(stored + closed, kept), (ejected + closed, lost.sum(axis=0) - kept)]
-        if remembered is not None:
-            for rows, filled, rate in remembered.filling(members):
-                left.append((rows.start + closed, rate))
-                fills.append((rows.start, filled))
-        count, every = len(closed), np.arange(len(closed))
-        onto_strip = csr_array(position.pair.wear_projection)[:, closed]
+        slopes = _wear_slopes(self.problem, self.now, members, answering)
+        added, filled = self._worn(position, slopes, closed), list[tuple[int, float]]()
+        if layers.debris_here is not None:
+            filled.append((self.stored, 1.0))
+        if self.debris is not None:
+            added += self._laid(position, slopes, members, closed)
+        for rows, fills_gap, rate in [] if self.remembered is None else self.remembered.filling(members):
+            added.append(self._here(rows.start, rate, closed))
+            filled.append((rows.start, fills_gap))
+        share = float(records.duration[members].sum() / records.duration.sum())
+        pressure, closure = records.pressure[members].mean(axis=0), layers.closure_at(position.pair, self.now.worn)
+        left = csr_array(sum(added[1:], added[0]))
+        return Answering(position, closed, pressure, left, self._opening(position, closed, filled), share, closure)
+
+    def _here(self, first: int, rate: Array, closed: NDArray[np.int64]) -> csr_array:
+        """Return what pressures add at their own nodes (total, k), of unknowns of the contact from one on."""
+        entries = rate[closed], (first + closed, np.arange(len(closed)))
+        return csr_array(entries, shape=(self.total, len(closed)))
+
+    def _worn(self, position: Position, slopes: Array, closed: NDArray[np.int64]) -> list[csr_array]:
+        """Return what pressures wear off both bodies (total, k) each, as jumps count depths, by slopes of the steps."""
+        by_punch, by_strip = self.problem.coatings.layers_of_wear(self.now.worn)[1]
+        n, of_steps, count = len(self.now.worn.punch), slopes.sum(axis=2), len(closed)
+        onto = csr_array(position.pair.wear_projection)[:, closed]
         of_coating, of_base = (
-            diags_array(own) @ onto_strip @ diags_array(slope[closed])
+            diags_array(own) @ onto @ diags_array(slope[closed])
             for own, slope in zip(by_strip, of_steps[1], strict=True)
         )
-        put = csr_array(of_coating + of_base)
-        onto = [csr_array((rate[closed], (rows, every)), shape=(total, count)) for rows, rate in left]
-        onto.append(csr_array(vstack([csr_array((n, count)), put, csr_array((total - depths, count))])))
-        read = diags_array(of_strip)
-        seen = csr_array(position.pair.wear_interpolation)[closed] @ read
+        strip = vstack([csr_array((n, count)), of_coating + of_base, csr_array((self.total - self.depths, count))])
+        punch = of_steps[0, 0] * by_punch[0] + of_steps[0, 1] * by_punch[1]
+        return [self._here(0, punch, closed), csr_array(strip)]
+
+    def _laid(
+        self, position: Position, slopes: Array, members: list[int], closed: NDArray[np.int64]
+    ) -> list[csr_array]:
+        """Return what becomes debris of what pressures wear, and what is ejected of it (total, k) each."""
+        assert self.debris is not None
+        pair, (of_punch, of_strip) = position.pair, self.problem.coatings.layers_of_wear(self.now.worn)[0]
+        there = np.array([of_punch, [pair.wear_interpolation @ part for part in of_strip]])
+        lost, fed = np.einsum("blkn,bln->kn", slopes, there), self.debris.fed[members]
+        if self.problem.interface.layers.strip_carries:
+            entries = csr_array(pair.wear_projection)[:, closed].tocoo()
+            node, column = entries.coords
+            worn = lost[:, closed][:, column]
+            kept = entries.data * np.einsum("ke,ke->e", fed[:, node], worn)
+            pairs = ((self.stored, kept), (self.ejected, entries.data * worn.sum(axis=0) - kept))
+            shape = (self.total, len(closed))
+            return [csr_array((values, (first + node, column)), shape=shape) for first, values in pairs]
+        kept = np.einsum("kn,kn->n", fed, lost)
+        return [self._here(self.stored, kept, closed), self._here(self.ejected, lost.sum(axis=0) - kept, closed)]
+
+    def _opening(self, position: Position, closed: NDArray[np.int64], filled: Sequence[tuple[int, float]]) -> csr_array:
+        """Return the gap that all unknowns open at the closed nodes (k, total).
+
+        Args:
+            position: The place of the strip.
+            closed: The nodes.
+            filled: Where unknowns of the contact begin that fill the gap, and by how much.
+        """
+        of_punch, of_strip = self.problem.coatings.slopes(self.now.worn)
+        n, count, every = len(of_punch), len(closed), np.arange(len(closed))
+        reads = csr_array(position.pair.wear_interpolation)[closed]
         own = csr_array((of_punch[closed], (every, closed)), shape=(count, n))
-        by = csr_array(hstack([own, seen, csr_array((count, total - depths))]))
-        for first, filled in fills:
-            by = by - csr_array((np.full(count, filled), (every, first + closed)), shape=(count, total))
-        share = float(records.duration[members].sum() / records.duration.sum())
-        pressure = records.pressure[members].mean(axis=0)
-        closure = layers.closure_at(position.pair, now.worn)
-        found.append(
-            Answering(position, closed, pressure, csr_array(sum(onto[1:], onto[0])), csr_array(by), share, closure)
-        )
-    itself = csr_array((total, total))
-    if over is not None:
-        lost, at = over.loss, np.arange(n)
-        for row, rate in ((stored, -lost), (ejected, lost)):
-            itself = itself + csr_array((rate, (row + at, stored + at)), shape=(total, total))
-    return found, csr_array(itself if remembered is None else itself + remembered.slopes(total))
+        blocks = [own, reads @ diags_array(of_strip), csr_array((count, self.total - self.depths))]
+        found = csr_array(hstack(blocks))
+        for first, size in filled:
+            found = found - csr_array((np.full(count, size), (every, first + closed)), shape=(count, self.total))
+        if self.problem.interface.layers.strip_carries:
+            rest = self.total - self.stored - reads.shape[1]
+            found = found - hstack([csr_array((count, self.stored)), reads, csr_array((count, rest))])
+        return csr_array(found)
+
+    def itself(self) -> csr_array:
+        """Return what states do to themselves (total, total)."""
+        found = csr_array((self.total, self.total))
+        if self.debris is not None:
+            lost, at = self.debris.loss, np.arange(len(self.debris.loss))
+            for row, rate in ((self.stored, -lost), (self.ejected, lost)):
+                found = found + csr_array((rate, (row + at, self.stored + at)), shape=found.shape)
+        return csr_array(found if self.remembered is None else found + self.remembered.slopes(self.total))
+
+
+def rows_of_debris(layers: Layers, nodes: int, on_strip: int) -> tuple[int, int]:
+    """Return where thickness and ejected depth of debris begin among all unknowns of a jump; 0 without.
+
+    Args:
+        layers: What lies between.
+        nodes, on_strip: How many nodes contact and strip have.
+    """
+    if layers.debris is None:
+        return 0, 0
+    depths = nodes + on_strip
+    if layers.strip_carries:
+        first = depths + nodes * len(layers.rows)
+        return first, first + on_strip
+    first, second = (depths + nodes * layers.row(name) for name in DEBRIS)
+    return first, second
 
 
 def _wear_slopes(problem: PartialSlipProblem, now: FrettingCycle, members: list[int], answering: Mask) -> Array:
@@ -144,10 +240,12 @@ class Remembered:
         evolution = problem.losses.evolution(now.records, _begun(now))
         if memory is None or evolution is None:
             return None
-        begin = depths + now.worn.between.size - len(pair.weights) * len(memory.contact)
+        n, n_strip = len(pair.weights), len(pair.strip.weights)
+        between = depths + now.worn.between.size
+        firsts = [between - n * (len(memory.contact) - k) for k in range(len(memory.contact))]
+        firsts += [between + n_strip * (len(layers.carried_rows) + k) for k in range(len(memory.strip))]
         weights = [*(pair.weights for _ in memory.contact), *(pair.strip.weights for _ in memory.strip)]
-        ends = begin + np.cumsum([len(own) for own in weights])
-        rows = tuple(slice(int(end) - len(own), int(end)) for end, own in zip(ends, weights, strict=True))
+        rows = tuple(slice(first, first + len(own)) for first, own in zip(firsts, weights, strict=True))
         fills = tuple(state.fills for state in memory.states)
         return cls(rows, tuple(weights), evolution, layers.held(now.worn), fills)
 

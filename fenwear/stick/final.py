@@ -367,9 +367,21 @@ def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
     gap = problem.opening(problem.interface.middle, unworn)
     far = FAR * (np.abs(gap).max() + float(np.abs(problem.interface.middle.compliance.diagonal()).max()))
     opened = np.where(zone, 0.0, far)
-    carried = _crept(problem, WornDepths(opened, unworn.strip, crept=unworn.crept))
+    carried = _crept(problem, replace(_with_debris_left(problem, zone), punch=opened))
     records = TimeStepRecords.joined(problem.cycle(problem.beginning(carried))[1])
     return records.pressure, np.asarray(records.gap.min(axis=0) - opened)
+
+
+def _with_debris_left(problem: PartialSlipProblem, zone: Mask) -> WornDepths:
+    """Return the unworn bodies with what is left in the end of the debris there was: all where nothing slips."""
+    unworn, layers, pair = problem.unworn(), problem.interface.layers, problem.interface.middle.pair
+    if layers.debris is None:
+        return unworn
+    if layers.strip_carries:
+        carried = unworn.carried.copy()
+        carried[0] *= (pair.wear_projection @ zone) / np.maximum(pair.wear_projection @ np.ones(len(zone)), 1e-300)
+        return replace(unworn, carried=carried)
+    return layers.with_thickness(unworn, np.where(zone, layers.debris.initial, 0.0))
 
 
 def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array], size: float) -> FinalShape:

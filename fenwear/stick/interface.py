@@ -127,7 +127,8 @@ class StickInterface(OppositeBodies):
         if case is not None:
             modulus = common_modulus(case, bodies.regions, middle)
             initial = 0.0 if case.heat is None else case.heat.initial
-            self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial)
+            carries = moves and case.debris_on_strip  # else surfaces stay opposite each other: it lies where it is
+            self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial, strip_carries=carries)
         if bodies.followed is None:
             check_distance(middle)
         onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)

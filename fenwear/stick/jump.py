@@ -35,7 +35,7 @@ from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.derivative import Remembered, derivative, stiffness
+from fenwear.stick.derivative import Remembered, derivative, rows_of_debris, stiffness
 from fenwear.stick.grid_jump import TOO_LARGE, Answering, GridJump
 from fenwear.stick.heat import HeatHistory
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
@@ -188,16 +188,16 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
         simpson = cycles / 6 * (rate + 4 * rate_of(between_them) + rate_of(then))
         seen = solve(end - begin - simpson)
         missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
-    pair = problem.interface.middle.pair
-    felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
-    area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
+    felt = _felt(problem)
+    area = np.concatenate([felt, np.zeros(len(begin) - len(felt))])  # states of laws and creep have errors of their own
     scale = area @ np.abs(whole(worn) - whole(now.worn)) + REST * (area @ whole(worn))
     opened = np.concatenate([*problem.coatings.slopes(worn), np.ones(len(begin) - depths)])
     error = float(area @ (opened * np.abs(missing))) / max(float(scale), 1e-300)
     remembered = Remembered.of(problem, now, depths)
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
     of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
-    return replace(then, error=max(error, then.error, of_states, of_creep))
+    of_debris = _debris_error(problem, missing, begin, end)
+    return replace(then, error=max(error, then.error, of_states, of_creep, of_debris))
 
 
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
@@ -209,12 +209,37 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
     layers, pair = problem.interface.layers, problem.interface.middle.pair
     if layers.debris is None:
         return after
-    change, rows = after - before, [layers.row(name) for name in DEBRIS]
+    change = after - before
     worn = pair.weights @ change.punch + pair.strip.weights @ change.strip
-    missing = worn - float(pair.weights @ change.between[rows].sum(axis=0))
-    between = after.between.copy()
-    between[rows[1]] += missing / pair.weights.sum()
-    return replace(after, between=between)
+    if layers.strip_carries:
+        rows, weights, changed, state = [0, 1], pair.strip.weights, change.carried, after.carried.copy()
+    else:
+        rows, weights = [layers.row(name) for name in DEBRIS], pair.weights
+        changed, state = change.between, after.between.copy()
+    state[rows[1]] += (worn - float(weights @ changed[rows].sum(axis=0))) / weights.sum()
+    return replace(after, carried=state) if layers.strip_carries else replace(after, between=state)
+
+
+def _felt(problem: PartialSlipProblem) -> Array:
+    """Return the areas by which depths and what lies between are felt as gaps: what is ejected opens nothing."""
+    layers, pair = problem.interface.layers, problem.interface.middle.pair
+    here = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]
+    on_strip = [pair.strip.weights * (row == DEBRIS[0]) for row in layers.carried_rows]
+    return np.concatenate([pair.weights, pair.strip.weights, *here, *on_strip])
+
+
+def _debris_error(problem: PartialSlipProblem, missing: Array, begin: Array, end: Array) -> float:
+    """Return the error of the debris' thickness over its size; 0 without.
+
+    Beside what a jump wears, in many of its lives, it is next to nothing: an error of that says nothing of it.
+    """
+    layers, pair = problem.interface.layers, problem.interface.middle.pair
+    if layers.debris is None:
+        return 0.0
+    weights = pair.strip.weights if layers.strip_carries else pair.weights
+    stored, _ = rows_of_debris(layers, len(pair.weights), len(pair.strip.weights))
+    wrong, first, last = (float(weights @ np.abs(y[stored : stored + len(weights)])) for y in (missing, begin, end))
+    return wrong / max(first, last, 1e-300)
 
 
 def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end: Array) -> float:

@@ -135,31 +135,58 @@ class StepLosses:
         rate: bool,
     ) -> WornDepths:
         """Return what is worn with what steps do to what lies between; arguments as of `worn_in` and `_taken`."""
-        layers, now = self.layers, before.worn
-        changes = np.zeros_like(now.between)
+        layers, now, begin = self.layers, before.worn, replace(before, next_step=first)
+        changes, carried = np.zeros_like(now.between), np.zeros_like(now.carried)
         if layers.debris is not None:
-            over = self.debris_over(records, replace(before, next_step=first))
-            coatings, bases = (records.punch_depth, records.strip_depth), (records.punch_base, records.strip_base)
-            taken = self._taken(coatings, bases, parts)
-            rows = [layers.row(name) for name in DEBRIS]
-            thickness = now.between[rows[0]]
-            changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
+            over = self.debris_over(records, begin)
+            if layers.strip_carries:
+                state, thickness, rows = carried, now.carried[0], list(range(len(DEBRIS)))
+                taken = self._taken_onto_strip(records, parts, begin)
+            else:
+                rows = [layers.row(name) for name in DEBRIS]
+                state, thickness = changes, now.between[rows[0]]
+                coatings, bases = (records.punch_depth, records.strip_depth), (records.punch_base, records.strip_base)
+                taken = self._taken(coatings, bases, parts)
+            state[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
         if layers.hardness < np.inf and not rate:  # what flows does so as the shape wants it, however long it takes
             changes[layers.row(PLASTIC)] = records.flowed.sum(axis=0)
-        found = replace(worn, between=changes)
-        evolution = self.evolution(records, replace(before, next_step=first))
+        found = replace(worn, between=changes, carried=carried)
+        evolution = self.evolution(records, begin)
         if evolution is None:
             return found
         held = layers.held(now)
         return layers.with_held(found, evolution.rate(held)[0] if rate else evolution.after(held) - held)
 
+    def _taken_onto_strip(self, records: TimeStepRecords, parts: BothShares, before: PartialSlipState) -> Array:
+        """Return what both bodies lose in each step of a record that begins at a state, on the strip (k, n_strip).
+
+        Args:
+            records: Of the steps.
+            parts: What is worn of both, at the nodes of punch and strip.
+            before: Where they begin.
+        """
+        of_punch, of_strip = parts
+        found = []
+        for k, pair in enumerate(self.conditions.pairs(slips_of(records), before)):
+            above, below, onto = records.punch_depth[k], records.strip_depth[k], pair.wear_projection
+            if of_punch is not None:
+                above = of_punch.coating * above + of_punch.base * records.punch_base[k]
+            on_strip = onto @ below
+            if of_strip is not None:
+                on_strip = of_strip.coating * on_strip + of_strip.base * (onto @ records.strip_base[k])
+            found.append(onto @ above + on_strip)
+        return np.array(found)
+
     def debris_over(self, records: TimeStepRecords, before: PartialSlipState) -> DebrisCycle:
         """Return what the steps of a record that begin at a state do to debris."""
         debris = self.layers.debris
         assert debris is not None
-        if not self.layers.varies:
-            return debris.over(records.slip_magnitude)
-        return debris.over(records.slip_magnitude, self.conditions.of_steps(slips_of(records), before))
+        slips = slips_of(records)
+        conditions = self.conditions.of_steps(slips, before) if self.layers.varies else None
+        onto = None
+        if self.layers.strip_carries:
+            onto = [pair.wear_projection for pair in self.conditions.pairs(slips, before)]
+        return debris.over(slips.slid, conditions, onto)
 
     def evolution(self, records: TimeStepRecords, before: PartialSlipState) -> Evolution | None:
         """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""

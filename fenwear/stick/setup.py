@@ -64,11 +64,6 @@ def unheated_problem(
     """Return the same without heat; collective. Arguments as of `partial_slip_problem`."""
     sliding, surface = make_sliding(case), bodies.punch.surface
     _check_passing(case, surface)
-    if case.debris_on_strip and _moves(case, surface):
-        message = (
-            "expected 'punch' where a strip passes under a contact that sticks: what it carries is followed in place"
-        )
-        raise CaseError(InputError("contact.third_body.carried_by", message))
     interface = StickInterface(
         bodies,
         sliding,
@@ -90,7 +85,7 @@ def unheated_problem(
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     layers = interface.layers
     conditions = laws.conditions(
-        middle.pair, mean, states=layers.known(middle.pair, None), debris=layers.thickness(None)
+        middle.pair, mean, states=layers.known(middle.pair, None), debris=layers.facing(middle.pair, None)
     )
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
     changing = None if laws.constant and not layers.varies else laws
@@ -130,7 +125,7 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:
-    """Return whether the strip's surface passes under the punch: by default where it wears, and moves far enough."""
+    """Return whether the strip's surface passes under the punch: by default where it changes, and moves far enough."""
     motion = case.motion
     positions = getattr(motion, "positions", None)
     if isinstance(motion, Cycle) and positions is not None:
@@ -139,4 +134,4 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
         return False
     if positions is not None:
         return True
-    return case.wear.strip is not None and far_enough(case, surface)
+    return case.strip_changes and far_enough(case, surface)

@@ -36,11 +36,15 @@ def end(system: Tribosystem, how: str, tolerance: float = 1e-3) -> Block:
     return list(evolve(system, integration=how, tolerance=tolerance))[-1]
 
 
+STICKS = ("contact.law='coulomb'", *STICK, "motion.amplitude='3 um'")  # by several places of the strip
+
+
+@pytest.mark.parametrize("law", [(), STICKS])
 @pytest.mark.parametrize("how", ["explicit", "implicit", "jump"])
-def test_what_is_never_lost_is_as_if_less_were_worn(how: str) -> None:
+def test_what_is_never_lost_is_as_if_less_were_worn(how: str, law: tuple[str, ...]) -> None:
     """A strip of which 60 % of the worn stays on it for ever opens the gap as one that wears at 40 %, at any place."""
     runs = [
-        end(system_of("run.half_cycles=40", f"wear={{strip={{coefficient='{k} 1/MPa'}}}}", *lies), how)
+        end(system_of("run.half_cycles=40", f"wear={{strip={{coefficient='{k} 1/MPa'}}}}", *lies, *law), how)
         for k, lies in ((1e-6, [carried(0.6, "1e30 mm")]), (0.4e-6, []))
     ]
     stays, less = (run.end.worn.strip for run in runs)
@@ -61,6 +65,55 @@ def test_jumps_go_with_the_march() -> None:
         assert apart < 0.02 * of(explicit).max()
     with pytest.raises(ConvergenceError, match="debris goes to and fro with the strip"):
         steady(system_of("wear={punch={coefficient='1e-6 1/MPa'}}", carried(0.6, "3 mm")))
+
+
+def test_with_stick_by_hand_and_by_jumps() -> None:
+    """Each time step, node by node: t -> e t + share W (1 - e) / x on the strip's material; jumps go with the march."""
+    system = system_of("run.half_cycles=400", BOTH, carried(0.6, "0.3 mm"), *STICKS)
+    assert system.layers.strip_carries
+    problem, weights = system.law_state.problem, system.pair.strip.weights
+    lies = ejected = np.zeros(len(weights))
+    for block in evolve(system, integration="explicit"):
+        for steps in block.steps:
+            for k, step in enumerate(problem.program.steps[steps.first :][: len(steps.records)]):
+                onto = problem.interface.position(step.offset).pair.wear_projection
+                x = onto @ (steps.records.slip_magnitude[k] / 0.3)
+                worn = onto @ (steps.records.punch_depth[k] + steps.records.strip_depth[k])
+                lost = -np.expm1(-x)
+                stays = 0.6 * worn * np.divide(lost, x, out=np.ones_like(x), where=x > 0)
+                lies, ejected = lies - lost * lies + stays, ejected + lost * lies + worn - stays
+    marched = block
+    for own, by_hand in zip(marched.end.worn.carried, (lies, ejected), strict=True):
+        assert own == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * by_hand.max())
+    assert lies.max() > 0.5 * marched.end.worn.strip.max()
+    assert marched.steps[-1].stuck.any()
+    apart = []
+    for tolerance in (0.3, 0.03, 0.003):
+        jumps = end(system, "jump", tolerance)
+        assert values(jumps)["debris_balance_error"].max() < 1e-12
+        apart.append(
+            [
+                float(np.abs(of(jumps) - of(marched)).max() / of(marched).max())
+                for of in (
+                    lambda run: run.end.worn.punch,
+                    lambda run: run.end.worn.strip,
+                    lambda run: run.end.worn.carried[0],
+                    lambda run: run.end.worn.carried[1],
+                )
+            ]
+        )
+    assert (np.diff(apart, axis=0) < 0).all()
+    assert max(apart[-1]) < 4e-3  # half a cycle of 200: the march wears at its shape before
+
+
+def test_the_end_of_stick_keeps_what_lay_there() -> None:
+    """Debris that was there at first is lost where it slips, and stays where it sticks: so much less is worn beside."""
+    thick, depths = 1e-5, []
+    for initial in (0.0, thick):
+        lies = f"contact.third_body={{share=0.6, life='0.3 mm', initial={initial}}}"
+        found = steady(system_of(lies, *STICKS, "motion.positions=1"))
+        depths.append(found.depth.max())
+    assert depths[1] == pytest.approx(depths[0] - thick, rel=1e-5)  # of a zone that the first cycles move by less
 
 
 def test_along_a_closed_track_against_the_closed_form() -> None:

@@ -1,4 +1,4 @@
-"""The closed track of a counter-body: what is worn off it spreads along the whole of it.
+"""The track of a counter-body: its sides; and where it is closed, what is worn off it spreads along the whole of it.
 
 The track is made of rings: circles about the axis of a rotation, or lines along a translation, told apart by a
 coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. What a node wears
@@ -7,8 +7,7 @@ off its own area w_i goes to the rings that this area crosses, by shares, and al
     depth of ring k = sum over i of (share of node i's area in ring k) w_i d_i / area of ring k.
 
 A node of the counter-body takes the mean of the rings that its own area crosses; the track ends where the contact
-does. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
-What a pad feels beside the track's edge is the depth inside it: read through the step there, shape functions overshoot.
+does, see `Sides`. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
 
 Surfaces that turn beside each other without ever coming to the same place, as the two faces of a disc, are tracks
 of their own: parts of the strip's surface share one where they lie at the same height, measured square to s.
@@ -16,6 +15,7 @@ of their own: parts of the strip's surface share one where they lie at the same 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,68 @@ SAME = 1e-6  # of a surface's extent: heights that are one
 LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s is the radius
 
 
+@dataclass(frozen=True)
+class Sides:
+    """The sides of a track, where a solid's strip is worn on one side of a line along the sliding and not on the other.
+
+    They run through the areas of nodes: such an area is worn on the part of it that lies on the track, and so deep as
+    beside it; spread over the whole of it, depths at the sides would be the half, and what a punch feels there, too.
+    What the punch reads beyond the sides is the depth inside: shape functions overshoot at a step.
+
+    Attributes:
+        share: Of each strip node's area that lies on the track (n_strip,), 1 where nothing of it does.
+        inward: Node whose depth stands for each one's (n_strip,): its own, but beyond the sides the nearest inside's.
+    """
+
+    share: Array
+    inward: Indices
+
+    @classmethod
+    def of(cls, pair: ContactPair, field: SlidingField) -> Sides:
+        """Find them.
+
+        Args:
+            pair: The surfaces opposite each other.
+            field: The motion of the strip, the same at all times but for its amount.
+        """
+        count = len(pair.strip.weights)
+        on_track, inward = np.ones(count), np.arange(count)
+        if pair.strip.dim == 2 or pair.strip.grid is not None or ZERO not in (field.shift, field.turn):
+            return cls(on_track, inward)
+        across = _across(field, pair.strip)
+        punch, strip = (_Crossing.of(surface, across) for surface in (pair.punch, pair.strip))
+        for on_strip, on_punch in _facing(pair, field):
+            edges = punch.of_nodes(on_punch).reach()
+            share = np.asarray(strip.of_nodes(on_strip).shares(edges)[:, ::2].sum(axis=1))
+            inside = np.flatnonzero(share > THIN)
+            beyond = np.flatnonzero(on_strip & (share <= THIN))
+            if len(inside) and len(beyond):
+                inward[beyond] = inside[cKDTree(pair.strip.x[inside]).query(pair.strip.x[beyond])[1]]
+            on_track[inside] = np.minimum(share[inside], 1.0)
+        return cls(on_track, inward)
+
+    @property
+    def none(self) -> bool:
+        """Whether the track is as wide as the surface, with no side on it."""
+        return bool((self.share == 1).all() and (self.inward == np.arange(len(self.inward))).all())
+
+    def worn(self, pair: ContactPair) -> ContactPair:
+        """Return a pair whose strip's nodes stand for what of their areas lies on the track, by which they wear."""
+        if self.none:
+            return pair
+        strip = replace(pair.strip, weights=self.share * pair.strip.weights)
+        projection = csr_array(diags_array(1 / self.share) @ pair.wear_projection)
+        return replace(pair, strip=strip, wear_projection=projection)
+
+    def felt(self, pair: ContactPair) -> ContactPair:
+        """Return a pair whose punch feels of the strip's material what lies on the track."""
+        if self.none:
+            return pair
+        count = len(self.inward)
+        read = csr_array((np.ones(count), (np.arange(count), self.inward)), shape=(count, count))
+        return replace(pair, wear_interpolation=csr_array(pair.wear_interpolation @ read))
+
+
 def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> ContactPair:
     """Return the pair whose wear_projection spreads what is worn off the strip along a closed track.
 
@@ -44,25 +106,20 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
         field: The motion of the strip for a unit of the stroke.
         track: What closes the track: its length, mm, or 2 pi rad.
     """
-    rate, count = field.rate(pair.strip.x, pair.strip.outward), len(pair.strip.weights)
+    length, found = track * field.rate(pair.strip.x, pair.strip.outward), csr_array(pair.wear_projection.shape)
+    spread = _along_one if pair.punch.dim == 2 else _along_rings
+    for on_strip, on_punch in _facing(pair, field):
+        found = csr_array(found + spread(pair, field, length, on_strip, on_punch))
+    return replace(pair, wear_projection=found)
+
+
+def _facing(pair: ContactPair, field: SlidingField) -> Iterator[tuple[Mask, Mask]]:
+    """Return the nodes of the strip on each of its tracks, and the punch's nodes opposite."""
     own = _tracks(pair.strip, field)
-    opposite = np.array([pair.wear_projection[own == k].sum(axis=0) for k in range(own.max() + 1)]).argmax(axis=0)
-    found, inward = csr_array((count, len(pair.weights))), np.arange(count)
-    for k in range(own.max() + 1):
-        on_strip, on_punch = own == k, opposite == k
-        spread = _along_one if pair.punch.dim == 2 else _along_rings
-        onto = spread(pair, field, track * rate, on_strip, on_punch)
-        inward[on_strip] = _inward(pair.strip, on_strip, np.diff(onto.indptr) > 0)
-        found = csr_array(found + onto)
-    read = csr_array((np.ones(count), (np.arange(count), inward)), shape=(count, count))
-    return replace(pair, wear_projection=found, wear_interpolation=csr_array(pair.wear_interpolation @ read))
-
-
-def _inward(strip: ContactSurface, on_strip: Mask, worn: Mask) -> Indices:
-    """Return which node's depth stands for each node of a track's surface: beyond its edges the nearest inside's."""
-    inside = np.flatnonzero(worn)
-    nearest = inside[cKDTree(strip.x[inside]).query(strip.x[on_strip])[1]]
-    return np.where(worn[on_strip], np.flatnonzero(on_strip), nearest)
+    tracks = range(own.max() + 1)
+    opposite = np.array([pair.wear_projection[own == k].sum(axis=0) for k in tracks]).argmax(axis=0)
+    for k in tracks:
+        yield own == k, opposite == k
 
 
 def _tracks(strip: ContactSurface, field: SlidingField) -> Indices:
@@ -106,10 +163,7 @@ def _along_rings(pair: ContactPair, field: SlidingField, length: Array, on_strip
     along = np.interp(edges, s[order], broad[order])
     areas = np.diff(edges) * (along[1:] + along[:-1]) / 2
     depths = diags_array(1 / areas) @ punch.shares(edges).T @ diags_array(pair.weights)
-    shares = strip.shares(edges)
-    inside = shares.sum(axis=1)  # of the areas on the track's edge a part alone is worn, as deep as beside it
-    means = diags_array(1 / np.where(inside > 0, inside, 1.0)) @ shares
-    return csr_array(means @ depths)
+    return csr_array(strip.shares(edges) @ depths)
 
 
 @dataclass(frozen=True)
@@ -200,6 +254,14 @@ class _Crossing:
     def high(self) -> Array:
         """Largest s of each triangle (m,), mm."""
         return np.asarray(self.s[:, 2])
+
+    def reach(self) -> Array:
+        """Return where the areas begin and end (2 k,), ascending, mm: k stretches that do not meet."""
+        order = np.argsort(self.low)
+        low, high = self.low[order], np.maximum.accumulate(self.high[order])
+        apart = np.flatnonzero(low[1:] > high[:-1])
+        begin, end = np.append(0, apart + 1), np.append(apart, len(low) - 1)
+        return np.asarray(np.stack([low[begin], high[end]], axis=1).ravel())
 
     @property
     def span(self) -> float:

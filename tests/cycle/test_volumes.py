@@ -78,11 +78,8 @@ def test_what_is_worn_is_k_p_s_everywhere(assembled: Callable[..., Tribosystem],
         np.testing.assert_allclose(worn.punch, PUNCH * totals.energy / FRICTION, rtol=0, atol=1e-12 * worn.punch.max())
         by_depth = [thick * float(pair.weights @ worn.punch), thick * float(pair.strip.weights @ worn.strip)]
         metered = [float(totals.of("volume_punch")), float(totals.of("volume_strip"))]
-        if name == "disc-brake-two-pads":
-            by_depth[1] = metered[
-                1
-            ]  # the edges of its tracks run through the areas of nodes: see tests/sliding/test_track.py
-        np.testing.assert_allclose(by_depth, metered, rtol=1e-6)
+        rings = name == "disc-brake-two-pads"  # whose areas are those of circles, the mesh's those of chords
+        np.testing.assert_allclose(by_depth, metered, rtol=2e-4 if rings else 1e-6)
         assert metered[1] == pytest.approx(STRIP / PUNCH * metered[0], rel=1e-12)
         assert metered[0] == pytest.approx(PUNCH * float(totals.of("work")) / FRICTION, rel=1e-12)
         assert worn.strip.min() >= 0

@@ -117,6 +117,26 @@ def test_faces_of_a_disc_have_the_wear_of_their_own_pads(same_face: int) -> None
     assert errors[1] < errors[0] / 1.8, errors
 
 
+@pytest.mark.parametrize("cells", [{}, {"strip_tetrahedra": 1, "strip_across_x": 3, "strip_across_y": 3}])
+@pytest.mark.parametrize("along", [0, 1])
+def test_sides_of_a_track_to_and_fro(along: int, cells: dict[str, float]) -> None:
+    """A block worn evenly cuts a track with upright sides: across it all is as deep, and felt so; volumes are kept."""
+    direction = [float(k == along) for k in range(3)]
+    motion = {"kind": "reciprocating", "amplitude": 0.3, "angular_frequency": 1.0, "along": direction, "positions": 12}
+    placed = blocks(motion, **cells)
+    worn = placed.phases_wear.worn(np.ones((len(placed.pairs), len(placed.pair.weights))))
+    beside, x, xs = 1 - along, placed.pair.punch.x, placed.pair.strip.x
+    for pair in placed.pairs:
+        felt = pair.opening(0 * pair.weights, worn.strip)
+        rows = np.unique(x[:, along].round(6))
+        for k in rows[1:-1] if cells else rows:  # at the ends depths change within an element, as its diagonal goes
+            row = felt[np.abs(x[:, along] - k) < 1e-6]
+            np.testing.assert_allclose(row, row.mean(), rtol=0.05 if cells else 1e-6)
+    assert worn.strip[np.abs(xs[:, beside]) > 0.75].max() == 0
+    slid = placed.sliding.motion.sliding().sum()
+    assert placed.pair.strip.weights @ worn.strip == pytest.approx(2e-8 * slid, rel=1e-12)
+
+
 @pytest.mark.parametrize("across", [2, 3, 4])
 def test_edges_of_a_track_are_felt_as_deep_as_they_are(across: int) -> None:
     """Where the rims of pads lie within elements of the disc, each node feels the depth of its ring, not the step's."""

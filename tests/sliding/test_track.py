@@ -128,10 +128,9 @@ def test_sides_of_a_track_to_and_fro(along: int, cells: dict[str, float]) -> Non
     beside, x, xs = 1 - along, placed.pair.punch.x, placed.pair.strip.x
     for pair in placed.pairs:
         felt = pair.opening(0 * pair.weights, worn.strip)
-        rows = np.unique(x[:, along].round(6))
-        for k in rows[1:-1] if cells else rows:  # at the ends depths change within an element, as its diagonal goes
-            row = felt[np.abs(x[:, along] - k) < 1e-6]
-            np.testing.assert_allclose(row, row.mean(), rtol=0.05 if cells else 1e-6)
+        for k in np.unique(x[:, along].round(6)):
+            row = felt[np.abs(x[:, along] - k) < 1e-6]  # triangles divide the areas of their nodes unevenly
+            np.testing.assert_allclose(row, row.mean(), rtol=0, atol=(0.15 if cells else 1e-6) * felt.max())
     assert worn.strip[np.abs(xs[:, beside]) > 0.75].max() == 0
     slid = placed.sliding.motion.sliding().sum()
     assert placed.pair.strip.weights @ worn.strip == pytest.approx(2e-8 * slid, rel=1e-12)

@@ -91,7 +91,7 @@ class Dependence(Part):
         Raises:
             ValueError: its own unit is of another kind.
         """
-        return convert(f"1 {self.unit}", unit) if self.unit else 1.0
+        return _in_unit(self.unit, unit) if self.unit else 1.0
 
     def values(
         self,
@@ -128,6 +128,16 @@ class Dependence(Part):
             wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
             raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values if factor == 1 else values * factor
+
+
+@lru_cache(maxsize=100)
+def _in_unit(unit: str, other: str) -> float:
+    """Return a unit in another one.
+
+    Raises:
+        ValueError: it is of another kind.
+    """
+    return convert(f"1 {unit}", other)
 
 
 @lru_cache(maxsize=100)

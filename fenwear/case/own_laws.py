@@ -169,8 +169,6 @@ def check_law(name: str) -> None:
 def _tell_slow(name: str, seconds: float, nodes: int) -> None:
     """Warn once of a law whose fastest of its first calls takes long: it is called some ten times in a half-cycle."""
     calls = _CALLS.setdefault(name, [])
-    if len(calls) >= FIRST:
-        return
     calls.append(seconds)
     if len(calls) == FIRST and min(calls) > SLOW:
         warnings.warn(
@@ -188,6 +186,8 @@ def evaluate_law(name: str, now: Now, shape: tuple[int, ...]) -> Array:
     """
     check_law(name)
     law = _LAWS[name]
+    if len(_CALLS.get(name, ())) >= FIRST:
+        return _called(f"the law {name!r}", law.function, law.of, now, shape)
     begin = time.thread_time()
     found = _called(f"the law {name!r}", law.function, law.of, now, shape)
     _tell_slow(name, time.thread_time() - begin, shape[0] if shape else 1)

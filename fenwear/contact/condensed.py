@@ -47,7 +47,7 @@ from fenwear.remedies import (
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
-WHOLE = 2000  # the same where friction follows the pressure, whose Newton's method asks for all of them at once
+WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: what then changes asks for all at once
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 NUDGE = 1e-6  # of the largest pressure, for differences
@@ -174,7 +174,7 @@ class CondensedContact:
         if self._shared:
             self._team.serve(self)
         gridded = interface.pair.punch.grid is not None and interface.cost is not None
-        few = WHOLE if following else MANY
+        few = WHOLE if following or most < np.inf else MANY
         self._many = n > few or (n > SOME and m * n > TOGETHER) or self._shared or gridded
         self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))

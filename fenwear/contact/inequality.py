@@ -39,7 +39,8 @@ AT_BOUND = 1e-12  # of unknowns, which are scaled to 1: how near to their bound 
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 SETS = 30  # that are gone through before SNES starts
 AGAIN = 3  # times that a set may come again, where its derivative is another one
-CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor still serves
+CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor serves anyway
+SLOWEST = 0.8  # fall by which it may, where few steps are left: beyond it Newton's own are surer
 SERVES = 3  # such steps at least, after which the next solve has a factor of its own
 STEP_COSTS = 50  # unknowns by which a factor costs a step more, and serves for one more
 MOST_SHARE = 0.5  # of a step along the last one, that is corrected
@@ -295,7 +296,7 @@ class Inequality:
                 if small and same and (wanted if self.iterations else self._wanted(x, f, kept)) == key:
                     self.residual, self._worn_out = f, self.iterations > self._serves
                     return x
-                if size > FALLS * before:
+                if not self._falls(size, before):
                     steps, kept = [], self._factor(self._jacobian(x), key)
                 before = size
                 steps.append(_broyden(-kept.solve(rest), steps))
@@ -303,6 +304,12 @@ class Inequality:
         except np.linalg.LinAlgError:
             pass
         return None
+
+    def _falls(self, size: float, before: float) -> bool:
+        """Return whether the residual falls so fast that what is left of it costs less than a new factor."""
+        if size <= FALLS * before:
+            return True
+        return size < SLOWEST * before and math.log(size / TOLERANCE) < self._serves * math.log(before / size)
 
     def _wanted(self, x: Array, f: Array, kept: _Kept) -> bytes:
         """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""

@@ -368,7 +368,7 @@ class Recorder:
             if all(ratio is ratios[0] for ratio in ratios):
                 carried = np.einsum("kn,mn->km", pressure, equilibrium.equilibrium(ratios[0]))
             else:
-                carried = np.array([equilibrium.of(own, ratio) for own, ratio in zip(pressure, ratios, strict=True)])
+                carried = equilibrium.of(pressure, np.array(ratios))
             balance = carried + loads[:, None] * equilibrium.resultant
             error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)

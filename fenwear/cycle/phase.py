@@ -28,7 +28,8 @@ COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
-ONWARDS = ((1,), (2, -1), (3, -3, 1), (4, -6, 4, -1))  # shares of the last cycles in the next, by polynomials
+# Shares of the last cycles in the next, by polynomials of rising degree.
+ONWARDS = ((1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1), (6, -15, 20, -15, 6, -1))
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 
 
@@ -190,12 +191,14 @@ class PhaseStep:
         known = self._known
         if before is None or len(known) < 2 or before is not known[0]:
             return before
-        hardness, shares = self.system.layers.hardness, np.array(ONWARDS[len(known) - 1], dtype=float)
-        further = (shares @ np.concatenate([one.pressure for one in known]))[None]
+        hardness, (first, *shares) = self.system.layers.hardness, ONWARDS[len(known) - 1]
+        further, rigid = first * before.pressure, first * before.rigid
+        for share, one in zip(shares, known[1:], strict=True):
+            further += share * one.pressure
+            rigid += share * one.rigid
         kept = (before.pressure > 0) & (further > 0)
         if hardness < np.inf:
             kept &= (before.pressure < hardness) & (further < hardness)
-        rigid = (shares @ np.concatenate([one.rigid for one in known]))[None]
         return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(

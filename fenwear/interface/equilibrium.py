@@ -53,12 +53,11 @@ class RigidEquilibrium:
         traction = self.pair.normal + friction_ratio
         return np.einsum("id,idm->mi", traction, self.motion) * self.pair.weights
 
-    def of(self, pressure: Array, friction_ratio: Array | float) -> Array:
-        """Return the load on each mode (modes,) that pressures (n,) balance; arguments as of `equilibrium`."""
+    def of(self, pressure: Array, friction_ratio: Array) -> Array:
+        """Return the load on each mode (k, modes) that pressures (k, n) balance, with friction ratios (k, n, d)."""
         traction = self.pair.normal + friction_ratio
-        traction *= (pressure * self.pair.weights)[:, None]
-        found: Array = traction.ravel() @ self.motion.reshape(traction.size, -1)
-        return found
+        traction *= (pressure * self.pair.weights)[..., None]
+        return np.einsum("kid,idm->km", traction, self.motion)
 
     @property
     def mean_pressure(self) -> float:

@@ -26,6 +26,7 @@ from fenwear.arrays import Array
 
 LEAST = 1e-12  # of the largest pressure: where a power below 1 has a slope that is not infinite
 FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F is inverted; how often it is tabulated
+STEPS = 4  # of Newton's method that find the distances at even places
 
 
 class Closure(Protocol):
@@ -88,13 +89,18 @@ class RoughClosure:
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        touching = np.maximum(pressure, 0.0) / self.stiffness + _inverse().first
-        return np.asarray(self.height * (FIRST - _inverse().distance(np.log(touching))))
+        inverse = _inverse()
+        return np.asarray(self.height * (FIRST - inverse.distance(np.log(self._integral(pressure, inverse)))))
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
-        touching = np.maximum(pressure, 0.0) / self.stiffness + _inverse().first
-        return np.asarray(-self.height * _inverse().slope(np.log(touching)) / (touching * self.stiffness))
+        inverse = _inverse()
+        integral = self._integral(pressure, inverse)
+        return np.asarray(-self.height * inverse.slope(np.log(integral)) / (integral * self.stiffness))
+
+    def _integral(self, pressure: Array, inverse: _Inverse) -> Array:
+        """Return F (...)."""
+        return np.asarray(np.maximum(pressure, 0.0) / self.stiffness + inverse.first)
 
 
 @dataclass(frozen=True)
@@ -135,16 +141,43 @@ def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
 
 
 class _Inverse:
-    """The distance h as a function of ln F(h): Hermite's cubics between exact values and slopes."""
+    """The distance h as a function of ln F(h): Hermite's cubics between values and slopes at even places, of no search.
+
+    A third of a half-cycle would go into places that are searched for.
+    """
 
     def __init__(self) -> None:
         from scipy.interpolate import CubicHermiteSpline
 
         h = np.linspace(FIRST, LAST, POINTS)
+        known = np.log(asperity_integral(h))
+        places = np.linspace(known[0], known[-1], POINTS)
+        h = np.interp(places, known, h)
+        for _ in range(STEPS):
+            values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
+            h = h - (np.log(values) - places) * values / slopes
+        h[0] = FIRST
         values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
         self.first = float(values[0])
-        self.distance = CubicHermiteSpline(np.log(values), h, values / slopes)
-        self.slope = self.distance.derivative()
+        self._begin, self._width = places[0], places[1] - places[0]
+        powers = self._width ** np.arange(3.0, -1.0, -1.0)[:, None]
+        self._cubics = CubicHermiteSpline(places, h, values / slopes).c * powers
+
+    def distance(self, logarithm: Array) -> Array:
+        """Return h (...)."""
+        (a, b, c, d), t = self._cubic(logarithm)
+        return np.asarray(((a * t + b) * t + c) * t + d)
+
+    def slope(self, logarithm: Array) -> Array:
+        """Return its derivative (...)."""
+        (a, b, c, _), t = self._cubic(logarithm)
+        return np.asarray(((3 * a * t + 2 * b) * t + c) / self._width)
+
+    def _cubic(self, logarithm: Array) -> tuple[Array, Array]:
+        """Return the coefficients of the cubics at places (4, ...), and where these are in them (...)."""
+        t = (logarithm - self._begin) / self._width
+        number = np.fmin(np.fmax(t, 0.0), POINTS - 2.0).astype(np.intp)  # the first for what is no number
+        return self._cubics[:, number], t - number
 
 
 @lru_cache(maxsize=1)

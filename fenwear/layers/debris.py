@@ -97,7 +97,8 @@ class Debris:
         elif conditions is None:
             raise ValueError("expected the conditions of the phases where what is lost depends on them")
         else:
-            x = slid * np.array([self.lost(one) for one in conditions])
+            lost = [self.lost(one) for one in conditions]
+            x = slid * (lost[0] if len(lost) == 1 else np.array(lost))
         if onto is not None:
             x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept
@@ -130,6 +131,8 @@ class DebrisCycle:
             worn: Depth worn off both bodies in each phase (m, n), mm.
         """
         lost = self._lost * thickness
+        if len(worn) == 1:
+            return self._stays[0] * worn[0] - lost, self._leaves[0] * worn[0] + lost
         return (self._stays * worn).sum(axis=0) - lost, (self._leaves * worn).sum(axis=0) + lost
 
     def rate(self, thickness: Array, worn: Array, cycles: float) -> tuple[Array, Array]:

@@ -194,9 +194,10 @@ def _phi(z: Array) -> Array:
     """Return (e^z - 1) / z of matrices (n, q, q)."""
     n, q, _ = z.shape
     if q <= 1:
+        if z.all():
+            return np.asarray(np.expm1(z) / z)
         still = z == 0
-        safe = z + still
-        return np.expm1(safe) / safe if not still.any() else np.where(still, 1.0, np.expm1(safe) / safe)
+        return np.where(still, 1.0, np.expm1(z + still) / (z + still))
     block = np.zeros((n, 2 * q, 2 * q))
     block[:, :q, :q], block[:, :q, q:] = z, np.eye(q)
     return np.asarray(scipy.linalg.expm(block)[:, :q, q:])
@@ -414,10 +415,14 @@ class Evolution:
                 if 2 * (part + 1) == parts:
                     middle = now
             missing, end = now - end, now
-            largest = np.abs([missing, end, end - start]).max(axis=2, initial=0)
-            if (largest[0] <= AGREE * (largest[1] + largest[2])).all():
+            if (_most(missing) <= AGREE * (_most(end) + _most(end - start))).all():
                 return middle, end + missing / 3, z
         raise ConvergenceError(f"{self._told()} change too fast within a half-cycle: expected rates that are smoother")
+
+
+def _most(values: Array) -> Array:
+    """Return the largest of each row without its sign (Q,)."""
+    return np.asarray(np.maximum.reduce(np.abs(values), axis=1, initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -432,10 +437,18 @@ class _Rates:
     states: Sequence[tuple[str, State]]
     known: Callable[[Array], Sequence[Mapping[str, Array]]]
 
+    @cached_property
+    def _asked(self) -> list[frozenset[str]]:
+        """What each rate may ask for."""
+        return [frozenset((*one.of, name)) for name, one in self.states]
+
     def __call__(self, values: Array) -> Array:
         """Return the rates (Q, n) at states (Q, n)."""
-        pairs = zip(self.states, self.known(values), strict=True)
-        rows = [evaluate_of_state(name, one.rate, {*one.of, name}, now, values.shape[1:]) for (name, one), now in pairs]
+        known, shape = self.known(values), values.shape[1:]
+        rows = [
+            evaluate_of_state(name, one.rate, asked, now, shape)
+            for (name, one), asked, now in zip(self.states, self._asked, known, strict=True)
+        ]
         return rows[0][None] if len(rows) == 1 else np.array(rows).reshape(values.shape)
 
     def slope(self, values: Array, rate: Array, tau: float) -> Array:
@@ -445,10 +458,10 @@ class _Rates:
         for j, (other, state) in enumerate(self.states):
             asked = [i for i, (name, one) in enumerate(self.states) if _feels(name, one, other)]
             size = NUDGE * (np.abs(values[j]) + tau * np.abs(rate[j]))
-            largest = size.max(initial=0.0)
-            if not asked or largest == 0:
+            if not asked or not size.any():
                 continue
-            size = np.where(size > 0, size, largest)
+            if not size.all():
+                size = np.where(size > 0, size, size.max())
             if state.most < np.inf:
                 size = np.where(values[j] + size > state.most, -size, size)
             moved = values.copy()

@@ -6,16 +6,18 @@ source is a contribution of its own, and their sum bounds what they come to toge
 
     mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements; of a
                  contact grid, with every second or fourth of its nodes;
-    wear steps   of marched half-cycles or of jumps, from the same run in longer ones, or by what they wear;
+    wear steps   of marched half-cycles by what they wear; of jumps by their own errors, which go on from jump to jump
+                 (`fenwear.cycle.jump`), in the run that the mesh is compared with;
     positions    of the strip in a half-cycle, from the same run with half as many;
     following    of meshes that follow the wear, from the same run in which they follow half as often;
     heat steps   what halving them changes of the contact's temperatures;
     heat basis   how far temperatures on it are from those of the whole mesh;
     solver       what is left of equilibrium, and rounding.
 
-The runs that are compared are made on the coarser elements, so that all of them together take less than the set-up of
-solids does; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one and
-r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
+The runs that are compared are made on the coarser elements, one for mesh and jumps together, so that all of them take
+less than the set-up of solids does; only that against the run itself is of its own size. Where jumps are dear they are
+longer there: then its numbers are those of jumps as long as the run's own, to first order. With phi_h of the run, phi_H
+of the coarser one and r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
 
     u = 1.25 d / (r^q - 1),    d = |phi_h - phi_H| or, if that is more, what their fields differ by (`Value.apart`).
 

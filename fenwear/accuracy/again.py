@@ -18,8 +18,10 @@ from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError
 
-LONGEST = 400  # phases that are marched again one by one; longer runs go by jumps
-TOLERANCE = 1e-3  # of these jumps
+LONGEST = 100  # phases that are marched again one by one; longer runs go by jumps
+LARGER, LESS = 8.0, 0.25  # by which the tolerance of jumps is raised where they are dear, and their error then falls
+DEAR = 40  # phases in all jumps of a run that are
+TOLERANCE = 1e-2  # of these jumps, whose errors are known
 FEWEST = 9  # nodes of a contact grid that is coarsened
 LEAST = 8  # nodes across a contact whose grid grows
 PLENTY = 12  # nodes across a contact on a grid that is a quarter as fine
@@ -83,7 +85,8 @@ class Again:
             yield from march(system, span.until, implicit=run.integration == "implicit", start=start, **shared)
             return
         state, left = start, False
-        for block in jump(with_reduced_heat(system), span.until, tolerance=run.jump_tolerance, start=start, **shared):
+        reduced, tolerance = with_reduced_heat(system), run.jump_tolerance
+        for block in jump(reduced, span.until, tolerance=tolerance, start=start, finer=True, **shared):
             yield block
             state, left = block.end, leave(block.end)
         if not left and (0 if state is None else state.half_cycle) < span.until:  # a cycle that is not whole
@@ -149,6 +152,16 @@ def in_few_steps(case: Case, phases: int) -> Case:
     if case.run.integration != "jump" and phases > LONGEST and case.contact.solver == "condensed":
         run |= {"integration": "jump", "jump_tolerance": TOLERANCE}
     return changed(case, run=run)
+
+
+def are_dear(last: Block) -> bool:
+    """Return whether the jumps of a run, by its last half-cycles, take more than its set-up, more or less."""
+    return last.system.sticks or len(last) * last.system.motion.positions > DEAR
+
+
+def in_longer_jumps(case: Case) -> Case:
+    """Return the case with a larger tolerance of its jumps."""
+    return changed(case, run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)})
 
 
 def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:

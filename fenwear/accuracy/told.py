@@ -8,8 +8,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fenwear.accuracy.again import Again, coarser, in_few_steps, nodes_across, set_up
+from fenwear.accuracy.again import (
+    LESS,
+    Again,
+    are_dear,
+    coarser,
+    in_few_steps,
+    in_longer_jumps,
+    nodes_across,
+    set_up,
+)
 from fenwear.accuracy.heat import of_heat, of_steady_heat
+from fenwear.accuracy.jumps import by_short_jumps
 from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of, values_of_steady
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
@@ -20,7 +30,6 @@ from fenwear.errors import CaseError, ConvergenceError
 
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
 ORDER, OF_PRESSURE = 1.5, 1.0  # of what is integrated, and of pressures and what lies at an edge
-LARGER = 8.0  # by which the tolerance of jumps is raised: as they are of second order, their error by 4
 ROUNDING = 1e-12
 NOTHING_BELOW = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
 
@@ -78,12 +87,20 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         untold["mesh"] = NOTHING_BELOW
     try:
         base = in_few_steps(case if lower is None else lower.case, until * last.system.motion.positions)
-        again = Again(set_up(base, last.system, lower), until, watch)
+        by_jumps = case.run.integration == "jump"
+        longer = by_jumps and are_dear(last)
+        share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
+        again = Again(set_up(in_longer_jumps(base) if longer else base, last.system, lower), until, watch)
         first, end = again.ends()
-        before = values_of(end)
+        before, without = values_of(end), by_short_jumps(end)
+        short = before if without is None else values_of(without)
         if lower is not None:
-            found["mesh"] = of_mesh(values, before, lower.ratio)
-        for source, contribution in _steps(again, before, first, last):
+            coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
+            found["mesh"] = of_mesh(values, coarse, lower.ratio)
+        of_jumps = _apart(before, short, SAFETY * share)
+        if last.steps and (warmest := values.get(Quantity("temperature"))) is not None:  # by the last jump's own error
+            of_jumps[Quantity("temperature")] = getattr(last.steps[-1], "jump_error", 0.0) * abs(warmest.number)
+        for source, contribution in _steps(again, before, of_jumps, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
         untold["steps" if "mesh" in found else "mesh"] = str(error)
@@ -106,15 +123,22 @@ def order_of(quantity: Quantity, value: Value) -> float:
     return OF_PRESSURE if quantity.name == "pressure" or value.at_edge else ORDER
 
 
-def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[tuple[str, Contribution]]:
-    """Yield what steps of wear and of slip, positions of the strip and meshes that follow contribute; collective."""
+def _steps(
+    again: Again, before: Values, of_jumps: Contribution, first: Block, last: Block
+) -> Iterator[tuple[str, Contribution]]:
+    """Yield what steps of wear and of slip, positions of the strip and meshes that follow contribute; collective.
+
+    Args:
+        again: The run in another discretisation.
+        before: Its numbers.
+        of_jumps: What jumps of the run itself leave in them.
+        first: Its first half-cycles.
+        last: The last ones of the run itself.
+    """
     case = last.system.case
     positions, follow = last.system.motion.positions, case.geometry.follow_wear
     if case.run.integration == "jump":
-        again = again.otherwise(run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)})
-        longer = again.values()
-        yield "wear steps", _apart(before, longer, 1.0)
-        before = longer  # what follows is compared in longer steps, too: there are fewer of them
+        yield "wear steps", of_jumps
     else:
         yield "wear steps", _of_half_cycles(before, first, last)
     if last.system.sticks:

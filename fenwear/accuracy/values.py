@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +47,11 @@ class Value:
     x: Array = field(default_factory=lambda: np.zeros((0, 1)))
     along: Array = field(default_factory=lambda: np.zeros(0))
     weights: Array = field(default_factory=lambda: np.zeros(0))
+
+    def towards(self, other: Value, share: float) -> Value:
+        """Return what lies at a share of the way to another one on the same nodes."""
+        number = self.number + share * (other.number - self.number)
+        return replace(self, number=number, along=self.along + share * (other.along - self.along))
 
     def apart(self, other: Value) -> float:
         """Return how far a number is from another discretisation's: never less than the fields of both are on average.

@@ -99,7 +99,7 @@ def _renewed(
     if renewal is Renewal.MESHES:
         warmed = None if state.temperature is None else state.temperature.temperatures()
         moved = adapt(renewed(system, state.worn, warmed))
-        return moved, replace(state, temperature=_carried(state.temperature, moved))
+        return moved, _moved_along(state, moved)
     if renewal is Renewal.PROPERTIES and state.temperature is not None:
         return adapt(warmed_system(system, state.temperature)), state
     grid = outgrown(system, carried_by(state))
@@ -158,6 +158,12 @@ class _Leaving:
 def _is_warm(system: Tribosystem, state: RunState) -> bool:
     """Return whether a whole cycle ends at temperatures for which the properties are to be taken anew; collective."""
     return state.half_cycle % system.motion.half_cycles == 0 and properties_outdated(system, state.temperature)
+
+
+def _moved_along(state: RunState, moved: Tribosystem) -> RunState:
+    """Return the state on moved meshes; collective."""
+    finer = None if state.finer is None else _moved_along(state.finer, moved)
+    return replace(state, temperature=_carried(state.temperature, moved), finer=finer)
 
 
 def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:

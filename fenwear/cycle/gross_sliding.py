@@ -143,7 +143,10 @@ class Jumps:
                 length = max(length, tried + 1)
         number = state.half_cycle + tried * strokes
         after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
-        return after, stepper.last_cycle(state, after, tried)
+        recorded = stepper.last_cycle(state, after, tried)
+        if state.finer is not None:
+            after = replace(after, finer=stepper.finer(state, state.finer, after, tried))
+        return after, recorded
 
 
 class GrossSliding:

@@ -43,7 +43,7 @@ from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, DepthEvolution
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
-from fenwear.cycle.jump_error import Estimate, area, estimated
+from fenwear.cycle.jump_error import ORDER, Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
@@ -148,6 +148,9 @@ class Stepper:
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
         self._trend = _Trend()  # of what was made last
+        self._whole: tuple[RunState, _Trend, WornDepths | None] | None = (
+            None  # the last attempt as one step: see `finer`
+        )
         passing = bool(system.passing_laws) or system.friction.of_coatings != (None, None)
         passing = passing or system.layers.varies or system.asks("debris")
         self._follows = passing or system.layers.memory is not None  # coefficients do, within a step
@@ -163,7 +166,7 @@ class Stepper:
             ConvergenceError: it did not converge; a single cycle not in smaller steps either.
         """
         try:
-            known, self._half = self._half, None
+            known, self._half, self._whole = self._half, None, None
             if known and known[0] is state and known[1] == cycles:
                 whole, trend = known[2:]
             else:
@@ -172,14 +175,20 @@ class Stepper:
             self._solve_to(FINE)
             half = self.step(state, cycles / 2, near=trend)
             self._half = (state, cycles / 2, half, self._trend)
-            comes = _comes(state, half, whole)
+            comes = _comes(
+                state, half, whole
+            )  # then the last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2
             last = LAST * cycles if comes else 0.0
             halves = self.step(half, cycles / 2 - last, cycles / 2, trend)
             if comes:
                 halves = self._last_step(halves, last, cycles - last)
-            estimate = estimated(self.system, state, whole, halves)
+            estimate, bent = estimated(self.system, state, whole, halves), None
             if comes:
-                estimate = replace(estimate, depth=max(estimate.depth, self._bent(state, half, whole)))
+                first, second = half.worn - state.worn, whole.worn - half.worn
+                bent = (second - first).times(2 * LAST**2)
+                share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
+                estimate = replace(estimate, depth=max(estimate.depth, share))
+            self._whole = whole, trend, bent
             if self._follows:
                 missed = self._missed(state, half, halves, cycles)
                 estimate = replace(estimate, depth=max(estimate.depth, missed))
@@ -194,14 +203,50 @@ class Stepper:
             self.system.remedies.note(SMALLER_STEPS.format(PARTS))
             return parts, Estimate(np.inf, np.inf, np.inf)
 
-    def _bent(self, state: RunState, half: RunState, whole: RunState) -> float:
-        """Return the error of the depths by a last step of first order, h^2 y'' / 2, relative to what the jump wears.
+    def finer(self, state: RunState, fine: RunState, end: RunState, cycles: int) -> RunState:
+        """Return where jumps of next to no length lead, from where they had led before the last attempt.
 
-        y'' follows from what both halves of the jump wear, d_1 and d_2: 4 (d_2 - d_1) / N^2.
+        From the begin y to y_h in halves and to y_w as a whole y_h is off by a third of y_w - y_h; what was off before,
+        y - f, goes on as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
+        come into contact y_h has the error of its last step, of first order, too, which is taken from it.
+
+        Args:
+            state: Before the attempt.
+            fine: Where they had led.
+            end: The attempt's.
+            cycles: Its length.
         """
-        first, second = half.worn - state.worn, whole.worn - half.worn
-        worn = area(self.system, first + second)
-        return 2 * LAST**2 * area(self.system, second - first) / max(worn, 1e-300)
+        if self._whole is None:  # in smaller steps than there is an estimate of
+            return self._apart(end, fine, state, 1.0)
+        whole, trend, bent = self._whole
+        moved = whole
+        if fine is not state:
+            self._solve_to(ROUGH)
+            try:
+                moved = self.step(replace(fine, half_cycle=state.half_cycle), cycles, near=trend)
+            except ConvergenceError:  # it may lie where no contact is: then what was off stays
+                moved = self._apart(whole, fine, state, 1.0)
+        halves = end if bent is None else replace(end, worn=end.worn - bent)
+        return replace(self._apart(moved, halves, whole, 2**ORDER / (2**ORDER - 1)), half_cycle=end.half_cycle)
+
+    def _apart(self, state: RunState, one: RunState, other: RunState, share: float) -> RunState:
+        """Return a state, and a share of the difference of two others."""
+        heat, temperature = self.coupled.heat, state.temperature
+        if heat is not None and temperature and one.temperature and other.temperature:
+            base, first, second = (
+                heat.exchange.own(t).values for t in (temperature, one.temperature, other.temperature)
+            )
+            temperature = heat.exchange.at(base + share * (first - second))
+        return RunState(
+            state.half_cycle,
+            self.system.layers.settled(state.worn + (one.worn - other.worn).times(share)),
+            tuple(
+                _between(own, first, second, share)
+                for own, first, second in zip(state.contacts, one.contacts, other.contacts, strict=True)
+            ),
+            temperature,
+            state.totals + (one.totals - other.totals).times(share),
+        )
 
     def _missed(self, state: RunState, half: RunState, halves: RunState, cycles: float) -> float:
         """Return the error of what a jump wears where coefficients change with depth or distance, relative.
@@ -452,6 +497,17 @@ class Stepper:
             bulk = np.nan if temperature.bulk is None else temperature.bulk
             heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature, phase), terms, 1, bulk))
         return heats
+
+
+def _between(
+    contact: ContactState | None, one: ContactState | None, other: ContactState | None, share: float
+) -> ContactState | None:
+    """Return a contact, and a share of the difference of two others."""
+    if contact is None or one is None or other is None:
+        return contact
+    pressure = contact.pressure + share * (one.pressure - other.pressure)
+    rigid = contact.rigid + share * (one.rigid - other.rigid)
+    return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
 
 
 def _comes(before: RunState, half: RunState, end: RunState) -> bool:

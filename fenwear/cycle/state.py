@@ -29,6 +29,8 @@ class RunState:
         jump_length: Cycles that the next jump tries.
         periodic_phases: Half-cycles in a row that repeated.
         memory: What the law of contact must remember besides; a data class of arrays, numbers and such classes.
+        finer: Where jumps of next to no length would have led, to the next order, see `fenwear.cycle.jump`; None where
+            nobody asks.
     """
 
     half_cycle: int
@@ -39,13 +41,14 @@ class RunState:
     jump_length: int = 1
     periodic_phases: int = 0
     memory: Any = None
+    finer: RunState | None = None
 
 
 def with_phases(state: RunState | None, count: int) -> RunState | None:
     """Return the state for a motion of so many phases: the contacts of another number of them are of no use."""
     if state is None or len(state.contacts) == count:
         return state
-    return replace(state, contacts=(None,) * count, periodic_phases=0)
+    return replace(state, contacts=(None,) * count, periodic_phases=0, finer=with_phases(state.finer, count))
 
 
 def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:
@@ -81,6 +84,7 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
         totals=replace(
             totals, energy=on_nodes(totals.energy, nodes, none), pressure=on_nodes(totals.pressure, nodes, none)
         ),
+        finer=None if state.finer is None else on_other_grid(state.finer, before, after),
     )
 
 

@@ -380,7 +380,8 @@ class Jumps(_Run):
         problem, strokes, exchange = self.problem, self.strokes, self.system.exchange
         now = self._cycle(state)
         load = self.loading(float(state.half_cycle))
-        ends = replace(now, length=state.jump_length, end=replace(now.end, load=load))
+        begun = None if state.finer is None else state.finer.worn
+        ends = replace(now, length=state.jump_length, end=replace(now.end, load=load), finer=begun)
         then = jumped(problem, ends, until // strokes, self.tolerance)
         cycles = then.number - now.number
         number = then.number * strokes
@@ -406,9 +407,20 @@ class Jumps(_Run):
         after: tuple[HeatState, ...] = ()
         if exchange is not None and then.warm is not None and then.end.temperature is not None:
             warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
-        kept = replace(then, end=replace(then.end, temperature=None), warm=None)
+        kept = replace(then, end=replace(then.end, temperature=None), warm=None, finer=None)
         memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.meshes)
-        return RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory), made
+        done = RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory)
+        return (done if then.finer is None else replace(done, finer=self._finer(done, then, until))), made
+
+    def _finer(self, done: RunState, then: FrettingCycle, until: int) -> RunState:
+        """Return the state on the depths to which shorter jumps would have led; at the end with the cycle on them."""
+        assert then.finer is not None
+        off = self.meter.with_wear(done.totals.times(0.0), then.worn - then.finer)
+        memory: Memory | None = done.memory
+        if done.half_cycle == until and memory is not None:
+            cycle = first_cycle(self.problem, then.end, then.finer, then.number, then.warm)
+            memory = replace(memory, cycle=replace(cycle, warm=None, end=replace(cycle.end, temperature=None)))
+        return replace(done, worn=then.finer, totals=done.totals - off, memory=memory)
 
     def _cycle(self, state: RunState) -> FrettingCycle:
         """Return the cycle on the shape of a state."""

@@ -173,6 +173,7 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     if not np.isfinite(rate).all():
         raise ConvergenceError(TOO_LARGE)
     solve = _Implicit(problem, now, cycles).solve
+    off = None if now.finer is None else begin - whole(problem.coatings.measured(now.finer))
     first = solve(rate)
     start = _slid_on(now, cycles)
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
@@ -197,7 +198,14 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
     of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
     of_debris = _debris_error(problem, missing, begin, end)
-    return replace(then, error=max(error, then.error, of_states, of_creep, of_debris))
+    finer = None if off is None else parted(end - missing - _went_on(solve, off))
+    return replace(then, error=max(error, then.error, of_states, of_creep, of_debris), finer=finer)
+
+
+def _went_on(solve: Callable[[Array], Array], off: Array) -> Array:
+    """Return what a jump makes of a difference of its begin: (1 + (1 - 2 g) z) / (1 - g z)^2 of it, z = N A."""
+    once = solve(off)
+    return np.asarray((1 - GAMMA) / GAMMA * solve(once) + (2 * GAMMA - 1) / GAMMA * once)
 
 
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:

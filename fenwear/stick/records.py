@@ -128,6 +128,7 @@ class FrettingCycle:
         end: State at its end. What comes next follows from it.
         length: Cycles of the next jump, as wished.
         warm: Temperatures at the start of its records (dim,); None without heat.
+        finer: Depths to which jumps of next to no length would have led, to the next order; None where nobody asks.
     """
 
     number: int
@@ -140,6 +141,7 @@ class FrettingCycle:
     end: PartialSlipState
     length: int = 1
     warm: Array | None = None
+    finer: WornDepths | None = None
 
     @property
     def records(self) -> TimeStepRecords:

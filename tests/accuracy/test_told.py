@@ -10,8 +10,11 @@ import pytest
 
 from fenwear import Block, Tribosystem, evolve, steady
 from fenwear.accuracy import Quantity, Value, shown, uncertainty, uncertainty_of_steady, values_of
+from fenwear.accuracy.jumps import by_short_jumps
 from fenwear.accuracy.told import of_mesh
 from fenwear.accuracy.values import values_of_steady
+from fenwear.assembly import with_reduced_heat
+from fenwear.cycle import jump
 
 Assembled = Callable[..., Tribosystem]
 FEW = "geometry.parameters.elements_along_contact=8"
@@ -89,6 +92,43 @@ def test_linear_elements_have_nothing_below(assembled: Assembled) -> None:
     assert "geometry.degree = 2" in text
     assert "punch" not in table  # a sum without the mesh's part would say nothing
     assert table["contributions"]["wear steps"]["punch"]["largest_depth_mm"] > 0
+
+
+JUMPED = {
+    "plane": ("example1", "run.half_cycles=2000", "geometry.degree=3", FEW),
+    "heat": ("ring-on-ring-heat", "run.half_cycles=200", "geometry.parameters.across=4"),
+    "stick": (
+        "fretting-partial-slip",
+        "run.half_cycles=100",
+        'wear.punch.coefficient="2e-7 1/MPa"',
+        'wear.strip.coefficient="2e-7 1/MPa"',
+        FEW.replace("8", "16"),
+    ),
+}
+
+
+@pytest.mark.mpi("stick", "heat")
+@pytest.mark.parametrize("kind", JUMPED)
+def test_what_jumps_leave_is_found_beside_them(assembled: Assembled, kind: str) -> None:
+    """Against jumps of a hundredth of the tolerance, node by node; the jumps themselves are as without."""
+    base, *settings = JUMPED[kind]
+    system = with_reduced_heat(assembled(base, *settings))
+    half_cycles = system.case.run.half_cycles
+
+    def end(tolerance: float, *, finer: bool = False) -> Block:
+        *_, last = jump(system, half_cycles, tolerance=tolerance, finer=finer)
+        return last
+
+    alone, exact, last = end(3e-3), end(3e-5), end(3e-3, finer=True)
+    np.testing.assert_array_equal(last.end.worn.punch, alone.end.worn.punch)
+    short = by_short_jumps(last)
+    assert short is not None
+    weights = system.pair.weights
+    true, told, left = (
+        weights @ np.abs(one.wear[-1] - other.wear[-1]) for one, other in ((last, exact), (last, short), (short, exact))
+    )
+    assert left < true
+    assert true / 2 < told < 2 * true
 
 
 def test_equal_largest_values_of_other_fields_are_apart() -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from combinations import SMALL as SMALLEST
-from combinations import STICK
+from combinations import STICK, WARM
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.arrays import Array
+from fenwear.cycle.state import beginning
 from fenwear.sliding.coating import shares
 
 Assemble = Callable[..., Tribosystem]
@@ -369,6 +371,42 @@ def test_a_soft_coating_that_sticks_is_a_layer_and_wears_through() -> None:
         errors.append(float(np.abs(last.wear[-1] - marched.wear[-1]).max() / marched.wear[-1].max()))
     assert errors[0] < 0.1
     assert errors[1] < 5e-3
+
+
+FINE = (  # a ball on fine half-spaces
+    "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",
+    "punch.operator='fine'", "strip.operator='fine'", "grid.size=['0.4 mm', '0.4 mm']", "grid.nodes=21",
+    "motion.positions=1",
+)  # fmt: skip
+WITH_HEAT = (*SMALLEST, *WARM, "contact.law='gross-sliding'", "stick={}", "motion.positions=1")
+
+
+@pytest.mark.parametrize(
+    ("base", "settings", "coefficient"),
+    [("fretting-partial-slip", WITH_HEAT, 1e-5), ("ball-on-flat", FINE, 1e-7)],
+    ids=["heat", "grid"],
+)
+def test_a_soft_coating_opens_a_gap_of_its_own(base: str, settings: tuple[str, ...], coefficient: float) -> None:
+    """Of its compression, which bodies without it that are worn by as much more have, too: unworn, and in its end."""
+    text = "wear={punch={coefficient='%g 1/MPa'%s}}"
+    coat = f", coating={{thickness='2 um', coefficient='{coefficient:g} 1/MPa', modulus='2 GPa'}}"
+    soft, bare = (assemble(load_case(base, [*settings, text % (coefficient, more)])) for more in (coat, ""))
+    # As far as a part of it is worn through.
+    *_, worn = march(soft, 400, leave=lambda state: bool((state.worn.punch > 2e-3).sum() > 2))
+    assert 2 < (worn.wear[-1] > 2e-3).sum() < (worn.pressure[-1] > 0).sum()
+    none = next(iter(march(bare, 1)))
+    for start in (None, worn.end):
+        number = 1 if start is None else start.half_cycle + 1
+        *_, found = march(soft, number, start=start)
+        pressure, lost = found.pressure[-1], np.zeros(len(soft.pair.weights)) if start is None else start.worn.punch
+        compressed = np.maximum(2e-3 - lost, 0) * -np.expm1(-pressure / 2000)
+        begin = start or beginning(bare, None if bare.exchange is None else bare.exchange.initial())
+        *_, exact = march(bare, number, start=replace(begin, worn=replace(begin.worn, punch=lost + compressed)))
+        assert np.abs(none.pressure[0] - pressure).max() > 0.05 * pressure.max()
+        np.testing.assert_allclose(pressure, exact.pressure[-1], rtol=0, atol=1e-9 * pressure.max())
+        if exact.heat is not None and found.heat is not None:
+            warm = found.heat.temperature_punch[-1]
+            np.testing.assert_allclose(warm, exact.heat.temperature_punch[-1], rtol=0, atol=1e-9 * warm.max())
 
 
 def test_coatings_that_give_way_are_condensed() -> None:

@@ -49,6 +49,9 @@ class ContactLaw(Protocol):
     def end(self, system: Tribosystem, properties_within: float | None = None) -> Any:
         """Return the state to which wear leads in the end; collective."""
 
+    def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:
+        """Return what steps remember, on another contact grid of the same bodies; collective."""
+
     def half_cycles(
         self, system: Tribosystem, watch: Callable[[], bool], loading: Callable[[float], float], *, implicit: bool
     ) -> Any:

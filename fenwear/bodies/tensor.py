@@ -37,7 +37,8 @@ class TensorWeights:
         """Return the rows of some nodes (k, m)."""
         found: Array = np.ones((1, 1))
         for factor, place in zip(self.factors, self.at[nodes].T, strict=True):
-            found = (found[:, :, None] * factor[place][:, None]).reshape(np.size(place), -1)
+            found = found[:, :, None] * factor[place][:, None]
+            found = found.reshape(len(found), found.shape[1] * found.shape[2])  # of no nodes, too
         return found
 
     def to_nodes(self, values: Array) -> Array:

@@ -472,9 +472,6 @@ class Case(Part):
                 table and self.model.kind == "plane" and any(name.endswith("shift_y") for name in columns)
             ),
             "stick.force: expected none in a cycle, whose forces are columns,": table and self.stick.force is not None,
-            "grid.across: expected grid.nodes, of a grid that stays,": (
-                self.grid is not None and self.grid.across is not None
-            ),
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
             ),

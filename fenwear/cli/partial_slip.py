@@ -75,7 +75,8 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
     problem = partial_slip_problem(case) if system is None else system.law_state.problem
     if not touches(problem):
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
-    found = final_shape(problem)
+    found = final_shape(problem) if system is None else system.contact_law.end(system)
+    problem = problem if found.system is None else found.system.law_state.problem
     solid = case.model.kind == "solid"
     pair, weights = problem.interface.middle.pair, problem.weights
     x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x

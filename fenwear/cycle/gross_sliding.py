@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import reduce
+from typing import Any
+
+import numpy as np
 
 from fenwear.assembly import (
     Bodies,
@@ -25,9 +28,11 @@ from fenwear.assembly import (
     joined,
     make_sliding,
     on_first_contact,
+    outgrown,
     place,
     preparation,
     property_change,
+    regridded,
     with_exchange,
     with_reduced_heat,
 )
@@ -231,10 +236,18 @@ class GrossSliding:
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
-        if grows(system):
-            message = "expected grid.nodes: the end that wear leads to is looked for on a grid that stays"
-            raise CaseError(InputError("grid.across", message))
-        return steady_state(system, properties_within)
+        found = steady_state(system, properties_within)
+        while grows(system):
+            grid = outgrown(system, np.asarray((found.phase_pressure > 0).any(axis=0)))
+            if grid is None:
+                break
+            system = regridded(system, grid)
+            found = steady_state(system, properties_within)
+        return found
+
+    def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:  # noqa: ARG002
+        """Return what steps remember."""
+        return memory
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle."""

@@ -80,6 +80,7 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     return replace(
         state,
         worn=carried(state.worn, before, after),
+        memory=None if state.memory is None else after.contact_law.on_other_grid(state.memory, before, after),
         contacts=tuple(contacts),
         totals=replace(
             totals, energy=on_nodes(totals.energy, nodes, none), pressure=on_nodes(totals.pressure, nodes, none)

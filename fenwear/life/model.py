@@ -292,6 +292,7 @@ class Model:
 def _of_final_shape(system: Tribosystem) -> Snapshot:
     """Return the shape to which partial slip wears: where nothing that slips carries pressure, and nothing wears on."""
     found = cast(FinalShape, steady(system))  # under Coulomb's law
+    system = found.system
     none = Totals(np.zeros(len(SUMS)), np.zeros(0), np.zeros(0))
     surfaces = _worn_surfaces(system, found.worn, found.worn.times(0.0), none)
     thickness = system.bodies.punch.thickness

@@ -16,9 +16,17 @@ from fenwear.assembly import (
     ContactLaw,
     Preparation,
     Tribosystem,
+    at_rim,
     build_conduction,
+    carried,
+    grows,
     joined,
+    node_maps,
+    on_first_contact,
+    on_nodes,
+    outgrown,
     place_at_rest,
+    regridded,
 )
 from fenwear.assembly.tribosystem import Condensed
 from fenwear.bodies.operators import SurfaceOperator
@@ -38,6 +46,7 @@ from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.jump import first_cycle, jumped
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
+from fenwear.stick.regrid import on_other_grid
 from fenwear.stick.setup import heated, unheated_problem
 from fenwear.stick.state import PartialSlipState
 
@@ -103,12 +112,14 @@ class StickSetup:
         fineness: Of its time steps; None where they are taken as they are given.
         meshes: What tells these bodies apart from those on other meshes or with other properties.
         ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
+        prepared: Whether heat is, and its time steps are fine enough, where they are to be.
     """
 
     problem: PartialSlipProblem
     fineness: Fineness | None
     meshes: float
     ends: Ends | None = None
+    prepared: bool = True
 
 
 def touches(problem: PartialSlipProblem) -> bool:
@@ -125,13 +136,17 @@ class Coulomb:
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
+        if bodies.punch.reach is not None:  # its grid begins around the first contact
+            bodies = on_first_contact(system_of(case, bodies, law=self.name, heat="none", fresh=fresh)).bodies
         return system_of(case, bodies, law=self.name, heat=heat, fresh=fresh)
 
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         same = bodies.punch is system.bodies.punch
         condensed = (system.condensed.punch, system.condensed.strip) if same else None
-        return system_of(system.case, bodies, law=self.name, condensed=condensed, ends=system.law_state.ends)
+        heat: Preparation = "as set" if system.law_state.prepared else "none"
+        ends = system.law_state.ends
+        return system_of(system.case, bodies, law=self.name, heat=heat, condensed=condensed, ends=ends)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
@@ -169,8 +184,23 @@ class Coulomb:
             raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> FinalShape:  # noqa: ARG002
-        """Return the shape to which partial slip wears; collective."""
-        return final_shape(system.law_state.problem)
+        """Return the shape to which partial slip wears, of the grid that its scar has grown to; collective."""
+        found = final_shape(system.law_state.problem)
+        while grows(system):
+            grid = outgrown(system, np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)))
+            if grid is None:
+                break
+            system = regridded(system, grid)
+            found = final_shape(system.law_state.problem)
+        return replace(found, system=system)
+
+    def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
+        """Return what a run remembers on another contact grid; collective. Jumps go on from a cycle made there."""
+        (nodes, _), stuck = node_maps(before, after), memory.stuck
+        problems = before.law_state.problem, after.law_state.problem
+        at = on_other_grid(memory.at, *problems, nodes, carried(memory.at.worn, before, after))
+        stuck = None if stuck is None else on_nodes(stuck, nodes, np.zeros(len(nodes)))
+        return Memory(at, stuck=stuck, meshes=memory.meshes)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle; implicitly, of one cycle."""
@@ -222,7 +252,8 @@ def system_of(
             problem, fineness = fine_enough(problem, case)
             ends = fineness.ends
     exchange = None if problem.heat is None else problem.heat.exchange
-    return replace(system, exchange=exchange, law_state=StickSetup(problem, fineness, _told_apart(bodies), ends))
+    setup = StickSetup(problem, fineness, _told_apart(bodies), ends, heat != "none")
+    return replace(system, exchange=exchange, law_state=setup)
 
 
 def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
@@ -382,7 +413,7 @@ class Jumps(_Run):
         load = self.loading(float(state.half_cycle))
         begun = None if state.finer is None else state.finer.worn
         ends = replace(now, length=state.jump_length, end=replace(now.end, load=load), finer=begun)
-        then = jumped(problem, ends, until // strokes, self.tolerance)
+        then = jumped(problem, ends, until // strokes, self.tolerance, self._fits)
         cycles = then.number - now.number
         number = then.number * strokes
         totals = state.totals + self._adds(now, then, cycles)
@@ -421,6 +452,10 @@ class Jumps(_Run):
             cycle = first_cycle(self.problem, then.end, then.finer, then.number, then.warm)
             memory = replace(memory, cycle=replace(cycle, warm=None, end=replace(cycle.end, temperature=None)))
         return replace(done, worn=then.finer, totals=done.totals - off, memory=memory)
+
+    def _fits(self, cycle: FrettingCycle) -> bool:
+        """Return whether the contact has room on its grid: it grows before its rim is reached."""
+        return not at_rim(self.system, (cycle.worn.punch > 0) | cycle.records.touched)
 
     def _cycle(self, state: RunState) -> FrettingCycle:
         """Return the cycle on the shape of a state."""

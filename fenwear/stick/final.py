@@ -25,6 +25,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -62,6 +63,8 @@ class FinalShape:
             as small as it may be; None where it was given as nodes.
         within: Half the interval that is left of the size.
         temperature: Of the contact surfaces of punch and strip (2, n), K; None without heat.
+        system: The `Tribosystem` whose nodes these are: on a contact grid that grows, that of the end; None where it
+            was found of a problem alone.
     """
 
     stick: Mask
@@ -75,6 +78,7 @@ class FinalShape:
     volume: tuple[float, float] | None = None
     within: float = 0.0
     temperature: Array | None = None
+    system: Any = None
 
 
 def stick_zone(problem: PartialSlipProblem) -> Mask:

@@ -48,7 +48,13 @@ REST = 1e-3  # of all depths: near the end of wear, errors are no longer measure
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
 
 
-def jumped(problem: PartialSlipProblem, now: FrettingCycle, cycles: int, tolerance: float) -> FrettingCycle:
+def jumped(
+    problem: PartialSlipProblem,
+    now: FrettingCycle,
+    cycles: int,
+    tolerance: float,
+    fits: Callable[[FrettingCycle], bool] = lambda _: True,
+) -> FrettingCycle:
     """Return the cycle after the next jump that is accurate enough.
 
     Args:
@@ -56,6 +62,7 @@ def jumped(problem: PartialSlipProblem, now: FrettingCycle, cycles: int, toleran
         now: The cycle to go on from.
         cycles: How many in all.
         tolerance: Largest estimated error of one jump.
+        fits: Whether the nodes suffice for the cycle after it: it is halved where they do not.
 
     Raises:
         ConvergenceError: the shortest jump did not converge.
@@ -69,6 +76,9 @@ def jumped(problem: PartialSlipProblem, now: FrettingCycle, cycles: int, toleran
             if tried == 1:
                 raise
             length = max(1, tried // 4)
+            continue
+        if tried > 1 and not fits(then):
+            length = tried // 2
             continue
         factor = SAFETY * np.sqrt(tolerance / max(then.error, 1e-300))
         if then.error > tolerance and tried > 1:

@@ -126,6 +126,7 @@ def _nodes(system: Tribosystem) -> dict[str, Array]:
 def _final_shape(system: Tribosystem) -> Values:
     """Return the shape to which partial slip wears."""
     found = cast(FinalShape, steady(system))  # under Coulomb's law
+    system = found.system
     steps = system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
     pressure = found.pressures[ends]

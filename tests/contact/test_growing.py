@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from half_space_ball import ball
 
-from fenwear import Case, assemble, evolve, run_case
+from fenwear import Case, assemble, evolve, run_case, steady
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, node_maps, outgrown, regridded
 from fenwear.cycle.block import Block
@@ -122,12 +122,80 @@ def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
         assert (np.diff(volume) > 0).all()
 
 
+STILL = {"kind": "reciprocating", "amplitude": 0.02, "period": 1.0, "positions": 1}
+STICKS: dict[str, Any] = {
+    "contact": {"friction": 0.8, "law": "coulomb"},
+    "stick": {"steps": 4, "step_tolerance": 1},
+    "motion": STILL,
+    "wear": {"punch": {"coefficient": "2e-5 1/MPa"}, "strip": {"coefficient": "2e-5 1/MPa"}},
+}
+
+
+def test_with_stick_a_grid_that_grows_is_as_one_that_was_as_wide_at_first() -> None:
+    """Tractions, slips and what sticks go on over the change, node by node, to what solvers leave; volumes stay."""
+    system = assemble(growing({"across": 10}, **STICKS, run={"half_cycles": 8}))
+    grown = list(evolve(system))
+    assert len(grown) > 2
+    last = grown[-1]
+    for block in grown:
+        pair, worn = block.system.pair, block.end.worn
+        assert pair.weights @ worn.punch == pytest.approx(block.end.totals.of("volume_punch"), rel=1e-12)
+    wide = list(evolve(regridded(system, last.system.pair.punch.grid)))
+    assert len(wide) == 1
+    for of in (
+        lambda block: block.end.worn.punch,
+        lambda block: block.pressure[-1],
+        lambda block: block.steps[-1].records.traction[-1],
+        lambda block: block.steps[-1].records.slip.sum(axis=0),
+    ):
+        wanted = of(wide[0])
+        assert of(last) == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.slow
+def test_with_stick_jumps_go_with_the_march_and_runs_go_on(tmp_path: Path) -> None:
+    """On grids of their own; a run in parts ends as one in one piece, on a grid that had grown between."""
+    wear = {"punch": {"coefficient": "2e-6 1/MPa"}, "strip": {"coefficient": "2e-6 1/MPa"}}
+
+    def case(count: int, how: str) -> Case:
+        run = {"half_cycles": count, "integration": how, "jump_tolerance": 0.01}
+        return growing({"across": 10}, **{**STICKS, "wear": wear}, run=run)
+
+    marched, jumps = (list(evolve(assemble(case(40, how))))[-1] for how in ("explicit", "jump"))
+    for body in ("punch", "strip"):
+        wanted = marched.end.totals.of(f"volume_{body}")
+        assert jumps.end.totals.of(f"volume_{body}") == pytest.approx(wanted, rel=0.01)
+    run_case(case(30, "explicit"), output=tmp_path, log=lambda _: None)
+    resumed, _ = run_case(case(40, "explicit"), output=tmp_path, log=lambda _: None, resume=True)
+    assert resumed["punch"]["worn_volume_mm3"] == pytest.approx(marched.end.totals.of("volume_punch"), rel=1e-9)
+
+
+@pytest.mark.parametrize("sticks", [False, True])
+def test_the_end_is_that_of_a_grid_that_stays(sticks: bool) -> None:
+    """The steady state, and the end of partial slip, on the grid that they have grown to."""
+    wear = {"punch": {"coefficient": "1e-6 1/MPa"}}
+    more = (
+        {**STICKS, "wear": wear, "motion": {**STILL, "amplitude": 0.004}} if sticks else {"motion": STILL, "wear": wear}
+    )
+    system = assemble(growing({"across": 16}, **more))
+    found = steady(system)
+    grid = found.system.pair.punch.grid
+    stays = steady(assemble(growing({"nodes": max(grid.counts), "size": list(grid.sides)}, **more)))
+    if sticks:
+        pressure, wanted = found.pressure, stays.pressure
+        assert found.depth == pytest.approx(stays.depth, abs=1e-6 * stays.depth.max())
+        assert found.depth.reshape(grid.counts)[[0, -1]].max() == 0
+    else:
+        assert grid != system.pair.punch.grid
+        pressure, wanted = found.phase_pressure, stays.phase_pressure
+    assert pressure == pytest.approx(wanted, abs=1e-6 * wanted.max())
+
+
 @pytest.mark.parametrize(
     "more",
     [
         {"grid": {"across": 64, "nodes": 65}},
         {"strip": {"operator": "condensed"}},
-        {"contact": {"friction": 0.3, "law": "coulomb"}},
         {"punch": {"topography": {"rms": "0.1 um", "longest": 1}}},
         {"program": {"steps": [{"cycles": 10}]}},
     ],

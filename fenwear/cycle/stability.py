@@ -84,7 +84,7 @@ def growth_rate(
 ) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
-    Negative: every disturbance dies out. Not for a strip whose worn material, or debris on it, moves to and fro. The
+    Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
     state is that of the given pressures and of the temperatures that repeat under them. The cycle's map
     of temperature and worn depth is linearised there, friction, wear and conductance with it, for the
     same nodes in contact, and its eigenvalue largest in size taken: ln |lambda| over
@@ -142,7 +142,7 @@ def _factors(
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
-    dim += 0 if system.layers.debris_here is None else n
+    dim += 0 if system.layers.debris is None else len(system.pair.strip.weights) if system.layers.strip_carries else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
@@ -270,9 +270,11 @@ class _Laws:
         mu: (n,).
         rate: What each node slides for a unit of the stroke's law (n,): friction heat is mu p times that.
         mu_p: To the pressure of the same node (n,), 1/MPa.
-        mu_s: To the state of the heat, and to the thickness of debris at its start where there is any (n, dim).
+        mu_s: To the state of the heat, and to the thickness of debris at its start where there is any, of L nodes where
+            it lies (n, dim).
         worn_p, worn_s: Of the gap that the wear of the phase opens (n, n) and (n, dim).
-        lies: Of the thickness of debris at its end (n, n) and (n, dim); None without.
+        lies: Of the thickness of debris at its end (L, n) and (L, dim), and what of it lies at the contact's nodes
+            (n, L); None without.
     """
 
     mu: Array
@@ -281,7 +283,7 @@ class _Laws:
     mu_s: Array
     worn_p: Array
     worn_s: Array
-    lies: tuple[Array, Array] | None = None
+    lies: tuple[Array, Array, Array] | None = None
 
 
 def _rested(
@@ -293,7 +295,7 @@ def _rested(
         ConvergenceError: debris has no thickness at which as much is lost as comes.
     """
     layers = system.layers
-    if layers.memory is None and layers.debris_here is None:
+    if layers.memory is None and layers.debris is None:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if heat is not None and states:
@@ -302,13 +304,15 @@ def _rested(
         system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
     ]
     rest = system.rested(conditions)
-    if layers.debris_here is None:
+    if layers.debris is None:
         return rest
-    thickness = np.asarray(layers.thickness(rest))
+    thickness = np.asarray(layers.where_it_lies(rest))
     for _ in range(MAX_ITERATIONS):
-        now = [replace(one, debris=thickness) for one in conditions]
+        lying = layers.with_thickness(rest, thickness)
+        pairs = zip(conditions, system.pairs, strict=True)
+        now = [replace(one, debris=layers.facing(pair, lying)) for one, pair in pairs]
         passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
-        thickness = np.asarray(passing.resting(pressure))
+        thickness = np.asarray(passing.resting_where_it_lies(pressure))
         if not layers.varies and not system.asks("debris"):
             break
         if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):
@@ -327,12 +331,12 @@ def _lies_after(
     worn: WornDepths | None,
 ) -> WornDepths | None:
     """Return what lies between after a phase, of what does at its start."""
-    if worn is None or system.layers.debris_here is None:
+    if worn is None or system.layers.debris is None:
         return worn
     conditions = _conditions(system, phase, pressure, heat, state, worn)
     passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
     added, _ = passing.debris_changes(pressure[None], worn, None)
-    return system.layers.with_thickness(worn, np.asarray(system.layers.thickness(worn)) + added)
+    return system.layers.with_thickness(worn, np.asarray(system.layers.where_it_lies(worn)) + added)
 
 
 def _conditions(
@@ -382,24 +386,29 @@ def _laws(
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
     if not lies:
         return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
-    mu_s, worn_s = np.hstack([mu_s, np.diag(mu_t[2])]), np.hstack([worn_s, worn_t[2]])
-    debris = system.layers.debris_here
+    debris, pair = system.layers.debris, system.pairs[phase]
     assert debris is not None
-    taken, path = depths(*around).sum(axis=0)[None], system.path[phase][None]
-
-    def thickness(*values: Array) -> Array:
-        return values[-1] + debris.over(path, [at(*values)]).change(values[-1], taken)[0]
-
-    over = debris.over(path, [conditions])
-    lies_p, *lies_t, lies_lies = (over.slope(None)[0] * slope.sum(axis=0) for slope in by_depths)
-    if system.layers.varies:
-        by_loss = _slopes(thickness, around)
-        lies_p, lies_lies = lies_p + by_loss[0], lies_lies + by_loss[3]
-        lies_t = [own + more for own, more in zip(lies_t, by_loss[1:3], strict=True)]
+    if system.layers.strip_carries:
+        onto, reads, puts = [pair.wear_projection], pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
     else:
-        lies_lies = lies_lies + np.exp(-over.loss)
-    lies_s: Array = np.hstack([(np.array(lies_t)[:, :, None] * picked).sum(axis=0), np.diag(lies_lies)])
-    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, (np.diag(lies_p), lies_s))
+        onto, reads, puts = None, np.eye(n), np.eye(n)
+    path, taken, thickness = system.path[phase], depths(*around).sum(axis=0), system.layers.where_it_lies(worn)
+    over = debris.over(path[None], [conditions], onto)
+    # Of what is fed, by what is worn at the nodes of the contact, to pressure, temperatures and thickness there.
+    put = over.slope(None)[0][:, None] * puts
+    lies_p, *lies_t, lies_here = (put * slope.sum(axis=0) for slope in by_depths)
+    if system.layers.varies:
+        by_loss = over.by_loss(np.asarray(thickness), (puts @ taken)[None])[:, None] * puts * path
+        more_p, *more_t, more_here = (
+            by_loss * slope for slope in _slopes(lambda *values: debris.lost(at(*values)), around)
+        )
+        lies_p, lies_here = lies_p + more_p, lies_here + more_here
+        lies_t = [own + more for own, more in zip(lies_t, more_t, strict=True)]
+    lies_s: Array = np.hstack(
+        [(np.array(lies_t) @ picked).sum(axis=0), np.diag(np.exp(-over.loss)) + lies_here @ reads]
+    )
+    mu_s, worn_s = np.hstack([mu_s, mu_t[2][:, None] * reads]), np.hstack([worn_s, worn_t[2] @ reads])
+    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, (lies_p, lies_s, reads))
 
 
 def phase_tangent(
@@ -504,8 +513,8 @@ def _goes_on(
             conductance = heat.exchange.conductance(pressure)
         state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
     if laws.lies is not None:
-        state_p[of_heat:], state_s[of_heat:] = laws.lies
-        (gap_rows if implicit else before_s)[:, of_heat:] = -np.eye(n)
+        state_p[of_heat:], state_s[of_heat:], reads = laws.lies
+        (gap_rows if implicit else before_s)[:, of_heat:] = -reads
     return gap_rows, before_s, state_s, state_p
 
 

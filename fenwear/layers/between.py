@@ -186,15 +186,28 @@ class Layers:
     def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array | None:
         """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
 
-        What the strip carries is what lies opposite each node. None without.
+        What the strip carries is what lies opposite each node, which laws know of: where it is heaped up, quadratic
+        elements fall below nothing beside it. None without.
         """
         if not self.strip_carries or self.debris is None:
             return self.thickness(worn)
         lies = None if worn is None else self.on_strip(worn)
-        return np.full(self.nodes, self.debris.initial) if lies is None else np.asarray(pair.wear_interpolation @ lies)
+        if lies is None:
+            return np.full(self.nodes, self.debris.initial)
+        return np.asarray(np.maximum(pair.wear_interpolation @ lies, 0.0))
+
+    def where_it_lies(self, worn: WornDepths | None) -> Array | None:
+        """Return the thickness of the debris at the contact's nodes, or at those of a strip that carries it, mm."""
+        if not self.strip_carries or self.debris is None:
+            return self.thickness(worn)
+        return None if worn is None else self.on_strip(worn)
 
     def with_thickness(self, worn: WornDepths, thickness: Array) -> WornDepths:
-        """Return the depths with debris of another thickness (n,), mm."""
+        """Return the depths with debris of another thickness, mm, at the nodes where it lies."""
+        if self.strip_carries:
+            carried = worn.carried.copy()
+            carried[0] = thickness
+            return replace(worn, carried=carried)
         state = worn.between.copy()
         state[self.row(DEBRIS[0])] = thickness
         return replace(worn, between=state)

@@ -145,6 +145,11 @@ class DebrisCycle:
         """Return how much thicker a step ends by what its phases wear in a cycle (m, n); None for one cycle."""
         return self.share * self.kept if cycles is None else cycles * self.fed / (1 + cycles * self.loss)
 
+    def by_loss(self, thickness: Array, worn: Array) -> Array:
+        """Return the derivative of `change` to x in a cycle of one phase (n,), mm; arguments as of `change`."""
+        left = np.exp(-self.loss)
+        return np.asarray(self.share * worn[0] * (left - self.kept[0]) / self.loss - left * thickness)
+
     @cached_property
     def _lost(self) -> Array:
         """1 - E (n,)."""

@@ -111,11 +111,17 @@ class LayerEvolution:
 
     def resting(self, pressure: Array) -> Array | None:
         """Return the thickness of the debris that such cycles leave in the end (n,), mm; None without."""
+        lies = self.resting_where_it_lies(pressure)
+        if lies is None or not self.layers.strip_carries:
+            return lies
+        return np.asarray(self.wear.pairs[0].wear_interpolation @ lies)
+
+    def resting_where_it_lies(self, pressure: Array) -> Array | None:
+        """Return the same at the nodes where it lies: the contact's, or those of a strip that carries it (n_strip,)."""
         if self.debris is None:
             return None
         fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
-        lies = fed / self.debris.loss
-        return self.wear.pairs[0].wear_interpolation @ lies if self.layers.strip_carries else lies
+        return np.asarray(fed / self.debris.loss)
 
     def _where_it_lies(self, depths: Array) -> Array:
         """Return depths of the phases at the contact's nodes (m, n) where debris lies: there, or on the strip."""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from combinations import SMALL, STICK
 
 from fenwear import Tribosystem, assemble, load_case, steady
-from fenwear.cycle import Block, evolve
+from fenwear.arrays import Array
+from fenwear.cycle import Block, evolve, growth_rate, march
+from fenwear.cycle.stability import _lies_after, phase_tangent
+from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.results.between import values
 
@@ -131,6 +136,51 @@ def test_along_a_closed_track_against_the_closed_form() -> None:
         assert values(block)["debris_balance_error"][-1] < 1e-12
         assert values(block)["debris_volume"][-1] == pytest.approx(thickness * TRACK * wanted, rel=error)
     assert steady(system).debris == pytest.approx(share * worn / (TRACK * x), rel=1e-8)
+
+
+PROTECTS = "wear={punch={coefficient={expression='1e-6 * (0.2 + 0.8 * exp(-debris / 1e-4))', unit='1/MPa'}}}"
+FELT = "contact.friction={expression='0.2 + 0.3 * exp(-debris / 1e-4)'}"
+LIES = "contact.third_body={share=0.6, life='3 mm', initial='0.1 um', carried_by='strip'}"
+OWN = (
+    "contact.third_body={share=0.8, initial='0.1 um', carried_by='strip', "
+    "life={expression='3 * (1 + p / 300) / (1 + 100 * debris)', unit='mm'}}"
+)
+
+
+@pytest.mark.parametrize("way", ["to and fro", "track"])
+@pytest.mark.parametrize("laws", [(LIES, PROTECTS, FELT), (OWN,)], ids=["felt", "own law"])
+@pytest.mark.parametrize("implicit", [True, False])
+def test_growth_rates_follow_what_the_strip_carries(laws: tuple[str, ...], way: str, *, implicit: bool) -> None:
+    """A cycle's map of its thickness and the punch's depth is the derivative of a march's, by differences."""
+    wears = "wear={punch={coefficient='1e-6 1/MPa'}}"
+    few = (
+        "geometry.degree=1",
+        "geometry.follow_wear='never'",
+        "geometry.parameters.elements_along_contact=12",
+        ONE_WAY,
+    )
+    system = assemble(load_case("example2", [*few, wears, *laws])) if way == "track" else system_of(wears, *laws)
+    start = list(march(system, 100, block=100, implicit=implicit))[-1].end
+    n, lies, worn = len(system.pair.weights), len(system.pair.strip.weights), start.worn
+    phases, strokes = range(len(system.motion.phases)), system.motion.half_cycles
+
+    def cycle(change: Array) -> RunState:
+        carried = worn.carried + np.array([change[:lies], np.zeros(lies)])
+        moved = replace(start, worn=replace(worn, punch=worn.punch + change[lies:], carried=carried))
+        return list(march(system, 100 + strokes, implicit=implicit, start=moved))[-1].end
+
+    predicted, known, contacts = np.eye(lies + n), worn, cycle(np.zeros(lies + n)).contacts
+    for phase in phases:
+        pressure = contacts[phase].pressure[0]
+        predicted = phase_tangent(system, phase, pressure, implicit=implicit, worn=known) @ predicted
+        known = _lies_after(system, phase, pressure, None, None, known)
+    change = 1e-9 * np.sin(np.arange(lies + n) ** 2)
+    ends = [cycle(sign * change).worn for sign in (1.0, -1.0)]
+    found = np.concatenate([ends[0].carried[0] - ends[1].carried[0], ends[0].punch - ends[1].punch]) / 2
+    assert np.abs(found - change).max() > 1e-3 * np.abs(change).max()
+    assert np.abs(found - predicted @ change).max() < 1e-5 * np.abs(found - change).max()
+    if way == "track":
+        assert growth_rate(system, np.concatenate([one.pressure for one in contacts]), implicit=implicit) < 0
 
 
 def test_laws_know_what_the_strip_carries_past_a_place() -> None:

@@ -17,6 +17,7 @@ import fenwear as package
 from fenwear import Tribosystem, steady
 from fenwear.case import Dependence, builtin_cases
 from fenwear.cli.states import steady_command
+from fenwear.cycle import RunningIn
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -67,17 +68,17 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     """A command of 196 s printed "663 ms": the state alone. The state is printed before the way to it is sought."""
     clock, printed = [0.0], []
 
-    def slow(*_arguments: object) -> int:
+    def slow(*_arguments: object) -> RunningIn:
         printed.append(capsys.readouterr().out)
         clock[0] += 196.0
-        return 7
+        return RunningIn(7, 1)
 
     monkeypatch.setattr("fenwear.cli.states.time", SimpleNamespace(perf_counter=lambda: clock[0]))
-    monkeypatch.setattr("fenwear.cycle.cycles_to_reach", slow)
+    monkeypatch.setattr("fenwear.cycle.running_in", slow)
     steady_command("example2", list(options()[1::2]))
     assert "33.333 MPa" in printed[0]
     rest = capsys.readouterr().out
-    assert "after about 7 cycles" in rest
+    assert "after about 7 ± 1 cycles" in rest
     assert "196.0 s in all: " in rest
     assert "the way there 196.0 s" in rest
 

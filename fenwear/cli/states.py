@@ -16,7 +16,7 @@ from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
-    from fenwear.cycle import SteadyState
+    from fenwear.cycle import RunningIn, SteadyState
 
 
 StepOption = Annotated[
@@ -44,7 +44,7 @@ def steady_command(
 ) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import with_case, with_reduced_heat
-    from fenwear.cycle import cycles_to_reach, growth_rate, heat_gain, heat_warnings, held, steady
+    from fenwear.cycle import growth_rate, heat_gain, heat_warnings, held, running_in, steady
     from fenwear.law_choice import resolve_law
     from fenwear.plausibility import fineness_warnings, steady_warnings
     from fenwear.results.degrees import degrees_of
@@ -82,7 +82,7 @@ def steady_command(
     way = time.perf_counter()
     rate = growth_rate(found, state.phase_pressure, state.conductances)
     short = len(found.motion.phases) <= FOLLOWED
-    cycles = cycles_to_reach(found, state, 0.01) if rate < 0 and short else None
+    cycles = running_in(found, state, 0.01) if rate < 0 and short else None
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     if not as_json:
         _print_way(rate, short, cycles, seconds, time.perf_counter() - begin)
@@ -106,7 +106,8 @@ def steady_command(
             "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
-            "cycles_to_1_percent": cycles,
+            "cycles_to_1_percent": None if cycles is None else cycles.cycles,
+            "cycles_to_1_percent_uncertainty": None if cycles is None else cycles.uncertainty,
             **uncertain,
             "seconds": state.seconds,
             "all_seconds": {**seconds, "in_all": time.perf_counter() - begin},
@@ -189,7 +190,7 @@ def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str)
     sys.stdout.flush()
 
 
-def _print_way(rate: float, followed: bool, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
+def _print_way(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float], in_all: float) -> None:
     """Print how the state is reached, and where the time went."""
     if rate > 0:
         show(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
@@ -198,7 +199,10 @@ def _print_way(rate: float, followed: bool, cycles: int | None, seconds: dict[st
     elif cycles is None:
         show("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
     else:
-        show(f"  pressure within 1 % of the pressure scale after about {cycles:,} cycles from the initial shape")
+        digit = 10 ** math.floor(math.log10(max(cycles.uncertainty, 1)))  # no more are known
+        number, wrong = (digit * round(one / digit) for one in (cycles.cycles, cycles.uncertainty))
+        about = f"after about {number:,} ± {wrong:,} cycles"
+        show(f"  pressure within 1 % of the pressure scale {about} from the initial shape")
     show(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
           f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
 

@@ -20,13 +20,14 @@ from fenwear.cycle.stability import (
     stability_number,
     stationary_growth,
 )
-from fenwear.cycle.steady import SteadyState, cycles_to_reach, steady
+from fenwear.cycle.steady import RunningIn, SteadyState, cycles_to_reach, running_in, steady
 from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 
 __all__ = [
     "Block",
     "Monotonic",
     "Renewal",
+    "RunningIn",
     "Span",
     "SteadyState",
     "at_step",
@@ -45,6 +46,7 @@ __all__ = [
     "jump",
     "march",
     "monotonic",
+    "running_in",
     "stability_number",
     "stationary_growth",
     "steady",

@@ -40,10 +40,11 @@ from fenwear.assembly import (
 from fenwear.case.names import told_by_name
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
+from fenwear.cycle.block import Block
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
 from fenwear.cycle.program import at_step
-from fenwear.cycle.state import pressure_scale
+from fenwear.cycle.state import RunState, pressure_scale
 from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_memory
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
@@ -56,6 +57,8 @@ ZERO = 1e-12  # of the largest: a velocity that is rounding
 LEFT = 0.1  # of heat.property_tolerance: what properties may still change by in the state that is found
 FALLING = 0.7  # of the change of the properties in the pass before
 PASSES = 30
+JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
+REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
 NO_ONE_MOTION = (
     "no cyclic steady state exists: no one rigid motion wears all that carries pressure, as where loads press a body "
     "to either side in turn, and both wear for ever. Follow the wear by `run`"
@@ -436,10 +439,31 @@ def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:
     return modes @ np.linalg.lstsq(modes * root[:, None], values * root, rcond=None)[0]
 
 
-def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> int | None:
-    """Return after how many cycles from the initial shape the pressures come this near to the end.
+@dataclass(frozen=True)
+class RunningIn:
+    """How long the pressures take to come near to those of a steady state.
 
-    Found by a run of cycle jumps; within the jump that crosses the distance is taken to decay exponentially.
+    Attributes:
+        cycles: From the initial shape.
+        uncertainty: Of these, by the tolerance of the jumps and by the curve that is laid through them.
+    """
+
+    cycles: int
+    uncertainty: int
+
+
+def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> int | None:
+    """Return after how many cycles from the initial shape the pressures come this near to the end, see `running_in`."""
+    found = running_in(system, state, fraction, limit)
+    return None if found is None else found.cycles
+
+
+def running_in(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> RunningIn | None:
+    """Return after how many cycles from the initial shape the pressures come this near to the end; collective.
+
+    Found by a run of cycle jumps. Between two of them the distance is taken to decay exponentially; the jump across it
+    is made again to where that leads, until that no longer changes. Pressures that are off by the tolerance of the
+    jumps, a share s of the distance, put the cycles off by s over the rate of decay.
 
     Args:
         system: The assembled problem. Its properties stay: where they depend on the temperature take the state's own.
@@ -449,13 +473,52 @@ def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, li
     """
     phases = len(state.directions)
     goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
-    before: tuple[int, float] | None = None
-    for block in jump(system, limit * phases, tolerance=fraction / 10, block=phases):
-        cycles, distance = int(block.half_cycle[-1]) // phases, float(np.abs(block.pressure - state.pressure).max())
-        if distance < goal:
-            if before is None or distance == 0:
-                return cycles
-            share = np.log(before[1] / goal) / np.log(before[1] / distance)
-            return round(before[0] + share * (cycles - before[0]))
-        before = (cycles, distance)
-    return None
+    low: _Passed | None = None
+    for block in jump(system, limit * phases, tolerance=JUMPS * fraction, block=phases):
+        high = _Passed.of(block, state)
+        if high.distance < goal:
+            break
+        low = high
+    else:
+        return None
+    if low is None or high.distance == 0:
+        return RunningIn(high.cycles, high.cycles)
+    cycles = before = low.until(high, goal)
+    for _ in range(REFINED):
+        if not low.cycles < round(cycles) < high.cycles:
+            break
+        *_, block = jump(system, round(cycles) * phases, tolerance=JUMPS * fraction, block=phases, start=low.end)
+        between, before = _Passed.of(block, state), cycles
+        low, high = (low, between) if between.distance < goal else (between, high)
+        cycles = low.until(high, goal)
+        if abs(cycles - before) < SETTLED * cycles:
+            break
+    life = (high.cycles - low.cycles) / max(np.log(low.distance / max(high.distance, 1e-300)), 1e-300)
+    return RunningIn(round(cycles), round(JUMPS * life + abs(cycles - before)))
+
+
+@dataclass(frozen=True)
+class _Passed:
+    """A jump's end on the way to a steady state.
+
+    Attributes:
+        cycles: Done.
+        distance: Of its pressures from those of the state, MPa.
+        end: From where the way goes on.
+    """
+
+    cycles: int
+    distance: float
+    end: RunState
+
+    @classmethod
+    def of(cls, block: Block, state: SteadyState) -> _Passed:
+        """Return the end of a jump."""
+        distance = float(np.abs(block.pressure - state.pressure).max())
+        return cls(int(block.half_cycle[-1]) // len(state.directions), distance, block.end)
+
+    def until(self, later: _Passed, goal: float) -> float:
+        """Return after how many cycles the distance is this one, where it decays exponentially from here to later."""
+        decayed = np.log(self.distance / max(later.distance, 1e-300))
+        share = np.log(self.distance / goal) / decayed if decayed > 0 else 1.0
+        return self.cycles + float(np.clip(share, 0.0, 1.0)) * (later.cycles - self.cycles)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.optimize import linprog
@@ -483,14 +484,14 @@ def running_in(system: Tribosystem, state: SteadyState, fraction: float, limit: 
         return None
     if low is None or high.distance == 0:
         return RunningIn(high.cycles, high.cycles)
-    cycles = before = low.until(high, goal)
+    cycles = before = system.team.lead(partial(low.until, high, goal))  # a logarithm may have other bits on other ranks
     for _ in range(REFINED):
         if not low.cycles < round(cycles) < high.cycles:
             break
         *_, block = jump(system, round(cycles) * phases, tolerance=JUMPS * fraction, block=phases, start=low.end)
         between, before = _Passed.of(block, state), cycles
         low, high = (low, between) if between.distance < goal else (between, high)
-        cycles = low.until(high, goal)
+        cycles = system.team.lead(partial(low.until, high, goal))
         if abs(cycles - before) < SETTLED * cycles:
             break
     life = (high.cycles - low.cycles) / max(np.log(low.distance / max(high.distance, 1e-300)), 1e-300)

@@ -22,7 +22,6 @@ from fenwear.assembly import (
     grows,
     joined,
     node_maps,
-    on_first_contact,
     on_nodes,
     outgrown,
     place_at_rest,
@@ -34,6 +33,7 @@ from fenwear.case import Case
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.driver import Loading, Watch
+from fenwear.cycle.gross_sliding import LAW as SLIDING
 from fenwear.cycle.state import RunState, beginning
 from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
 from fenwear.errors import CaseError, InputError
@@ -136,8 +136,8 @@ class Coulomb:
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
-        if bodies.punch.reach is not None:  # its grid begins around the first contact
-            bodies = on_first_contact(system_of(case, bodies, law=self.name, heat="none", fresh=fresh)).bodies
+        if bodies.punch.reach is not None:  # its grid begins around the first contact, pressed alone
+            bodies = SLIDING.of_bodies(case, bodies, heat="none", fresh=fresh).bodies
         return system_of(case, bodies, law=self.name, heat=heat, fresh=fresh)
 
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:

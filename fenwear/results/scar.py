@@ -99,7 +99,11 @@ def scar_geometry(placed: ContactSetup, surface: ContactSurface) -> ScarGeometry
         if all_round:
             return ScarGeometry(surface.x[:, :0], edges, part, ())
         return ScarGeometry(surface.abscissa[:, None], edges, part, ("width",))
-    coordinates = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x)
+    chart = sliding_chart(placed.sliding.field, placed.pair)
+    coordinates = chart.coordinates(surface.x)
+    if surface is placed.pair.strip and not placed.motion.steps:  # its track has upright sides: no wider than the punch
+        across = chart.coordinates(placed.pair.punch.x)[:, 1]
+        coordinates[:, 1] = np.clip(coordinates[:, 1], across.min(), across.max())
     if all_round:
         return ScarGeometry(coordinates[:, 1:], edges, part, ("width",))
     return ScarGeometry(coordinates, edges, part, ("length", "width"))

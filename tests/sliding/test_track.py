@@ -13,6 +13,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import place_case
 from fenwear.case import load_case, make_case
 from fenwear.cycle import march, steady
+from fenwear.results.scar import extents, scar_geometry
 from fenwear.sliding.track import _part_below
 
 DISC = ("geometry.degree=2", "wear.strip.coefficient=2e-8", "geometry.parameters.disc_layers=2",
@@ -132,6 +133,8 @@ def test_sides_of_a_track_to_and_fro(along: int, cells: dict[str, float]) -> Non
             row = felt[np.abs(x[:, along] - k) < 1e-6]  # triangles divide the areas of their nodes unevenly
             np.testing.assert_allclose(row, row.mean(), rtol=0, atol=(0.15 if cells else 1e-6) * felt.max())
     assert worn.strip[np.abs(xs[:, beside]) > 0.75].max() == 0
+    scar = scar_geometry(placed, placed.pair.strip)
+    assert extents(worn.strip[None], scar.coordinates, scar.edges)[0, 1] == pytest.approx(1.0, rel=1e-9)  # its width
     slid = placed.sliding.motion.sliding().sum()
     assert placed.pair.strip.weights @ worn.strip == pytest.approx(2e-8 * slid, rel=1e-12)
 

@@ -40,7 +40,7 @@ from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
-from fenwear.sliding.track import Sides, on_closed_track
+from fenwear.sliding.track import Border, on_closed_track
 from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
@@ -615,9 +615,6 @@ def place(
     check_stays(middle, sliding)
     if sliding.track is not None:
         middle = on_closed_track(middle, sliding.field, sliding.track)
-    sides = None if sliding.motion.steps else Sides.of(middle, sliding.field)
-    if sides is not None:
-        middle = sides.worn(middle)
     sliding = sliding.measured_on(middle)
     # Round surfaces that slide along themselves stay; a whole strip is moved where it does not turn by a table.
     whole = heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
@@ -628,8 +625,10 @@ def place(
         if moved != HERE
     }
     pairs[HERE] = middle
-    if sides is not None:
-        pairs = {moved: sides.felt(one) for moved, one in pairs.items()}
+    if middle.strip.grid is None:
+        swept = Border.of_swept([pairs[there] for there in places])
+        border = swept if sliding.track is None else Border.of_rings(middle, sliding.field)
+        pairs = border.on_all(pairs)
     middle = pairs[HERE]
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)

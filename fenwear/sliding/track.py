@@ -1,4 +1,4 @@
-"""The track of a counter-body: its sides; and where it is closed, what is worn off it spreads along the whole of it.
+"""The track of a counter-body: its border; and where it is closed, what is worn off it spreads along the whole of it.
 
 The track is made of rings: circles about the axis of a rotation, or lines along a translation, told apart by a
 coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. What a node wears
@@ -7,7 +7,7 @@ off its own area w_i goes to the rings that this area crosses, by shares, and al
     depth of ring k = sum over i of (share of node i's area in ring k) w_i d_i / area of ring k.
 
 A node of the counter-body takes the mean of the rings that its own area crosses; the track ends where the contact
-does, see `Sides`. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
+does, see `Border`. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one.
 
 Surfaces that turn beside each other without ever coming to the same place, as the two faces of a disc, are tracks
 of their own: parts of the strip's surface share one where they lie at the same height, measured square to s.
@@ -15,7 +15,7 @@ of their own: parts of the strip's surface share one where they lie at the same 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,76 +26,97 @@ from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.interface import ContactPair
 from fenwear.interface.overlap import ChartedSurface, Indices, node_triangles
-from fenwear.interface.placement import ZERO, in_space
+from fenwear.interface.placement import ZERO, Placement, in_space
 from fenwear.sliding.field import SlidingField
 
 RINGS = 2000  # at most
 FINER = 2  # rings over the width of a node's area
+WHOLE = 0.9  # of a node's area, beyond which it counts as swept
 THIN = 1e-12  # of a surface's width across the track
 SAME = 1e-6  # of a surface's extent: heights that are one
 LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s is the radius
 
 
 @dataclass(frozen=True)
-class Sides:
-    """The sides of a track, where a solid's strip is worn on one side of a line along the sliding and not on the other.
+class Border:
+    """The border of what the punch sweeps of the strip, where its depth ends upright: sides and ends of a track.
 
-    They run through the areas of nodes: such an area is worn on the part of it that lies on the track, and so deep as
-    beside it; spread over the whole of it, depths at the sides would be the half, and what a punch feels there, too.
-    What the punch reads beyond the sides is the depth inside: shape functions overshoot at a step.
+    It runs through the areas of nodes: such an area is worn on the part of it that is swept, and as deep as beside it;
+    spread over the whole of it, the depth at the border would be the half, and what a punch feels there, too. What the
+    punch reads of the strip beyond is the depth inside: shape functions overshoot at a step.
 
     Attributes:
-        share: Of each strip node's area that lies on the track (n_strip,), 1 where nothing of it does.
-        inward: Node whose depth stands for each one's (n_strip,): its own, but beyond the sides the nearest inside's.
+        share: Of each strip node's area that is swept (n_strip,), 1 where nothing of it is.
+        inward: Node whose depth stands for each one's (n_strip,): its own, but beyond the border the nearest inside's.
     """
 
     share: Array
     inward: Indices
 
     @classmethod
-    def of(cls, pair: ContactPair, field: SlidingField) -> Sides:
-        """Find them.
+    def of_swept(cls, pairs: Sequence[ContactPair]) -> Border:
+        """Find it of a strip that goes to and fro, or as a table says: of each area what is covered once, at most.
+
+        Args:
+            pairs: The surfaces opposite each other in all phases.
+        """
+        covered = np.max([pair.wear_projection.sum(axis=1) for pair in pairs], axis=0)
+        # Areas of curved surfaces opposite each other are not the same to the last percent.
+        return cls._of(np.where(covered > WHOLE, 1.0, covered), pairs[0].strip)
+
+    @classmethod
+    def of_rings(cls, pair: ContactPair, field: SlidingField) -> Border:
+        """Find it of a closed track: the sides of its rings.
 
         Args:
             pair: The surfaces opposite each other.
-            field: The motion of the strip, the same at all times but for its amount.
+            field: The motion of the strip.
         """
-        count = len(pair.strip.weights)
-        on_track, inward = np.ones(count), np.arange(count)
-        if pair.strip.dim == 2 or pair.strip.grid is not None or ZERO not in (field.shift, field.turn):
-            return cls(on_track, inward)
+        share = np.zeros(len(pair.strip.weights))
+        if pair.strip.dim == 2:
+            return cls(np.ones(len(share)), np.arange(len(share)))
         across = _across(field, pair.strip)
         punch, strip = (_Crossing.of(surface, across) for surface in (pair.punch, pair.strip))
         for on_strip, on_punch in _facing(pair, field):
             edges = punch.of_nodes(on_punch).reach()
-            share = np.asarray(strip.of_nodes(on_strip).shares(edges)[:, ::2].sum(axis=1))
-            inside = np.flatnonzero(share > THIN)
-            beyond = np.flatnonzero(on_strip & (share <= THIN))
+            share += strip.of_nodes(on_strip).shares(edges)[:, ::2].sum(axis=1)
+        return cls._of(np.minimum(share, 1.0), pair.strip)
+
+    @classmethod
+    def _of(cls, share: Array, strip: ContactSurface) -> Border:
+        inward, swept, part = np.arange(len(share)), share > THIN, strip.part
+        for k in range(part.max() + 1):
+            inside, beyond = (np.flatnonzero((part == k) & one) for one in (swept, ~swept))
             if len(inside) and len(beyond):
-                inward[beyond] = inside[cKDTree(pair.strip.x[inside]).query(pair.strip.x[beyond])[1]]
-            on_track[inside] = np.minimum(share[inside], 1.0)
-        return cls(on_track, inward)
+                inward[beyond] = inside[cKDTree(strip.x[inside]).query(strip.x[beyond])[1]]
+        return cls(np.where(swept, share, 1.0), inward)
 
     @property
     def none(self) -> bool:
-        """Whether the track is as wide as the surface, with no side on it."""
+        """Whether all of the strip's surface is swept."""
         return bool((self.share == 1).all() and (self.inward == np.arange(len(self.inward))).all())
 
-    def worn(self, pair: ContactPair) -> ContactPair:
-        """Return a pair whose strip's nodes stand for what of their areas lies on the track, by which they wear."""
+    def on_all(self, pairs: Mapping[Placement, ContactPair]) -> dict[Placement, ContactPair]:
+        """Return pairs of the same surfaces whose strip is worn, and felt, where it is swept."""
         if self.none:
-            return pair
-        strip = replace(pair.strip, weights=self.share * pair.strip.weights)
-        projection = csr_array(diags_array(1 / self.share) @ pair.wear_projection)
-        return replace(pair, strip=strip, wear_projection=projection)
+            return dict(pairs)
+        strip = self.on_strip(next(iter(pairs.values())).strip)
+        return {place: self.on(pair, strip) for place, pair in pairs.items()}
 
-    def felt(self, pair: ContactPair) -> ContactPair:
-        """Return a pair whose punch feels of the strip's material what lies on the track."""
-        if self.none:
-            return pair
+    def on_strip(self, strip: ContactSurface) -> ContactSurface:
+        """Return the strip's surface whose nodes stand for what of their areas is swept."""
+        return replace(strip, weights=self.share * strip.weights)
+
+    def on(self, pair: ContactPair, strip: ContactSurface) -> ContactPair:
+        """Return a pair of that surface of the strip, from one of the whole of it."""
         count = len(self.inward)
         read = csr_array((np.ones(count), (np.arange(count), self.inward)), shape=(count, count))
-        return replace(pair, wear_interpolation=csr_array(pair.wear_interpolation @ read))
+        return replace(
+            pair,
+            strip=strip,
+            wear_interpolation=csr_array(pair.wear_interpolation @ read),
+            wear_projection=csr_array(diags_array(1 / self.share) @ pair.wear_projection),
+        )
 
 
 def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> ContactPair:

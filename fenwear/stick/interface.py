@@ -25,7 +25,7 @@ from fenwear.interface.placement import HERE, Placement
 from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
-from fenwear.sliding.track import Sides
+from fenwear.sliding.track import Border
 from fenwear.sliding.wear import STIFF, WornDepths
 from fenwear.stick.creep import StickCreep
 from fenwear.stick.position import LoadEffect, Position, along_tangents, position_of
@@ -124,9 +124,10 @@ class StickInterface(OppositeBodies):
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
-        self.sides = None if sliding.motion.steps else Sides.of(middle, sliding.field)
-        if self.sides is not None:
-            middle = self.sides.felt(self.sides.worn(middle))
+        places = [sliding.placement(phase) for phase in sliding.motion.phases] if moves else []
+        self.whole_strip, swept = middle.strip, [pair(middle.punch, middle.strip, there) for there in {HERE, *places}]
+        self.border = Border.of_swept(swept)
+        middle = self.border.on(middle, self.border.on_strip(middle.strip))
         self.layers = Layers(len(middle.weights))
         if case is not None:
             modulus = common_modulus(case, bodies.regions, middle)
@@ -207,8 +208,8 @@ class StickInterface(OppositeBodies):
     def prepare_position(self, offset: float | Placement) -> None:
         """Make a new place of the strip; collective."""
         middle = self.middle.pair
-        there = pair(middle.punch, middle.strip, self.placement(offset))
-        self._positions[offset] = self._position(there if self.sides is None else self.sides.felt(there))
+        there = pair(middle.punch, self.whole_strip, self.placement(offset))
+        self._positions[offset] = self._position(self.border.on(there, middle.strip))
 
     def placement(self, offset: float | Placement) -> Placement:
         """Return the place of the strip moved by this amount of its motion, or there by a table."""

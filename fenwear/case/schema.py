@@ -122,7 +122,8 @@ class Case(Part):
         """Return what does not go with bodies whose meshes are not what answers to forces."""
         others = [name for name, body in self.bodies.items() if body.operator != CONDENSED]
         against = {
-            "with heat: temperatures expand the bodies' meshes": self.heat is not None,
+            "with heat: a contact finer than the meshes warms a layer as thin as its own nodes are wide, whose "
+            "temperatures and expansion the meshes do not have": self.heat is not None,
             "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
         }
         bare = [name for name in ("punch", "strip") if getattr(self, name).topography is not None and self.grid is None]

@@ -625,10 +625,9 @@ def place(
         if moved != HERE
     }
     pairs[HERE] = middle
-    if middle.strip.grid is None:
-        swept = Border.of_swept([pairs[there] for there in places])
-        border = swept if sliding.track is None else Border.of_rings(middle, sliding.field)
-        pairs = border.on_all(pairs)
+    swept = sliding.track is None
+    border = Border.of_swept([pairs[at] for at in places]) if swept else Border.of_rings(middle, sliding.field)
+    pairs = border.on_all(pairs)
     middle = pairs[HERE]
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)

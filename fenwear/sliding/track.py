@@ -60,9 +60,12 @@ class Border:
         Args:
             pairs: The surfaces opposite each other in all phases.
         """
+        strip = pairs[0].strip
+        if strip.grid is not None:  # which ends beside the contact
+            return cls(np.ones(len(strip.weights)), np.arange(len(strip.weights)))
         covered = np.max([pair.wear_projection.sum(axis=1) for pair in pairs], axis=0)
         # Areas of curved surfaces opposite each other are not the same to the last percent.
-        return cls._of(np.where(covered > WHOLE, 1.0, covered), pairs[0].strip)
+        return cls._of(np.where(covered > WHOLE, 1.0, covered), strip)
 
     @classmethod
     def of_rings(cls, pair: ContactPair, field: SlidingField) -> Border:

@@ -144,7 +144,7 @@ def interrupted_after(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     ],
 )
 def test_interrupted_and_resumed_equals_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: list[str]) -> None:
-    """After SIGTERM nothing is lost, and the end is that of a run in one piece; set-ups that are kept may round anew."""
+    """After SIGTERM nothing is lost, and the end is that of a run in one piece; kept set-ups may round anew."""
     whole = run(tmp_path / "whole", how)
     with monkeypatch.context() as patched:
         interrupted_after(patched, 3)

@@ -16,7 +16,8 @@ from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
-from fenwear.stick.program import far_enough, make_program
+from fenwear.stick.program import SPACINGS, far_enough, make_program
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.wear import LocalLaws
 
 MOST_PASSING = 3000  # nodes of a grid under which a strip passes
@@ -60,8 +61,13 @@ def unheated_problem(
     *,
     fresh: bool = False,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
+    moves: bool | None = None,
 ) -> PartialSlipProblem:
-    """Return the same without heat; collective. Arguments as of `partial_slip_problem`."""
+    """Return the same without heat; collective. Arguments as of `partial_slip_problem`.
+
+    Args:
+        moves: Whether the strip's surface passes under the punch; None as the motion says.
+    """
     sliding, surface = make_sliding(case), bodies.punch.surface
     if bodies.punch.reach is None or surface.grid != bodies.punch.reach.grid:  # else it is looked for first
         _check_passing(case, surface)
@@ -69,7 +75,7 @@ def unheated_problem(
         bodies,
         sliding,
         case,
-        moves=_moves(case, surface),
+        moves=_moves(case, surface) if moves is None else moves,
         far=case.stick.force is None and far_enough(case, surface),
         keep=bodies.warmed is None,
         fresh=fresh,
@@ -126,7 +132,10 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:
-    """Return whether the strip's surface passes under the punch: by default where it changes, and moves far enough."""
+    """Return whether the strip's surface passes under the punch: by default where it changes, and moves far enough.
+
+    Whether it slips so far is seen in the first cycle alone, see `stays_by_slip`.
+    """
     motion = case.motion
     positions = getattr(motion, "positions", None)
     if isinstance(motion, Cycle) and positions is not None:
@@ -136,3 +145,27 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
     if positions is not None:
         return True
     return case.strip_changes and far_enough(case, surface)
+
+
+def stays_by_slip(problem: PartialSlipProblem, case: Case) -> bool:
+    """Return whether a strip that passes by default slips less than a node to each side in the first cycle; collective.
+
+    Where nodes stick, the strip's surface goes with the punch's, however far its supports go: what slips passes,
+    by the mean over the pressure.
+    """
+    if (
+        not problem.interface.moves
+        or isinstance(case.motion, Cycle)
+        or getattr(case.motion, "positions", 2) is not None
+    ):
+        return False
+    return problem.led(lambda: _slipped(problem) <= SPACINGS * problem.interface.middle.pair.punch.spacing())
+
+
+def _slipped(problem: PartialSlipProblem) -> float:
+    """Return the amplitude of the slip in the first cycle, its mean over the pressure, mm."""
+    weights = problem.interface.middle.pair.weights
+    cycle = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
+    carried = np.maximum(cycle.pressure @ weights, 1e-300)
+    ways = (cycle.pressure * np.linalg.norm(cycle.slip, axis=2)) @ weights / carried
+    return float(ways.sum()) / (2 * problem.program.half_cycles)

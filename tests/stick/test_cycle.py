@@ -243,3 +243,11 @@ def test_mean_pressure_of_the_last_cycle() -> None:
         # Directions at nodes of the strip are those of some of the punch's, which is round.
         for depth, same in ((now.punch_depth, 1e-11), (now.strip_depth, 1e-8)):
             assert np.abs(depth[k][slid] - wanted).max() < same * now.punch_depth.max()
+
+
+@pytest.mark.parametrize(("amplitude", "passes"), [("5 um", False), ("8 um", True)])
+def test_a_strip_passes_by_what_slips(amplitude: str, *, passes: bool) -> None:
+    """Where its supports move by two nodes of 2.5 um, but the surfaces slip by a fifth of one, they stay opposite."""
+    wears = "wear={punch={coefficient='1e-7 1/MPa'}, strip={coefficient='1e-7 1/MPa'}}"
+    system = assemble(load_case("fretting-partial-slip", [wears, f"motion.amplitude='{amplitude}'"]))
+    assert getattr(system.condensed, "strip_moves") == passes  # noqa: B009  (of bodies that are condensed)

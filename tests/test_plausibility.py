@@ -30,6 +30,7 @@ from fenwear.plausibility import (
     stroke_warnings,
 )
 from fenwear.plausibility.chamfer import contact_chamfer
+from fenwear.plausibility.curved import curved_text, turned
 from fenwear.plausibility.ends import contact_ends
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.layer import heated_layer, layer_warnings
@@ -575,3 +576,13 @@ def test_height_of_elements_that_the_layer_is_held_against(tetrahedra: int) -> N
     assert layer is not None
     assert layer.height == pytest.approx(0.25, rel=1e-9)
     assert layer.thickness == pytest.approx(np.sqrt(50.0 / (4.6e8 * 7.8e-9) * 1.0 / 1e4), rel=1e-9)
+
+
+def test_deep_wear_of_a_bore_turns_its_normals() -> None:
+    """A shaft moved by delta into its bore touches it along normals turned by delta / R beside."""
+    pair = place_case(load_case("bushing", ["geometry.parameters.elements_along_contact=40"])).pair
+    cosine = np.maximum((pair.normal @ pair.normal[np.abs(pair.x).argmin()]), 0.0)
+    radius = pair.punch.rounds[0][0].radius
+    assert turned(pair, 0.08 * radius * cosine) == pytest.approx(0.08, rel=5e-3)
+    assert curved_text(pair, 0.04 * radius * cosine, "then") == ""
+    assert "8 % of its radius" in curved_text(pair, 0.08 * radius * cosine, "then")

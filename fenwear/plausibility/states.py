@@ -12,6 +12,7 @@ from fenwear.case.plausible import HOT
 from fenwear.contact.complementarity import broken_text, complementarity_error
 from fenwear.cycle import Block, SteadyState
 from fenwear.plausibility.chamfer import contact_chamfer
+from fenwear.plausibility.curved import curved_text
 from fenwear.plausibility.ends import ContactEnds, contact_ends, opened
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.grid_rim import grid_limits
@@ -56,6 +57,9 @@ class StateMonitor:
         hardest = int(np.argmax(block.pressure.max(axis=1)))
         when = f"in half-cycle {int(block.half_cycle[hardest]):,}"
         found["shakedown"] = shakedown_text(block.system, float(block.pressure.max()), when)
+        last = block.end.worn
+        deep = block.system.pair.opening(last.punch, last.strip)
+        found["curved"] = curved_text(self.system.pair, deep, f"by half-cycle {int(block.half_cycle[-1]):,}")
         for name, elastic, depths in (
             ("punch", self.system.bodies.punch, block.wear),
             ("strip", self.system.bodies.strip, block.wear_strip),

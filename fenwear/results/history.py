@@ -95,7 +95,7 @@ STRIP_VARIABLES = {
     "weight_strip": (
         ("half_cycle", "x_strip"),
         "mm",
-        "length that each node stands for, on the mesh of the half-cycle",
+        "length swept by the punch that each node stands for, on the mesh of the half-cycle",
     ),
 }
 

@@ -41,7 +41,11 @@ RENAMED = {
     "worn_area_increment": ("worn_volume_increment", "mm3", "volume worn off the punch in the half-cycle"),
     "worn_area_increment_strip": ("worn_volume_increment_strip", "mm3", "volume worn off the strip in the half-cycle"),
     "weight": ("weight", "mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
-    "weight_strip": ("weight_strip", "mm2", "area that each node stands for, on the mesh of the half-cycle"),
+    "weight_strip": (
+        "weight_strip",
+        "mm2",
+        "swept area that each node stands for, on the mesh of the half-cycle",
+    ),
     "direction": (
         "direction",
         "1",

@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
+from fenwear.arrays import Array
 from fenwear.cycle.program import Span
 from fenwear.report.course import mean_pressure, nominal_width
 from fenwear.results.history import HistoryWriter, free_directory, make_directory
@@ -132,14 +133,22 @@ def test_weights_follow_the_meshes(tmp_path: Path) -> None:
     followed = np.flatnonzero((np.diff(history.weight_strip, axis=0) != 0).any(axis=1)) + 1
     assert len(followed)
     x, (points, shares) = history.x_strip.values, np.polynomial.legendre.leggauss(8)
-    for k in followed:
-        z = -history.wear_strip.values[k - 1]  # where the mesh has moved
-        expected = np.zeros_like(x)
+
+    def integrals(z: Array) -> Array:
+        found = np.zeros_like(x)
         for nodes in np.arange(0, len(x) - 1, 2)[:, None] + np.arange(3):
             shape = np.array([points * (points - 1) / 2, 1 - points**2, points * (points + 1) / 2])
             slope = np.array([points - 0.5, -2 * points, points + 0.5])
-            expected[nodes] += shape @ (shares * np.hypot(x[nodes] @ slope, z[nodes] @ slope))
-        flat, found = (history.weight_strip.values[n] for n in (0, k))
+            found[nodes] += shape @ (shares * np.hypot(x[nodes] @ slope, z[nodes] @ slope))
+        return found
+
+    flat = history.weight_strip.values[0]
+    swept = flat / integrals(0 * x)  # where the stroke ends within a node's area, a part of it
+    assert (swept <= 1 + 1e-9).all()
+    assert np.abs(swept[2:-2] - 1).max() < 1e-9
+    for k in followed:
+        expected = swept * integrals(-history.wear_strip.values[k - 1])  # where the mesh has moved
+        found = history.weight_strip.values[k]
         np.testing.assert_allclose(found, expected, rtol=1e-6)
         assert np.abs(flat / expected - 1).max() > 30 * np.abs(found / expected - 1).max()
     assert not np.diff(history.weight[followed[-1] :], axis=0).any()  # of one mesh they are the same

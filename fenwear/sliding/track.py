@@ -101,17 +101,19 @@ class Border:
 
     def on_all(self, pairs: Mapping[Placement, ContactPair]) -> dict[Placement, ContactPair]:
         """Return pairs of the same surfaces whose strip is worn, and felt, where it is swept."""
-        if self.none:
-            return dict(pairs)
         strip = self.on_strip(next(iter(pairs.values())).strip)
         return {place: self.on(pair, strip) for place, pair in pairs.items()}
 
     def on_strip(self, strip: ContactSurface) -> ContactSurface:
         """Return the strip's surface whose nodes stand for what of their areas is swept."""
+        if self.none:
+            return strip
         return replace(strip, weights=self.share * strip.weights)
 
     def on(self, pair: ContactPair, strip: ContactSurface) -> ContactPair:
         """Return a pair of that surface of the strip, from one of the whole of it."""
+        if self.none:
+            return pair
         count = len(self.inward)
         read = csr_array((np.ones(count), (np.arange(count), self.inward)), shape=(count, count))
         return replace(

@@ -124,9 +124,9 @@ class StickInterface(OppositeBodies):
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
-        places = [sliding.placement(phase) for phase in sliding.motion.phases] if moves else []
-        self.whole_strip, swept = middle.strip, [pair(middle.punch, middle.strip, there) for there in {HERE, *places}]
-        self.border = Border.of_swept(swept)
+        places = {sliding.placement(phase) for phase in sliding.motion.phases} - {HERE} if moves else set()
+        self.whole_strip = middle.strip
+        self.border = Border.of_swept([middle, *(pair(middle.punch, middle.strip, there) for there in places)])
         middle = self.border.on(middle, self.border.on_strip(middle.strip))
         self.layers = Layers(len(middle.weights))
         if case is not None:

@@ -17,11 +17,10 @@ from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.results.shakedown import shakedown_text
 from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
-from fenwear.stick.coulomb import touches
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.interface import meshed
 from fenwear.stick.records import TimeStepRecords
-from fenwear.stick.setup import partial_slip_problem
+from fenwear.stick.setup import partial_slip_problem, touches
 
 
 def check_text(case: Case, system: Tribosystem | None = None) -> str:

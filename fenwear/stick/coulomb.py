@@ -47,7 +47,7 @@ from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.jump import first_cycle, jumped
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
 from fenwear.stick.regrid import on_other_grid
-from fenwear.stick.setup import heated, stays_by_slip, unheated_problem
+from fenwear.stick.setup import heated, placed_by_slip, touches, unheated_problem
 from fenwear.stick.state import PartialSlipState
 
 
@@ -120,11 +120,6 @@ class StickSetup:
     meshes: float
     ends: Ends | None = None
     prepared: bool = True
-
-
-def touches(problem: PartialSlipProblem) -> bool:
-    """Return whether the load brings the surfaces together; collective."""
-    return problem.led(lambda: bool(problem.beginning().contact.closed.any()))
 
 
 class Coulomb:
@@ -239,9 +234,7 @@ def system_of(
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: a time step of the first cycle did not converge.
     """
-    problem = unheated_problem(case, bodies, fresh=fresh, condensed=condensed)
-    if problem.interface.moves and touches(problem) and stays_by_slip(problem, case):
-        problem = unheated_problem(case, bodies, fresh=fresh, moves=False)
+    problem = placed_by_slip(case, bodies, fresh=fresh, condensed=condensed)
     interface, fineness = meshed(problem.interface), None
     sliding = replace(interface.sliding, motion=_motion_at_rest(interface, case))
     placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case, passes=interface.moves)

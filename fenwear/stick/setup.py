@@ -49,9 +49,26 @@ def partial_slip_problem(
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
-    return heated(
-        unheated_problem(case, bodies or build_bodies(case, comm), steps, fresh=fresh, condensed=condensed), case
-    )
+    bodies = bodies or build_bodies(case, comm)
+    return heated(placed_by_slip(case, bodies, steps, fresh=fresh, condensed=condensed), case)
+
+
+def placed_by_slip(
+    case: Case,
+    bodies: Bodies,
+    steps: int | None = None,
+    *,
+    fresh: bool = False,
+    condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
+) -> PartialSlipProblem:
+    """Return the same without heat, its strip passing if it slips as far; collective.
+
+    Arguments as of `partial_slip_problem`, bodies being built.
+    """
+    problem = unheated_problem(case, bodies, steps, fresh=fresh, condensed=condensed)
+    if _asks_for_slip(problem, case) and touches(problem) and _slips_little(problem):
+        return unheated_problem(case, bodies, steps, fresh=fresh, moves=False)
+    return problem
 
 
 def unheated_problem(
@@ -134,7 +151,7 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
 def _moves(case: Case, surface: ContactSurface) -> bool:
     """Return whether the strip's surface passes under the punch: by default where it changes, and moves far enough.
 
-    Whether it slips so far is seen in the first cycle alone, see `stays_by_slip`.
+    Whether it slips so far is seen in the first cycle alone, see `placed_by_slip`.
     """
     motion = case.motion
     positions = getattr(motion, "positions", None)
@@ -147,18 +164,23 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
     return case.strip_changes and far_enough(case, surface)
 
 
-def stays_by_slip(problem: PartialSlipProblem, case: Case) -> bool:
-    """Return whether a strip that passes by default slips less than a node to each side in the first cycle; collective.
+def touches(problem: PartialSlipProblem) -> bool:
+    """Return whether the load brings the surfaces together; collective."""
+    return problem.led(lambda: bool(problem.beginning().contact.closed.any()))
+
+
+def _asks_for_slip(problem: PartialSlipProblem, case: Case) -> bool:
+    """Return whether a strip passes by default, as far as its supports tell."""
+    by_default = not isinstance(case.motion, Cycle) and getattr(case.motion, "positions", 2) is None
+    return problem.interface.moves and by_default
+
+
+def _slips_little(problem: PartialSlipProblem) -> bool:
+    """Return whether a strip slips less than a node to each side in the first cycle; collective.
 
     Where nodes stick, the strip's surface goes with the punch's, however far its supports go: what slips passes,
     by the mean over the pressure.
     """
-    if (
-        not problem.interface.moves
-        or isinstance(case.motion, Cycle)
-        or getattr(case.motion, "positions", 2) is not None
-    ):
-        return False
     return problem.led(lambda: _slipped(problem) <= SPACINGS * problem.interface.middle.pair.punch.spacing())
 
 

@@ -22,7 +22,7 @@ CORNERS = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8}
 
 
 def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int, owner: int | None = None) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Distribute the gmsh model of rank 0: its mesh, cell tags and facet tags.
+    """Distribute the gmsh model of rank 0, or what answers as one does: its mesh, cell tags and facet tags.
 
     Every rank gets as many cells, from left to right: always the same ones, unlike from a graph's
     partitioner; or one rank, the owner, gets all. dolfinx 0.9 has io.gmshio and returns three items,

@@ -129,6 +129,8 @@ def build_bodies(
     comm: MPI.Comm = MPI.COMM_WORLD,
     followed: WornDepths | None = None,
     warmed: tuple[Array, Array] | None = None,
+    *,
+    fresh: bool = False,
 ) -> Bodies:
     """Mesh both bodies and assemble them; collective.
 
@@ -138,6 +140,7 @@ def build_bodies(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         warmed: Temperatures of this rank's own nodes of both bodies that the materials' properties are taken at
             (owned,) each, K; by default the initial one.
+        fresh: Mesh them even where their meshes are kept on disk.
 
     Raises:
         CaseError: what only the geometry can tell is wrong, such as a missing group.
@@ -146,7 +149,7 @@ def build_bodies(
     check_operators(case)
     release(comm)  # what earlier systems have left
     known, owners = case.diffusion, _owners(case, comm)
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names)
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names, fresh)
     moved, made = (None, (None, None)) if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (

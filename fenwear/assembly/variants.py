@@ -41,7 +41,7 @@ def assemble(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
-        fresh: Condense the bodies and reduce their heat again, even where they are kept on disk.
+        fresh: Mesh and condense the bodies and reduce their heat again, even where all that is kept on disk.
         warmed: Temperatures of this rank's own nodes that the materials' properties are taken at; by default the
             initial one.
 
@@ -50,7 +50,7 @@ def assemble(
         MeshQualityError: an element does not survive the motion of its mesh.
     """
     law: ContactLaw = law_named(case.contact.law)
-    return law.of_bodies(case, build_bodies(case, comm, followed, warmed), heat=heat, fresh=fresh)
+    return law.of_bodies(case, build_bodies(case, comm, followed, warmed, fresh=fresh), heat=heat, fresh=fresh)
 
 
 def renewed(

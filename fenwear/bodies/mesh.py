@@ -10,6 +10,7 @@ axisymmetric model has r along x.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,8 +25,10 @@ from numpy.typing import NDArray
 
 from fenwear import compat
 from fenwear.arrays import Array, Mask
+from fenwear.bodies import kept
 from fenwear.bodies.constants import constants
 from fenwear.bodies.mesh_check import element_problems
+from fenwear.bodies.raw_mesh import GmshView, RawMesh, raw_mesh
 from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
@@ -41,6 +44,8 @@ MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, 
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
+# What makes the mesh of a .geo follow from more than its text and parameters.
+REACHES_OUT = re.compile(rb"Include|Merge|File|System|GetEnv|GetString|GetNumber|Onelab|Plugin")
 MOST_ELEMENTS = 1_000_000  # along one line: with more gmsh comes to no end
 TOLERANCE, SAME_POINT = "Geometry.Tolerance", 1e-8  # of the size of what gmsh compares points in: closer ones are one
 _largest = [
@@ -149,6 +154,7 @@ def build_meshes(
     owners: tuple[int, int] | None = None,
     known: Mapping[str, float] = NOTHING,
     names: Names = BY_ROLE,
+    fresh: bool = False,
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -160,25 +166,49 @@ def build_meshes(
         owners: The ranks that have the whole punch and the whole strip; by default all have parts of both.
         known: Values of parameters that a geometry may have and does not set itself.
         names: Of the bodies, which its groups may start with.
+        fresh: Mesh it even where the meshes are kept on disk.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
         StackError: there is no gmsh.
     """
-
-    def check() -> None:
-        find_geometry(geometry, folder)
-        _library()
-
-    on_root(comm, check)
+    made: list[RawMesh] = []
+    on_root(comm, lambda: made.extend(_meshed(geometry, find_geometry(geometry, folder), kind, known, names, fresh)))
     owned = owners or (None, None)
-    if comm.rank == 0:
-        with gmsh_model() as gmsh:
-            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names))
-            punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
-    else:
-        on_root(comm, lambda: None)
-        punch, strip = (_distribute(None, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
+    parts = zip(made or (None, None), BODIES, owned, strict=True)
+    punch, strip = (_distribute(raw, body, owner, comm, kind) for raw, body, owner in parts)
+    return punch, strip
+
+
+def _meshed(
+    geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float], names: Names, fresh: bool
+) -> tuple[RawMesh, RawMesh]:
+    """Return the meshes of the punch and the strip: those kept on disk, or gmsh's, which are kept; on one rank."""
+    parameters = _parameters(geometry, path, known)
+    content = path.read_bytes()
+    keep = kept.limit() > 0 and not (path.suffix == ".geo" and REACHES_OUT.search(content))
+    shape = (geometry.order, geometry.degree, kind, names, path.suffix, sorted(parameters.items()))
+    key = kept.common_key(MPI.COMM_SELF, [kept.surroundings(), *shape, content]) if keep else ""
+    stored = kept.load(MPI.COMM_SELF, key) if keep and not fresh else None
+    if stored is not None:
+        _check_size(float(stored.pop("contact_nodes")))
+        punch, strip = (
+            RawMesh.of_arrays(
+                {name.removeprefix(body): array for name, array in stored.items() if name.startswith(body)}
+            )
+            for body in BODIES
+        )
+        return punch, strip
+    with gmsh_model() as gmsh:
+        contact_nodes = _load(gmsh, geometry, path, kind, parameters, names)
+        punch, strip = (raw_mesh(gmsh, body, _dim(kind)) for body in BODIES)
+    if keep:
+        arrays = {
+            f"{body}{name}": a
+            for body, raw in zip(BODIES, (punch, strip), strict=True)
+            for name, a in raw.arrays().items()
+        }
+        kept.save(MPI.COMM_SELF, key, {**arrays, "contact_nodes": np.array(contact_nodes)})
     return punch, strip
 
 
@@ -200,8 +230,9 @@ def write_msh(
         CaseError: as `build_meshes`; or `path` cannot be written.
         OutputError: there is no room for it.
     """
+    geo = find_geometry(geometry, folder)
     with gmsh_model() as gmsh:
-        _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names)
+        _load(gmsh, geometry, geo, kind, _parameters(geometry, geo, known), names)
         _name_groups(gmsh, names.by_name)
         try:
             path.touch()
@@ -242,35 +273,38 @@ def gmsh_model() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float], names: Names) -> None:
-    """Read and mesh the geometry in the current gmsh model, name its groups by roles, and check the contract."""
+def _load(
+    gmsh: Any, geometry: Geometry, path: Path, kind: Kind, parameters: Mapping[str, float], names: Names
+) -> float:
+    """Read and mesh the geometry in the current gmsh model, name its groups by roles, and check the contract.
+
+    Returns:
+        About how many contact nodes a solid has; 0 of others.
+    """
     gmsh.parser.clear()
-    defined = _checked_parameters(geometry, path)
-    asked_for = {name: value for name, value in known.items() if name in defined}
-    for name, value in {**asked_for, **geometry.parameters}.items():
+    for name, value in parameters.items():
         gmsh.parser.setNumber(name, [value])
     gmsh.option.setNumber(SCALING, 1.0)  # not of a geometry that was read before
-    too_large = ""
+    contact_nodes = 0.0
     try:
         _merge(gmsh, path)
         _by_roles(gmsh, path, names)
         if path.suffix == ".geo":
             if kind == "solid":
                 gmsh.model.mesh.generate(2)
-                too_large = _too_large(gmsh, geometry)
-            if not too_large:
-                gmsh.model.mesh.generate(_dim(kind))
-                gmsh.model.mesh.setOrder(geometry.order)
-                factor = gmsh.option.getNumber(SCALING)  # gmsh itself would apply it to files alone
-                gmsh.model.mesh.affineTransform([factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0])
-                gmsh.option.setNumber(SCALING, 1.0)
+                contact_nodes = _contact_nodes(gmsh, geometry)
+                _check_size(contact_nodes)
+            gmsh.model.mesh.generate(_dim(kind))
+            gmsh.model.mesh.setOrder(geometry.order)
+            factor = gmsh.option.getNumber(SCALING)  # gmsh itself would apply it to files alone
+            gmsh.model.mesh.affineTransform([factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0])
+            gmsh.option.setNumber(SCALING, 1.0)
     except CaseError:
         raise
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
-    if too_large:
-        raise CaseError(InputError("geometry", too_large))
     _check_groups(gmsh, path, kind)
+    return contact_nodes
 
 
 def _by_roles(gmsh: Any, path: Path, names: Names) -> None:
@@ -295,23 +329,31 @@ def _name_groups(gmsh: Any, change: Callable[[str], str]) -> None:
                 gmsh.model.setPhysicalName(dim, tag, new)
 
 
-def _too_large(gmsh: Any, geometry: Geometry) -> str:
-    """Say that the contact of the meshed surfaces alone would not fit into memory, before the bodies are meshed."""
-    free = free_memory()
-    if free is None:
-        return ""
+def _contact_nodes(gmsh: Any, geometry: Geometry) -> float:
+    """Return about how many contact nodes the meshed surfaces have."""
     nodes = 0.0
     tags = [tag for name, tag in _groups(gmsh, 2).items() if name == "punch_contact" or _contact_name("punch", name)]
     for entity in (entity for tag in tags for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag)):
         for cell, cells in zip(*gmsh.model.mesh.getElements(2, entity)[:2], strict=True):
             nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**2)
-    least = MATRICES * 8 * nodes**2
-    if least <= free:
-        return ""
-    return (
-        f"about {nodes:,.0f} contact nodes take {memory_size(least)} at least, but {memory_size(free)} are free; "
-        f"elements {(least / free) ** 0.25:.2g} times as large at the contact might fit"
+    return nodes
+
+
+def _check_size(contact_nodes: float) -> None:
+    """Refuse what would not fit into memory with its contact alone, before bodies are meshed.
+
+    Raises:
+        CaseError: it has too many contact nodes.
+    """
+    free = free_memory()
+    least = MATRICES * 8 * contact_nodes**2
+    if free is None or least <= free:
+        return
+    message = (
+        f"about {contact_nodes:,.0f} contact nodes take {memory_size(least)} at least, but {memory_size(free)} are "
+        f"free; elements {(least / free) ** 0.25:.2g} times as large at the contact might fit"
     )
+    raise CaseError(InputError("geometry", message))
 
 
 def _merge(gmsh: Any, path: Path) -> None:
@@ -332,6 +374,16 @@ def _merge(gmsh: Any, path: Path) -> None:
     errors = [m.removeprefix("Error: ") for m in messages if m.startswith("Error: ")]
     if errors:
         raise RuntimeError(errors[0])
+
+
+def _parameters(geometry: Geometry, path: Path, known: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters of a .geo file that are set: by the case, or known of what the file asks for.
+
+    Raises:
+        CaseError: the file does not define one by DefineConstant, or too many elements are asked for.
+    """
+    defined = _checked_parameters(geometry, path)
+    return {**{name: value for name, value in known.items() if name in defined}, **geometry.parameters}
 
 
 def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
@@ -425,26 +477,12 @@ def _solid_types(gmsh: Any) -> list[str]:
     return problems
 
 
-def _distribute(gmsh: Any, body: str, owner: int | None, comm: MPI.Comm, kind: Kind) -> BodyMesh:
-    """Distribute one body's part of rank 0's gmsh model over the ranks, or the whole to its owner; collective."""
-    top = _dim(kind)
-    groups: list[dict[str, int]] = [{} for _ in range(top + 1)]
-    points: dict[str, NDArray[np.float64]] = {}
-    model = None
-    if gmsh is not None:
-        model = gmsh.model
-        for dim in range(top + 1):
-            groups[dim] = {n: t for n, t in _groups(gmsh, dim).items() if n.startswith(f"{body}_")}
-        for name, tag in groups[0].items():
-            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :top]
-        both = model.getCurrent()
-        _isolate(gmsh, body, groups)
-    *_, curves, regions = comm.bcast(groups)
-    points = comm.bcast(points)
-    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, top, owner)
-    if gmsh is not None:
-        gmsh.model.remove()
-        gmsh.model.setCurrent(both)
+def _distribute(raw: RawMesh | None, body: str, owner: int | None, comm: MPI.Comm, kind: Kind) -> BodyMesh:
+    """Distribute rank 0's mesh of one body over the ranks, or the whole to its owner; collective."""
+    *_, curves, regions = comm.bcast(None if raw is None else raw.groups)
+    points = comm.bcast(None if raw is None else raw.points)
+    model = None if raw is None else GmshView(raw)
+    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, _dim(kind), owner)
     return _with_contacts(BodyMesh(body, mesh, cell_tags, facet_tags, regions, curves, points))
 
 
@@ -462,29 +500,3 @@ def _with_contacts(body: BodyMesh) -> BodyMesh:
         curves={**curves, f"{body.name}_contact": whole},
         contacts={name: tags.find(tag) for name, tag in sorted(named.items())},
     )
-
-
-def _isolate(gmsh: Any, body: str, groups: list[dict[str, int]]) -> None:
-    """Make a model of the body's groups alone current: dolfinx wants nodes numbered without gaps."""
-    model, whole = gmsh.model, len(groups) - 1
-    node_tags, coordinates, _ = model.mesh.getNodes()
-    parts = [
-        (dim, tag, model.mesh.getElements(dim, entity))
-        for dim in (whole, whole - 1)
-        for tag in groups[dim].values()
-        for entity in model.getEntitiesForPhysicalGroup(dim, tag)
-    ]
-    used = np.unique(np.concatenate([nodes for dim, _, (_, _, lists) in parts if dim == whole for nodes in lists]))
-    position = np.argsort(node_tags)[np.searchsorted(np.sort(node_tags), used)]
-    model.add(body)
-    entities: dict[tuple[int, int], list[int]] = {}
-    for number, (dim, tag, (types, _, nodes)) in enumerate(parts, start=1):
-        model.addDiscreteEntity(dim, number)
-        if number == 1:
-            count = np.arange(1, len(used) + 1)
-            model.mesh.addNodes(dim, number, count, np.asarray(coordinates).reshape(-1, 3)[position].ravel())
-        for kind, connectivity in zip(types, nodes, strict=True):
-            model.mesh.addElementsByType(number, kind, [], np.searchsorted(used, connectivity) + 1)
-        entities.setdefault((dim, tag), []).append(number)
-    for (dim, tag), numbers in entities.items():
-        model.addPhysicalGroup(dim, numbers, tag)

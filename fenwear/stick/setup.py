@@ -49,7 +49,7 @@ def partial_slip_problem(
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
-    bodies = bodies or build_bodies(case, comm)
+    bodies = bodies or build_bodies(case, comm, fresh=fresh)
     return heated(placed_by_slip(case, bodies, steps, fresh=fresh, condensed=condensed), case)
 
 

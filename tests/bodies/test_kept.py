@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble, load_case
-from fenwear.bodies import factor, kept, substructure
+from fenwear import Case, CaseError, Tribosystem, assemble, load_case
+from fenwear.assembly.bodies import build_bodies
+from fenwear.bodies import factor, kept, mesh, substructure
+from fenwear.bodies.ready import meshes_folder
+from fenwear.case import Geometry
 from fenwear.heat import fitted, passing_strip
 from fenwear.heat.field import ReducedBasis
 
@@ -84,21 +87,65 @@ def test_only_what_a_change_leaves_is_taken(
     assert same(changed, setup(setting)[0])
 
 
+@pytest.fixture
+def meshed(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """Return meshed(case, *settings): how often gmsh is called for a case; what is kept is in a folder of the test."""
+    opened: list[object] = []
+    open_model = mesh.gmsh_model
+    monkeypatch.setattr(mesh, "gmsh_model", lambda: (opened.append(1), open_model())[1])
+
+    def meshed(case: Case, *, fresh: bool = False) -> int:
+        opened.clear()
+        build_bodies(case, fresh=fresh)
+        return MPI.COMM_WORLD.bcast(len(opened))
+
+    return meshed
+
+
+@pytest.mark.parametrize(
+    ("setting", "count"),
+    [
+        ("materials.steel.young=2.1e5", 0),
+        ("geometry.parameters.strip_height=90", 1),
+        ("model.plane='strain'", 1),
+        ("geometry.order=2", 1),
+    ],
+)
+@pytest.mark.mpi("geometry.order=2-1")
+def test_meshes_are_kept_too(meshed: Callable[..., int], setting: str, count: int) -> None:
+    """And made again by --fresh, or where they are others."""
+    case, changed = (load_case("example1", [*SMALL, *more]) for more in ([], [setting]))
+    assert (meshed(case), meshed(case), meshed(case, fresh=True)) == (1, 0, 1)
+    assert (meshed(changed), meshed(changed)) == (count, 0)
+
+
+@pytest.mark.parametrize("name", ["own.geo", "part.geo"])
+def test_a_geometry_that_has_changed_is_meshed_again(meshed: Callable[..., int], tmp_path: Path, name: str) -> None:
+    """Its own text, and that of what it includes, which nothing is kept of."""
+    text = (meshes_folder() / "punch_on_strip.geo").read_text("utf-8")
+    (tmp_path / "part.geo").write_text(text, "utf-8")
+    (tmp_path / "own.geo").write_text(text if name == "own.geo" else 'Include "part.geo";', "utf-8")
+    case = load_case("example1").model_copy(update={"geometry": Geometry(file="own.geo")}).at(tmp_path)
+    assert (meshed(case), meshed(case)) == ((1, 0) if name == "own.geo" else (1, 1))
+    (tmp_path / name).write_text(text.replace("100", "90"), "utf-8")
+    assert meshed(case) == 1
+
+
 @pytest.mark.parametrize("damage", ["cut", "changed", "emptied", "another"])
 @pytest.mark.mpi("changed")
 def test_a_broken_file_is_computed_again(setup: Setup, damage: str) -> None:
     """On every rank, though one of them alone finds it broken."""
     first, _ = setup()
     if MPI.COMM_WORLD.rank == 0:
-        path = sorted(kept.folder().glob("*-0of*.npz"))[0]
-        content = bytearray(path.read_bytes())
-        content[len(content) // 2] ^= 255
-        path.write_bytes(
-            {"cut": bytes(content[:900]), "changed": bytes(content), "emptied": b"", "another": b"text"}[damage]
-        )
+        for path in kept.folder().glob("*-0of*.npz"):  # the meshes among them
+            content = bytearray(path.read_bytes())
+            content[len(content) // 2] ^= 255
+            path.write_bytes(
+                {"cut": bytes(content[:900]), "changed": bytes(content), "emptied": b"", "another": b"text"}[damage]
+            )
     MPI.COMM_WORLD.Barrier()
     again, count = setup()
-    assert count == 1
+    assert count == 2
     assert same(first, again)
     assert setup()[1] == 0
 
@@ -127,15 +174,15 @@ def test_the_longest_unused_goes_first(setup: Setup, monkeypatch: pytest.MonkeyP
     setup()
     for path in kept.files():
         os.utime(path, (1.0, 1.0))
-    old, largest = set(kept.files()), max(path.stat().st_size for path in kept.files())
+    room = 1.01 * kept.size()
     left = kept.folder() / "killed.tmp"
     left.write_text("a part")
     os.utime(left, (1.0, 1.0))
-    monkeypatch.setenv(kept.LIMIT, str(2.5 * largest / 2**30))
+    monkeypatch.setenv(kept.LIMIT, str(room / 2**30))
     setup("materials.steel.young=2.1e5")
     assert kept.size() <= kept.limit()
     assert not left.exists()
-    assert not old & set(kept.files())
+    assert all(path.stat().st_mtime > 1.0 for path in kept.files())
 
 
 @pytest.mark.parametrize("text", ["much", "-1", "nan"])

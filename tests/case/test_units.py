@@ -1,10 +1,11 @@
 """Quantities with units."""
 
+import itertools
 import math
 
 import pytest
 
-from fenwear.case.units import USUAL_UNITS, convert, quantity_text, registry
+from fenwear.case.units import POWERS, USUAL_UNITS, _power_of_ten, convert, quantity_text, registry
 
 
 @pytest.mark.parametrize(
@@ -94,3 +95,15 @@ def test_usual_units_are_those_of_the_whole_list() -> None:
         there = [one.Quantity(3.0, one.parse_units(name)).to_root_units() for one in (usual, whole)]
         assert f"{there[0].units:C}" == f"{there[1].units:C}", name
         assert there[0].magnitude == pytest.approx(there[1].magnitude, rel=1e-14), name
+
+
+def test_powers_of_ten_are_those_of_pint() -> None:
+    """Of every two multiples of one unit, or of 1 over it; others are left to pint."""
+    known, units = registry(usual=True), ("m", "g", "s", "N", "Pa", "J", "W", "K")
+    for unit, one, other in itertools.product(units, POWERS, POWERS):
+        for given, wanted in ((f"{one}{unit}", f"{other}{unit}"), (f"1/{one}{unit}", f"{other}{unit}^-1")):
+            ratio = known.Quantity(1.0, known.parse_units(given)).to(wanted).magnitude
+            assert 10.0 ** _power_of_ten(given, wanted) == pytest.approx(ratio, rel=1e-14), (given, wanted)
+        assert _power_of_ten(f"{one}{unit}", f"{other}{unit}^-1") is None
+    assert not any(_power_of_ten(*pair) for pair in itertools.permutations(units, 2))
+    assert _power_of_ten("m", "mN") is _power_of_ten("m", "N") is _power_of_ten("mm^2", "mm") is None

@@ -1,0 +1,159 @@
+"""The mesh of one body as gmsh has made it, in arrays: kept on disk, and read by dolfinx as a model of gmsh is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Elements of one kind on one entity of a group.
+
+    Attributes:
+        dim: Of the group.
+        group: Its tag.
+        kind: gmsh's number of the kind of element.
+        nodes: Of each element in gmsh's order, counted from 0 (elements, nodes).
+    """
+
+    dim: int
+    group: int
+    kind: int
+    nodes: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """The mesh of one body on one rank.
+
+    Attributes:
+        x: Of the nodes (n, 3), mm.
+        elements: Of the regions and of the groups of their facets.
+        groups: Tags of the groups by their names, of each dimension.
+        points: Coordinates (count, dim) of each group of points, mm.
+    """
+
+    x: Array
+    elements: tuple[Elements, ...]
+    groups: list[dict[str, int]]
+    points: dict[str, Array]
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all of it as arrays, to be kept."""
+        named = {
+            "groups": self.groups,
+            "points": {name: x.tolist() for name, x in self.points.items()},
+            "kinds": [(one.dim, one.group, one.kind) for one in self.elements],
+        }
+        return {
+            "x": self.x,
+            "named": np.frombuffer(json.dumps(named).encode(), dtype=np.uint8),
+            **{f"elements{number}": one.nodes for number, one in enumerate(self.elements)},
+        }
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> RawMesh:
+        """Return the mesh of `arrays`."""
+        named = json.loads(bytes(arrays["named"]))
+        elements = (
+            Elements(dim, group, kind, arrays[f"elements{number}"])
+            for number, (dim, group, kind) in enumerate(named["kinds"])
+        )
+        points = {name: np.array(x) for name, x in named["points"].items()}
+        return cls(arrays["x"], tuple(elements), named["groups"], points)
+
+
+class GmshView:
+    """A mesh as dolfinx reads a model of gmsh, by the names and with the answers that gmsh's functions have.
+
+    Each of its elements' arrays is an entity, counted from 1.
+    """
+
+    def __init__(self, mesh: RawMesh) -> None:
+        self.raw = mesh
+
+    @property
+    def mesh(self) -> GmshView:
+        """What gmsh has under this name."""
+        return self
+
+    def getPhysicalGroups(self, dim: int = -1) -> list[tuple[int, int]]:  # noqa: N802
+        """Return the dimension and tag of the groups."""
+        return sorted({(one.dim, one.group) for one in self.raw.elements if dim in (-1, one.dim)})
+
+    def getPhysicalName(self, dim: int, tag: int) -> str:  # noqa: N802
+        """Return the name of a group."""
+        return next(name for name, own in self.raw.groups[dim].items() if own == tag)
+
+    def getEntitiesForPhysicalGroup(self, dim: int, tag: int) -> list[int]:  # noqa: N802
+        """Return the entities of a group."""
+        found = enumerate(self.raw.elements, start=1)
+        return [entity for entity, one in found if (one.dim, one.group) == (dim, tag)]
+
+    def getNodes(self) -> tuple[NDArray[np.int64], Array, Array]:  # noqa: N802
+        """Return the tags of the nodes and their coordinates, one after the other."""
+        return np.arange(1, len(self.raw.x) + 1), self.raw.x.ravel(), np.empty(0)
+
+    def getElements(self, dim: int = -1, tag: int = -1) -> tuple[list[int], list[Any], list[Any]]:  # noqa: N802
+        """Return the kinds of the elements of an entity, or of all, with their tags and their nodes."""
+        found: dict[int, tuple[list[Any], list[Any]]] = {}
+        for one, tags in self._tagged(dim, tag):
+            of_kind = found.setdefault(one.kind, ([], []))
+            of_kind[0].append(tags)
+            of_kind[1].append(one.nodes.ravel() + 1)
+        joined = [(np.concatenate(tags), np.concatenate(nodes)) for tags, nodes in found.values()]
+        return list(found), [of_kind[0] for of_kind in joined], [of_kind[1] for of_kind in joined]
+
+    def getElementProperties(self, kind: int) -> tuple[str, int, int, int, Array, int]:  # noqa: N802
+        """Return of a kind of element what is asked for: its dimension, second, and the number of its nodes, fourth."""
+        one = next(one for one in self.raw.elements if one.kind == kind)
+        return "", one.dim, 0, one.nodes.shape[1], np.empty(0), 0
+
+    def _tagged(self, dim: int, entity: int) -> Iterator[tuple[Elements, NDArray[np.int64]]]:
+        """Find elements by dimension and entity, -1 for all of them, with their tags."""
+        first = 1
+        for number, one in enumerate(self.raw.elements, start=1):
+            tags = np.arange(first, first + len(one.nodes))
+            first += len(one.nodes)
+            if dim in (-1, one.dim) and entity in (-1, number):
+                yield one, tags
+
+
+def raw_mesh(gmsh: Any, body: str, whole: int) -> RawMesh:
+    """Return the part of a body of gmsh's current model, its nodes numbered without gaps.
+
+    Args:
+        gmsh: The module.
+        body: "punch" or "strip": what the names of its groups start with.
+        whole: Dimension of the bodies.
+    """
+    model = gmsh.model
+    groups: list[dict[str, int]] = []
+    for dim in range(whole + 1):
+        named = {model.getPhysicalName(dim, tag): tag for _, tag in model.getPhysicalGroups(dim)}
+        groups.append({name: tag for name, tag in named.items() if name.startswith(f"{body}_")})
+    points = {
+        name: np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :whole]
+        for name, tag in groups[0].items()
+    }
+    parts = [
+        (dim, tag, kind, np.asarray(nodes).reshape(len(elements), -1))
+        for dim in (whole, whole - 1)
+        for tag in groups[dim].values()
+        for entity in model.getEntitiesForPhysicalGroup(dim, tag)
+        for kind, elements, nodes in zip(*model.mesh.getElements(dim, entity), strict=True)
+    ]
+    node_tags, coordinates, _ = model.mesh.getNodes()
+    used = np.unique(np.concatenate([nodes.ravel() for dim, _, _, nodes in parts if dim == whole]))
+    position = np.argsort(node_tags)[np.searchsorted(np.sort(node_tags), used)]
+    x = np.asarray(coordinates).reshape(-1, 3)[position]
+    elements = (Elements(dim, tag, int(kind), np.searchsorted(used, nodes)) for dim, tag, kind, nodes in parts)
+    return RawMesh(x, tuple(elements), groups, points)

@@ -30,7 +30,7 @@ import scipy.fft
 from numpy.typing import DTypeLike, NDArray
 
 from fenwear.arrays import Array
-from fenwear.interface.convolution import Box, Convolution, back, forward, in_cache
+from fenwear.interface.convolution import Box, Convolution, back, forward, in_cache, over_period
 
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
 SAME = 1e-12  # of symbols
@@ -70,11 +70,9 @@ class EndlessGrid:
     def __init__(self, of: Convolution, box: Box, passing: Sequence[Passing] | None) -> None:
         self.box = box
         self.period = tuple(scipy.fft.next_fast_len(int(MARGIN * count) + 2, real=True) for count in box.counts)
-        reach = [min(b - 1, (size - 1) // 2) for b, size in zip(box.counts, self.period, strict=True)]
-        cut = tuple(slice(m - 1 - r, m + r) for m, r in zip(of.shape, reach, strict=True))
-        wrapped = np.zeros(self.period)
-        wrapped[np.ix_(*(np.arange(-r, r + 1) % s for r, s in zip(reach, self.period, strict=True)))] = of.numbers[cut]
-        symbol = _rows(scipy.fft.rfftn(wrapped)).real * float(of.weights.max())
+        cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, box.counts, strict=True))
+        waves = scipy.fft.rfftn(over_period(of.numbers[cut], self.period))
+        symbol = _rows(waves).real * float(of.weights.max())
         symbol += 0.0 if of.local is None else float(of.local.mean())
         self._symbol = np.maximum(symbol, LEAST * np.median(np.abs(symbol)))
         self._read = self._put = None

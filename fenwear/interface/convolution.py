@@ -216,10 +216,8 @@ class OnBox:
         return of.numbers[cut]
 
     def _transformed(self, of: Convolution) -> NDArray[np.complexfloating[Any, Any]]:
-        wrapped = np.zeros(self.size)
-        to = np.ix_(*(np.arange(1 - b, b) % size for b, size in zip(self.box.counts, self.size, strict=True)))
-        wrapped[to] = self.numbers(of)
-        return np.asarray(scipy.fft.rfftn(wrapped)).astype(np.result_type(self._dtype, np.complex64))
+        waves = scipy.fft.rfftn(over_period(self.numbers(of), self.size))
+        return np.asarray(waves).astype(np.result_type(self._dtype, np.complex64))
 
     def apply(self, x: Array) -> Array:
         """Return the gaps (m, ...) of pressures (m, ...) of each convolution, in the box."""
@@ -259,6 +257,27 @@ def back(image: NDArray[np.complexfloating[Any, Any]], size: Sequence[int], coun
     if len(size) == 2:
         image = scipy.fft.ifft(image, axis=1, overwrite_x=True)[:, : counts[0]]
     return np.asarray(scipy.fft.irfft(image, size[-1], axis=-1, overwrite_x=True)[..., : counts[-1]])
+
+
+def over_period(numbers: Array, size: Sequence[int]) -> Array:
+    """Return numbers at all distances (..., 2 m - 1, ...) over a period, their zero distance first.
+
+    Farther ones than half a period are left out. Half a period away both ways are one place, with the mean of both:
+    without it the shortest waves would have next to nothing of what does not change along a line.
+    """
+    axes = len(size)
+    for k, period in enumerate(size):
+        axis = numbers.ndim - axes + k
+        middle = numbers.shape[axis] // 2
+        reach = min(middle, period // 2)
+        lines = np.moveaxis(numbers, axis, 0)[middle - reach : middle + reach + 1]
+        found: Array = np.zeros((period, *lines.shape[1:]))
+        if 2 * reach == period:
+            found[reach] = (lines[0] + lines[-1]) / 2
+            lines, reach = lines[1:-1], reach - 1
+        found[: reach + 1], found[period - reach :] = lines[reach:], lines[:reach]
+        numbers = np.moveaxis(found, 0, axis)
+    return numbers
 
 
 class _Smooth:

@@ -21,12 +21,13 @@ from numpy.typing import DTypeLike, NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.tensor import TensorWeights
-from fenwear.interface.convolution import back, forward
+from fenwear.interface.convolution import back, forward, over_period
 
 SAME = 1e-9  # of a frame: one frame; of tables: none
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
 WASTE = 1.3  # of a box: how much larger than needed along an axis it may be
-MARGIN = {1: 2.0, 2: 1.25}  # of a line, of a rectangle: the period of what is inverted, which does not end
+STIFF = 3.0, 20.0  # of tangents, over what a node's own traction moves it
+MARGIN = {1: 2.0, 2: 1.0}  # of a line, of a rectangle: the period of what is inverted, which does not end
 Waves = NDArray[np.complexfloating[Any, Any]]
 Mixed = tuple[TensorWeights, Array]  # L, and what forces at points do along each axis (k, a, k, d)
 
@@ -91,18 +92,13 @@ class FrameConvolution:
     def _size(self) -> tuple[int, ...]:
         return tuple(scipy.fft.next_fast_len(2 * count - 1, real=True) for count in self.counts)
 
-    def kernel(self, size: Sequence[int], reach: Sequence[int]) -> Waves:
-        """Return the waves of the tables up to a distance, over a period."""
-        cut = tuple(slice(m - 1 - r, m + r) for m, r in zip(self.counts, reach, strict=True))
-        wrapped = np.zeros((self.d, self.d, *size))
-        to = np.ix_(*(np.arange(-r, r + 1) % s for r, s in zip(reach, size, strict=True)))
-        into: tuple[Any, ...] = (slice(None), slice(None), *to)
-        wrapped[into] = self.table[(slice(None), slice(None), *cut)]
-        return np.asarray(scipy.fft.rfftn(wrapped, axes=range(2, 2 + len(size))))
+    def kernel(self, size: Sequence[int]) -> Waves:
+        """Return the waves of the tables over a period."""
+        return np.asarray(scipy.fft.rfftn(over_period(self.table, size), axes=range(2, 2 + len(size))))
 
     @cached_property
     def _kernels(self) -> dict[Any, Waves]:
-        return {np.dtype(np.float64): self.kernel(self._size, [count - 1 for count in self.counts])}
+        return {np.dtype(np.float64): self.kernel(self._size)}
 
     def spread(self, values: Array) -> Array:
         """Return values at the nodes (..., n) on the grid, zero where no node is (..., m, ...)."""
@@ -131,7 +127,7 @@ class FrameConvolution:
     def on_grid(self, fields: Array) -> Array:
         """Return the displacements (d, m, ...) of tractions (d, m, ...), in their precision."""
         force = fields * self._areas.astype(fields.dtype)
-        found = self.through(_in_precision(self._kernels, fields.dtype), self._size, force)
+        found = self.through([(_in_precision(self._kernels, fields.dtype), force, range(self.d))], self._size)
         if not force.any():
             return found
         for factors, response in self._factors:
@@ -140,27 +136,32 @@ class FrameConvolution:
             found[0] += self.spread(self.local).astype(fields.dtype) * fields[0]
         return found
 
-    def through(self, waves: Waves, size: Sequence[int], fields: Array) -> Array:
-        """Return what waves make of fields (d, m, ...) over a period: of the components that act on each other alone.
+    def through(self, parts: Sequence[tuple[Waves, Array, Sequence[int]]], size: Sequence[int]) -> Array:
+        """Return what waves make of fields over a period (d, m, ...), all of them added: of what acts on each other.
 
         Args:
-            waves: Of component a by component b, where `pairs` has them (d, d, ...).
+            parts: Waves, of component a by component b, where `pairs` has them (d, d, ...); and fields (k, m, ...), in
+                whose precision the result is, of these components.
             size: The period.
-            fields: In whose precision the result is.
         """
-        found: Array = np.zeros_like(fields)
-        acting = [b for b in range(self.d) if fields[b].any()]
-        if not acting:
-            return found
-        image = forward(fields[acting], size)
-        seen = [a for a in range(self.d) if any(b in self.pairs[a] for b in acting)]
-        moved = np.empty((len(seen), *image.shape[1:]), dtype=image.dtype)
-        for row, a in enumerate(seen):
-            by = [(k, b) for k, b in enumerate(acting) if b in self.pairs[a]]
-            np.multiply(waves[a, by[0][1]], image[by[0][0]], out=moved[row])
-            for k, b in by[1:]:
-                moved[row] += waves[a, b] * image[k]
-        found[seen] = back(moved, size, self.counts)
+        found: Array = np.zeros((self.d, *self.counts), dtype=parts[0][1].dtype)
+        moved = dict[int, Waves]()
+        for waves, fields, components in parts:
+            acting = [k for k, field in enumerate(fields) if field.any()]
+            if not acting:
+                continue
+            image = forward(fields if len(acting) == len(fields) else fields[acting], size)
+            for k, wave in zip(acting, image, strict=True):
+                for a in range(self.d):
+                    b = components[k]
+                    if b not in self.pairs[a]:
+                        continue
+                    if a in moved:
+                        moved[a] += waves[a, b] * wave
+                    else:
+                        moved[a] = waves[a, b] * wave
+        if moved:
+            found[list(moved)] = back(np.array(list(moved.values())), size, self.counts)
         return found
 
     def _add(self, factors: tuple[Array, ...], response: Array, force: Array, to: Array) -> None:
@@ -240,6 +241,8 @@ class _Box:
 class EndlessFrame:
     """The inverse of C on an endless grid: each wave by itself; restricted to nodes in contact, near what these have.
 
+    It is known with tangents that give way besides, too, by `STIFF` times what a node's own traction moves it.
+
     Args:
         of: The compliance.
     """
@@ -247,19 +250,37 @@ class EndlessFrame:
     def __init__(self, of: FrameConvolution) -> None:
         self.of, margin = of, MARGIN[len(of.counts)]
         self.period = tuple(scipy.fft.next_fast_len(int(margin * count) + 2, real=True) for count in of.counts)
-        reach = [min(b - 1, (size - 1) // 2) for b, size in zip(of.counts, self.period, strict=True)]
-        symbol = np.moveaxis(of.kernel(self.period, reach), (0, 1), (-2, -1)) * float(of.weights.max())
+        symbol = np.moveaxis(of.kernel(self.period), (0, 1), (-2, -1)) * float(of.weights.max())
         if of.local is not None:
             symbol[..., 0, 0] += float(of.local.mean())
         symbol = (symbol + symbol.conj().swapaxes(-2, -1)) / 2
         size, axes = np.linalg.eigh(symbol)
         size = np.maximum(size, LEAST * np.median(np.abs(size)))
-        inverse = (axes / size[..., None, :]) @ axes.conj().swapaxes(-2, -1)
-        self._inverse = {np.dtype(np.float64): np.ascontiguousarray(np.moveaxis(inverse, (-2, -1), (0, 1)))}
+        self._symbol = (axes * size[..., None, :]) @ axes.conj().swapaxes(-2, -1)
+        self._inverses: dict[float, dict[Any, Waves]] = {}
 
-    def solve(self, fields: Array) -> Array:
-        """Return the tractions (d, m, ...) of displacements (d, m, ...), in their precision."""
-        return self.of.through(_in_precision(self._inverse, fields.dtype), self.period, fields)
+    def _inverse(self, stiff: float, dtype: DTypeLike) -> Waves:
+        """Return the waves of the inverse where tangents give way besides."""
+        if stiff not in self._inverses:
+            symbol, tangents = self._symbol.copy(), range(1, self.of.d)
+            own = float(self.of.diagonal.reshape(self.of.d, -1)[1:].mean())
+            symbol[..., tangents, tangents] += stiff * own
+            inverse = np.moveaxis(np.linalg.inv(symbol), (-2, -1), (0, 1))
+            self._inverses[stiff] = {np.dtype(np.float64): np.ascontiguousarray(inverse)}
+        return _in_precision(self._inverses[stiff], dtype)
+
+    def solve(self, fields: Array, *stiff: Array | None) -> Array:
+        """Return the tractions (d, m, ...) of displacements (d, m, ...), in their precision.
+
+        Args:
+            fields: Where nothing gives way besides.
+            stiff: Along the tangents (d - 1, m, ...) where they do, of each of `STIFF`; None for nowhere.
+        """
+        parts = [(self._inverse(0.0, fields.dtype), fields, range(self.of.d))]
+        for size, own in zip(STIFF, stiff, strict=False):
+            if own is not None:
+                parts.append((self._inverse(size, fields.dtype), own, range(1, self.of.d)))
+        return self.of.through(parts, self.period)
 
 
 def _in_precision(kept: dict[Any, Waves], dtype: DTypeLike) -> Waves:

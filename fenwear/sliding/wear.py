@@ -63,6 +63,11 @@ class WornDepths:
         """Whether nothing lies between, creeps or is remembered."""
         return not (len(self.between) or len(self.crept) or len(self.carried))
 
+    def same(self, other: WornDepths) -> bool:
+        """Return whether all of it is equal to another's."""
+        mine, theirs = ((one.punch, one.strip, *one._kept) for one in (self, other))
+        return all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
+
     def times(self, factor: float) -> WornDepths:
         """Return all of it times a factor."""
         if self.plain:

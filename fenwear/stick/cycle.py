@@ -66,10 +66,13 @@ class PartialSlipProblem:
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self.conditions = StepConditions(interface, program, laws, heat, wear.strip is not None)
         self.losses = StepLosses(self.conditions, wear, coatings)
+        self._pressed: PartialSlipState | None = None  # unworn, under the case's loads, where the first cycle begins
 
     def watching(self, watch: Callable[[], object]) -> PartialSlipProblem:
         """Return the same with what is called before every time step."""
-        return self._with(watch=watch)
+        found = self._with(watch=watch)
+        found._pressed = self._pressed
+        return found
 
     def _with(self, **changed: Any) -> PartialSlipProblem:
         """Return the same with other arguments."""
@@ -111,7 +114,10 @@ class PartialSlipProblem:
 
     def driven(self, program: Program) -> PartialSlipProblem:
         """Return the same in other time steps, without heat."""
-        return self._with(program=program, heat=None)
+        found = self._with(program=program, heat=None)
+        if self.program.same_way(program):
+            found._pressed = self._pressed
+        return found
 
     @cached_property
     def reach(self) -> float:
@@ -151,7 +157,21 @@ class PartialSlipProblem:
         return self.led(partial(self._begun, shape, load))
 
     def _begun(self, shape: WornDepths | None, load: float) -> PartialSlipState:
-        interface, program, worn = self.interface, self.program, shape or self.unworn()
+        unworn = self.unworn()
+        as_made = load == 1.0 and (shape is None or shape.same(unworn))
+        at = self._pressed if as_made else None
+        if at is None:
+            at = self._pressed_to(shape or unworn, load)
+            if as_made:
+                self._pressed = at
+        at = self.forgotten(at)
+        if self.heat is None:
+            return at
+        return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(at.contact.pressure))
+
+    def _pressed_to(self, worn: WornDepths, load: float) -> PartialSlipState:
+        """Return the state in which the first cycle begins, at a shape and a factor of all loads."""
+        interface, program = self.interface, self.program
         given = interface.loaded(None if program.steps[-1].fraction is None else 0.0).times(load)
         loaded = self.expanded(given, 0.0)
         opening = self.opening(interface.middle, worn)
@@ -172,10 +192,7 @@ class PartialSlipProblem:
         at = PartialSlipState(state, replace(before, closure=None), worn, load=load)
         for step in program.lead_in:
             at = self._stepped(at, step)
-        at = self.forgotten(at)
-        if self.heat is None:
-            return at
-        return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
+        return at
 
     def opening(self, position: Position, worn: WornDepths) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""

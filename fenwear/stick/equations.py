@@ -134,6 +134,16 @@ class Step:
         """Which nodes may touch at first (n,)."""
         return np.ones(self.n, dtype=bool)
 
+    @cached_property
+    def going_on(self) -> Mask:
+        """Which nodes would slip on as their traction has them, if it stayed (n,): none where a motion turns back."""
+        if self.imposed.displacement is None:
+            return np.ones(self.n, dtype=bool)
+        before = self.before
+        f = np.concatenate([before.pressure, before.traction.T.ravel()])
+        _, slip = self.jumps(StatusSolution(f, before.rigid, self.imposed.displacement, 1))
+        return np.asarray((slip * before.traction).sum(axis=1) <= 0)
+
     def _crept(self, creep: StickCreep) -> tuple[Displaced, Displaced]:
         """Return what has crept at the end of the step but for what its tractions add, and at its start.
 

@@ -98,7 +98,13 @@ def _judged(
     problem: PartialSlipProblem, fine: PartialSlipProblem, of: Ends, splits: NDArray[np.bool_], tolerance: float
 ) -> tuple[float, NDArray[np.bool_] | None]:
     """Return what halving all steps changes, and which are to be halved; None where that is to end."""
-    local, change = _compare(_first_cycle(problem), _first_cycle(fine), of, problem.weights)
+    after, coarse = problem.cycle(problem.beginning())
+    begin = fine.beginning()
+    if after.pressures is not None and after.trials is not None:  # second halves end where their steps do
+        known = np.where(_last(of)[:, None], after.pressures[of], np.nan)
+        begin = replace(begin, pressures=known, trials=after.trials[of])
+    halves = TimeStepRecords.joined(fine.cycle(begin)[1])
+    local, change = _compare(TimeStepRecords.joined(coarse), halves, of, problem.weights)
     if change <= tolerance or local[~splits].sum() > tolerance:  # the finest steps alone are too coarse
         return change, None
     return change, _marked(local, splits)
@@ -139,10 +145,6 @@ def _halved(ends: Ends) -> tuple[Ends, Ends]:
 def _last(of: Ends) -> NDArray[np.bool_]:
     """Return which halves are the last of their steps."""
     return np.append(of[1:] != of[:-1], True)
-
-
-def _first_cycle(problem: PartialSlipProblem) -> TimeStepRecords:
-    return TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
 
 
 def _compare(coarse: TimeStepRecords, fine: TimeStepRecords, of: Ends, weights: Array) -> tuple[Array, float]:

@@ -144,6 +144,7 @@ def _newton(step: Step) -> StickState:
     """
     first = _status(step.before.pressure, step.before.trial, step.mu, step.hardness)
     first, none = first._replace(closed=first.closed & step.reachable), np.zeros_like(first.closed)
+    first = first._replace(slipping=first.slipping & step.going_on)
     starts = [first, first._replace(slipping=none), first._replace(closed=step.reachable, slipping=none, flowing=none)]
     failure = ConvergenceError("the contact with stick did not converge")
     for status in starts:

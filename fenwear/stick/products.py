@@ -25,6 +25,7 @@ from numpy.typing import DTypeLike, NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import flexible
 from fenwear.errors import ConvergenceError
+from fenwear.interface.frame_convolution import STIFF
 from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
@@ -37,10 +38,11 @@ ROUGH = {2: 1e-6, 3: 1e-2}  # of a residual that is left, at most: in the plane 
 AHEAD = 0.1  # of a residual that is left, over that of the laws: Newton's steps speed up
 NUMBERS = {2: np.float64, 3: np.float32}  # of the solutions by products
 FINEST = {2: 1e-10, 3: 2e-5}  # of a residual that may be left in them
+SLIGHT = 1e-3  # of tractions: changes whose displacements are known to as many digits as the laws ask for
 SHARE = 0.1  # of the residual of the laws that ends a step, in its last solution
 RESTART, RESTARTS = 80, 2
 FAR = 0.5  # of a residual that may be left: more is no solution
-STIFF = 1e8  # D over the diagonal of C, at most
+STIFFEST = 1e8  # D over the diagonal of C, at most
 LOOSE = "the contact with stick has a singular step: nothing holds the bodies as they slip"
 FLAT = 1e-6  # of the largest singular value: balances that nothing holds
 
@@ -95,7 +97,7 @@ class GridStep(Step):
             displacement = float(self.imposed.displacement or 0.0)
         x = piece.known(f)
         f = piece.tractions(x) + piece.fixed
-        jump = self.on.apply(f.ravel())
+        jump = self._jump(f.ravel(), last)
         found = StatusSolution(f.ravel(), rigid, displacement, 1, jump=jump)
         rest, forces = piece.residual(x, self._opened(found)), self._missing(found)
         closed = piece.closed
@@ -112,9 +114,17 @@ class GridStep(Step):
         loose = self.imposed.force is not None
         r = len(rigid)
         displacement += float(by[-1] * self.length) if loose else 0.0
-        jump = self.on.apply(f.ravel())
+        jump = self._jump(f.ravel(), found)
         self._last = StatusSolution(f.ravel(), rigid + by[:r] * self.units, displacement, 1, jump=jump)
         return self._last
+
+    def _jump(self, f: Array, known: StatusSolution | None) -> Array:
+        """Return what tractions (d n,) displace: of slight changes of known ones in less precision."""
+        if known is not None and known.jump is not None:
+            change = f - known.f
+            if np.abs(change).max() <= SLIGHT * np.abs(f).max():
+                return np.asarray(known.jump + self.on.apply(change.astype(NUMBERS[self.d])))
+        return self.on.apply(f)
 
     def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
         """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
@@ -186,8 +196,8 @@ class _Piece:
         scale = step.scale / step.length
         if step.m == 2:
             across = np.stack([-direction[1], direction[0]])
-            over = (size - status.radius) / np.maximum(status.radius, size / STIFF)
-            stiff[1:] = np.where(slips, scale[1:] * np.clip(over, 0.0, STIFF), 0.0)
+            over = (size - status.radius) / np.maximum(status.radius, size / STIFFEST)
+            stiff[1:] = np.where(slips, scale[1:] * np.clip(over, 0.0, STIFFEST), 0.0)
         if step.closure is not None:
             stiff[0] = np.where(closed, step.closure.slope(status.pressure) / step.length, 0.0)
         fixed = np.zeros((step.d, step.n))
@@ -202,12 +212,13 @@ class _Piece:
         rest = (self.across, self.slides, self.stiff, self.fixed)
         return _Piece(self.closed, self.pressed, self.kept, *(one.astype(dtype) for one in rest))
 
-    @cached_property
-    def on_closed(self) -> _Piece:
-        """The same on the nodes that touch alone."""
-        k = self.closed
-        rest = (self.across, self.slides, self.stiff, self.fixed)
-        return _Piece(np.arange(len(k), dtype=np.int64), self.pressed[k], self.kept[k], *(one[:, k] for one in rest))
+    def on_box(self, at: NDArray[np.int64], size: int) -> _Piece:
+        """The same over the places of a box, the nodes that touch at these of them."""
+        arrays = (self.across, self.slides, self.stiff, self.fixed)
+        masks, fields = (
+            [_spread(one[..., self.closed], at, size) for one in some] for some in ((self.pressed, self.kept), arrays)
+        )
+        return _Piece(at, *masks, *fields)
 
     def known(self, f: Array) -> Array:
         """Return the unknowns (d, n) that tractions have."""
@@ -241,13 +252,20 @@ class _Piece:
         return np.concatenate([(opened[0] * self.pressed)[None], self.unknown(opened)[1:] + self.stiff[1:] * x[1:]])
 
 
+def _spread(values: NDArray[Any], at: NDArray[np.int64], size: int) -> NDArray[Any]:
+    """Return values (..., k) at their places of a box, zero elsewhere (..., size)."""
+    found = np.zeros((*values.shape[:-1], size), dtype=values.dtype)
+    found[..., at] = values
+    return found
+
+
 class _Solver:
-    """The linear equations of a piece on the nodes that touch (k).
+    """The linear equations of a piece on a box around the nodes that touch (k), zero elsewhere.
 
     Args:
         step: What they are of.
         piece: The unknowns.
-        moved, held: Unit rigid modes and their forces there (r, d, k).
+        moved, held: Unit rigid modes and their forces at the nodes that touch (r, d, k).
 
     Raises:
         ConvergenceError: nothing holds the bodies.
@@ -255,13 +273,16 @@ class _Solver:
 
     def __init__(self, step: GridStep, piece: _Piece, moved: Array, held: Array) -> None:
         self.dtype: np.dtype[Any] = np.dtype(NUMBERS[step.d])
-        self.piece, self.length = piece.on_closed.of_numbers(self.dtype), float(step.length)
         if not len(piece.closed):
             raise ConvergenceError(LOOSE)
         self.on, self.at = step.on.around(piece.closed)
-        scale = step.scale[:, piece.closed] / step.length
-        self.shrunk = (1 / np.sqrt(1 + self.piece.stiff / scale)).astype(self.dtype)
-        moved, held = (np.asarray(one, dtype=self.dtype) for one in (moved, held))
+        self.fields, self.length = (self.on.d, int(np.prod(self.on.counts))), float(step.length)
+        self.cut = int(np.prod(self.fields))
+        boxed = piece.on_box(self.at, self.fields[1])
+        self.piece = boxed.of_numbers(self.dtype)
+        scale = step.scale[:, piece.closed].mean(axis=1)[:, None]
+        self._share(boxed.stiff * (step.length / scale))
+        moved, held = (_spread(one.astype(self.dtype), self.at, self.fields[1]) for one in (moved, held))
         self.moved = np.array([self.piece.unknown(one) for one in moved]).reshape(len(moved), -1)
         self.held = np.array([self._weighed(one) for one in held]).reshape(len(held), -1)
         self.by_moved = np.array([self._inverse(one) for one in self.moved]).reshape(self.moved.shape)
@@ -271,53 +292,55 @@ class _Solver:
             if not singular.min() > FLAT * max(singular.max(), 1e-300):
                 raise ConvergenceError(LOOSE)
 
+    def _share(self, over: Array) -> None:
+        """Share places out among the inverses with tangents that give way, by D / C_ii (d, size)."""
+        sizes = np.log(STIFF)
+        places = np.append(2 * sizes[0] - sizes[1], sizes)
+        at = np.interp(np.log(np.maximum(over[1:].max(axis=0), 1e-9)), places, np.arange(len(places)))
+        shares = np.clip(1 - np.abs(at - np.arange(len(places))[:, None]), 0.0, 1.0).astype(self.dtype)
+        self.shares, self.rest = [one if one.any() else None for one in shares[1:]], shares[0]
+        known = np.append(0.0, np.full(len(over) - 1, STIFF[-1]))[:, None]
+        self.shrunk = np.sqrt((1 + known) / np.maximum(1 + over, 1 + known)).astype(self.dtype)
+
     def _weighed(self, force: Array) -> Array:
-        """Return what forces of tractions (d, k) take of the unknowns: N^T."""
+        """Return what forces of tractions (d, size) take of the unknowns: N^T."""
         own = self.piece.unknown(force)
         own[0] += (self.piece.slides * force[1:]).sum(axis=0) * self.piece.pressed
         return own
 
-    def _grid(self, fields: Array) -> Array:
-        whole = np.zeros((self.on.d, int(np.prod(self.on.counts))), dtype=fields.dtype)
-        whole[:, self.at] = fields
-        return whole.reshape(self.on.d, *self.on.counts)
-
-    def _nodes(self, fields: Array) -> Array:
-        return np.asarray(fields.reshape(self.on.d, -1)[:, self.at])
-
     def _inverse(self, fields: Array) -> Array:
-        """Return what the endless grid makes of residuals (d k,): unknowns."""
-        shrunk = fields.reshape(self.on.d, -1) * self.shrunk
-        found: Array = self._nodes(self.on.endless.solve(self._grid(shrunk))) * (self.shrunk * self.length)
-        return np.asarray(self.piece.unknown(found)).ravel()
+        """Return what the endless grid makes of residuals (d size,): unknowns."""
+        shrunk, counts = fields.reshape(self.fields) * self.shrunk, (self.fields[0], *self.on.counts)
+        stiff = [None if share is None else (shrunk[1:] * share).reshape(-1, *counts[1:]) for share in self.shares]
+        shrunk[1:] *= self.rest
+        found = self.on.endless.solve(shrunk.reshape(counts), *stiff).reshape(self.fields)
+        found *= self.shrunk
+        found *= self.length
+        return self.piece.unknown(found).ravel()
 
     def _precondition(self, r: Array) -> Array:
-        cut = self.moved.shape[1]
-        x = self._inverse(r[:cut])
-        y = np.linalg.solve(self.schur, self.held @ x - r[cut:]) if len(self.held) else r[cut:]
+        x = self._inverse(r[: self.cut])
+        y = np.linalg.solve(self.schur, self.held @ x - r[self.cut :]) if len(self.held) else r[self.cut :]
         return np.concatenate([x - y @ self.by_moved, y], dtype=self.dtype)
 
     def _multiply(self, z: Array) -> Array:
-        cut = self.moved.shape[1]
-        x, y = z[:cut].reshape(self.on.d, -1), z[cut:]
-        opened: Array = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x))))
+        x, y = z[: self.cut].reshape(self.fields), z[self.cut :]
+        opened = self.on.on_grid(self.piece.tractions(x).reshape(-1, *self.on.counts)).reshape(self.fields)
         opened /= self.length
         found = self.piece.unknown(opened) + self.piece.stiff * x
-        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[:cut]], dtype=self.dtype)
+        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[: self.cut]], dtype=self.dtype)
 
     def solve(self, rest: Array, forces: Array, accuracy: float) -> tuple[Array, Array]:
-        """Return unknowns (d, k) and rigid motions (r,) for what misses, to so much of it.
+        """Return unknowns (d, k) and rigid motions (r,) for what misses at nodes that touch, to so much of it.
 
         Raises:
             ConvergenceError: nothing holds the bodies.
         """
         size = max(float(np.abs(rest).max(initial=0.0)), float(np.abs(forces).max(initial=0.0)), 1e-300)
-        right = np.concatenate([self.piece.unknown(rest).ravel(), forces]) / size
-        x, left, self.iterations = flexible(
-            self._multiply, self._precondition, right.astype(self.dtype), accuracy, RESTART, RESTARTS
-        )
+        fields = self.piece.unknown(_spread((rest / size).astype(self.dtype), self.at, self.fields[1]))
+        right = np.concatenate([fields.ravel(), forces / size], dtype=self.dtype)
+        x, left, self.iterations = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
         x = x.astype(np.float64) * size
         if not (left <= FAR and np.isfinite(x).all()):
             raise ConvergenceError(LOOSE)
-        cut = self.moved.shape[1]
-        return x[:cut].reshape(self.on.d, -1), x[cut:]
+        return x[: self.cut].reshape(self.fields)[:, self.at], x[self.cut :]

@@ -67,6 +67,14 @@ class Program:
     half_cycles: int
     period: float
 
+    def same_way(self, other: Program) -> bool:
+        """Return whether another cycle begins in the same place, with the same way to it."""
+        return self._way == other._way
+
+    @property
+    def _way(self) -> tuple[object, ...]:
+        return self.pressing, self.lead_in, self.steps[-1].fraction is None, self.steps[0].force is None
+
 
 def make_program(case: Case, steps: int | None = None) -> Program:
     """Return the program of a case.

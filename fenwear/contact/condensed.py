@@ -393,6 +393,25 @@ class CondensedContact:
             last = self._operator = GriddedPhases(self._grid, slopes)
         return last
 
+    def _diagonal(self, x: Array) -> tuple[Array, Array] | None:
+        """Return the derivative's diagonal (size,) in two: of bodies and wear, one for rigid modes; of what bends.
+
+        None where what wears is not that of its own node.
+        """
+        assert self._wearing is not None
+        (m, n), scale = self.shape, self._pressure_scale / self._gap_scale
+        pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
+        worn, bends = self._wearing.local(pressure), self._wearing.layer(pressure)
+        if worn is None:
+            return None
+        own, found = np.ones_like(self._offset), np.zeros_like(self._offset)
+        for k, row in enumerate(own):
+            row[:n] = self.blocks[k].diagonal[:n] if self._many else self._dense[k].diagonal()[:n]
+        own[:, :n] += scale * worn
+        if bends is not None:
+            found[:, :n] = scale * bends
+        return own.ravel(), found.ravel()
+
     def _known(self, slope: Array, layer: Array | None) -> bool:
         """Return whether the last derivative is that of these slopes."""
         if self._slopes is None or (self._slopes[1] is None) != (layer is None):
@@ -438,6 +457,7 @@ class CondensedContact:
         self.inequality.curved = self._mu is not None or (
             wearing is not None and (wearing.curved or (self.follows and not self._gridded))
         )
+        self.inequality.diagonal = self._diagonal if wearing is not None and wearing.curved else None
         x, f, iterations = self._solve(start)
         if self._gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)

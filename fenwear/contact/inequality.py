@@ -21,14 +21,13 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.contact.chords import Chord, Diagonal, Factor
 from fenwear.contact.operators import Approximate, Indices, Operator, Solve
 from fenwear.contact.pivoting import complementary
 from fenwear.errors import ConvergenceError
@@ -41,9 +40,8 @@ SETS = 30  # that are gone through before SNES starts
 AGAIN = 3  # times that a set may come again, where its derivative is another one
 CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor serves anyway
 SLOWEST = 0.8  # fall by which it may, where few steps are left: beyond it Newton's own are surer
-SERVES = 3  # such steps at least, after which the next solve has a factor of its own
-STEP_COSTS = 50  # unknowns by which a factor costs a step more, and serves for one more
-MOST_SHARE = 0.5  # of a step along the last one, that is corrected
+SERVES = 3  # such steps at least that a factor costs
+STEP_COSTS = 50  # unknowns by which it costs a step more
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 PIVOTS_COST = 10  # iterations of SNES, as which pivots are counted that look for the set
 ROUNDS = 40  # of some digits each, where the derivative changes
@@ -76,25 +74,6 @@ def check(snes: PETSc.SNES, what: str) -> None:
             f"{what} did not converge: {REASONS.get(reason, reason)} after {snes.getIterationNumber()} iterations, "
             f"residual {snes.getFunctionNorm():.3g} (options: -{snes.getOptionsPrefix()}snes_monitor, ..snes_max_it)"
         )
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """The factor of the free rows and columns of an operator.
-
-    Attributes:
-        operator: What is factored.
-        key: Which of all are free, as bytes.
-        free: Their numbers; a slice where all are free.
-        bounded: The others.
-        solve: The solution operator.
-    """
-
-    operator: Operator
-    key: bytes
-    free: Indices | slice
-    bounded: Indices
-    solve: Solve
 
 
 class Inequality:
@@ -130,15 +109,16 @@ class Inequality:
         self._function, self._jacobian, self._prefix, self._rounding = residual, jacobian, prefix, rounding
         self._lower, self._upper = lower, upper
         self._bounded_above = bool((upper < np.inf).any())
-        self._kept: _Kept | None = None
+        self._kept: Factor | None = None
         self._operator: Operator | None = None
-        self._worn_out = False  # whether the factor took many steps
+        self._chord: Chord | None = None  # the last factor's, where the derivative changes with the solution
         self.curved = False  # whether the derivative changes with the solution
+        self.diagonal: Diagonal | None = None  # of the derivative, of what unknowns share and what is their own
         self.by_digits = False  # whether solutions may cost by their digits
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
-        self._serves = max(SERVES, len(lower) // STEP_COSTS)
+        self._cost = max(SERVES, len(lower) // STEP_COSTS)  # of a factor, in steps
         self._stepped: Array | None = None  # where the first step from the last start led to, on its own set
 
     @cached_property
@@ -189,7 +169,7 @@ class Inequality:
         free[kept] = True
         return self._factor(self._operator, free.tobytes()).solve
 
-    def _factor(self, operator: Operator, key: bytes) -> _Kept:
+    def _factor(self, operator: Operator, key: bytes) -> Factor:
         """Return the factor of an operator's free rows and columns; the last one is kept."""
         last = self._kept
         if last is None or last.operator is not operator or last.key != key:
@@ -197,7 +177,7 @@ class Inequality:
             free = np.frombuffer(key, dtype=bool)
             kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
             rows = kept if len(bounded) else slice(None)
-            last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
+            last = self._kept = Factor(operator, key, rows, bounded, operator.factor(kept))
         return last
 
     def solve(self, start: Array, *, near: bool = False, line_search: bool = False, most: int | None = None) -> Array:
@@ -272,52 +252,73 @@ class Inequality:
     def _by_chords(self, start: Array) -> Array | None:
         """Return the solution from a start that is near, where the derivative changes with it; None if it is not."""
         x, key, seen = start.copy(), self._free(start), set[bytes]()
-        steps: list[Array] = []  # of Broyden's method, since the last factor
-        last, before = self._kept, np.inf
+        before = np.inf
         try:
-            if last is None or last.key != key or self._worn_out:
-                last = self._factor(self._jacobian(x), key)
-            kept = last
+            chord = self._chord
+            if chord is None or chord.factor is not self._kept or chord.worn_out or not self._serves(chord, x, key):
+                chord = self._new_chord(x, key)
+            chord.begin()
             for self.iterations in range(CHORDS):
                 f = self._function(x)
-                wanted = self._wanted(x, f, kept) if self.iterations else key
+                wanted = self._wanted(x, f, key) if self.iterations else key
                 same = wanted == key
                 if not same:
                     if wanted in seen:
                         return None
                     seen.add(key)
-                    key, steps, before = wanted, [], np.inf
+                    key, before = wanted, np.inf
+                    chord.begin()
                     self._onto_bounds(x, key)
-                    kept = self._factor(self._jacobian(x), key)
+                    if not self._serves(chord, x, key):
+                        chord = self._new_chord(x, key)
                     f = self._function(x)
-                rest = f[kept.free]
-                size = math.sqrt(rest @ rest)
+                size = self._size(f, key)
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
-                if small and same and (wanted if self.iterations else self._wanted(x, f, kept)) == key:
-                    self.residual, self._worn_out = f, self.iterations > self._serves
+                if small and same and (wanted if self.iterations else self._wanted(x, f, key)) == key:
+                    self.residual = f
+                    chord.solved(self.iterations)
                     return x
                 if not self._falls(size, before):
-                    steps, kept = [], self._factor(self._jacobian(x), key)
+                    chord = self._new_chord(x, key)
                 before = size
-                steps.append(_broyden(-kept.solve(rest), steps))
-                x[kept.free] += steps[-1]
+                x += chord.step(f, key, self._bent(x))
         except np.linalg.LinAlgError:
             pass
         return None
+
+    def _new_chord(self, x: Array, key: bytes) -> Chord:
+        """Return steps by the derivative at a place."""
+        self._chord = Chord(self._factor(self._jacobian(x), key), self._cost, self._bent(x))
+        return self._chord
+
+    def _bent(self, x: Array) -> Array | None:
+        """Return the diagonal of the derivative at a place (size,); None where it is not known."""
+        parts = None if self.diagonal is None else self.diagonal(x)
+        return None if parts is None else np.add(*parts)
+
+    def _serves(self, chord: Chord, x: Array, key: bytes) -> bool:
+        """Return whether a factor serves for these free unknowns."""
+        if key == chord.factor.key:
+            return True
+        parts = None if self.diagonal is None or chord.bent is None else self.diagonal(x)
+        return parts is not None and chord.serves(np.frombuffer(key, dtype=bool), *parts)
+
+    def _size(self, f: Array, key: bytes) -> float:
+        """Return the norm of the residual of free unknowns."""
+        rest = np.where(np.frombuffer(key, dtype=bool), f, 0.0)
+        return math.sqrt(rest @ rest)
 
     def _falls(self, size: float, before: float) -> bool:
         """Return whether the residual falls so fast that what is left of it costs less than a new factor."""
         if size <= FALLS * before:
             return True
-        return size < SLOWEST * before and math.log(size / TOLERANCE) < self._serves * math.log(before / size)
+        return size < SLOWEST * before and math.log(size / TOLERANCE) < self._cost * math.log(before / size)
 
-    def _wanted(self, x: Array, f: Array, kept: _Kept) -> bytes:
+    def _wanted(self, x: Array, f: Array, key: bytes) -> bytes:
         """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""
-        wanted, held = x > self._lower, kept.bounded
-        if len(held):
-            wanted[held] = f[held] < -TOLERANCE
+        free = np.frombuffer(key, dtype=bool)
+        wanted = np.where(free, x > self._lower, f < -TOLERANCE)
         if self._bounded_above:
-            free = np.frombuffer(kept.key, dtype=bool)
             above = np.where(free, x < self._upper, f > TOLERANCE)
             wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
         return wanted.tobytes()
@@ -418,16 +419,6 @@ class Inequality:
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
         return x
-
-
-def _broyden(step: Array, before: list[Array]) -> Array:
-    """Return a step of Broyden's method from that of the factor alone, and the steps since it was made."""
-    for one, other in pairwise(before):
-        step = step + other * ((one @ step) / (one @ one))
-    if not before:
-        return np.asarray(step)
-    share = float(before[-1] @ step) / float(before[-1] @ before[-1])
-    return np.asarray(step / (1 - share) if share < MOST_SHARE else step)
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

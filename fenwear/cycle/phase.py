@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from math import comb
 
 import numpy as np
 
@@ -29,7 +30,8 @@ COEFFICIENTS_FAIL = (
     "they depend on did not come together"
 )
 # Shares of the last cycles in the next, by polynomials of rising degree.
-ONWARDS = ((1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1), (6, -15, 20, -15, 6, -1))
+ONWARDS = np.array([[-comb(n, k) * (-1) ** k if k <= n else 0 for k in range(1, 7)] for n in range(1, 7)], dtype=float)
+MOST_ONWARDS = 1.0  # change of a pressure's logarithm
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 
 
@@ -191,14 +193,13 @@ class PhaseStep:
         known = self._known
         if before is None or len(known) < 2 or before is not known[0]:
             return before
-        hardness, (first, *shares) = self.system.layers.hardness, ONWARDS[len(known) - 1]
-        further, rigid = first * before.pressure, first * before.rigid
-        for share, one in zip(shares, known[1:], strict=True):
-            further += share * one.pressure
-            rigid += share * one.rigid
+        closure, hardness = self.system.layers.closure, self.system.layers.hardness
+        pressures, rigid = np.array([one.pressure for one in known]), np.array([one.rigid for one in known])
+        further = _onwards(pressures, None if closure is None else closure.onset)
         kept = (before.pressure > 0) & (further > 0)
         if hardness < np.inf:
             kept &= (before.pressure < hardness) & (further < hardness)
+        rigid = np.tensordot(ONWARDS[len(known) - 1, : len(known)], rigid, 1)
         return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(
@@ -349,3 +350,17 @@ class PhaseStep:
         adds, lost = self.system.team.lead(left)
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)
+
+
+def _onwards(pressures: Array, onset: float | Array | None) -> Array:
+    """Return what pressures (cycles, m, n) lead to (m, n), of rising age, as far back as their nodes touch.
+
+    Layers give way by the logarithm of pressures beyond their onset, which goes on more evenly.
+    """
+    touches = np.logical_and.accumulate(pressures > 0).sum(axis=0)
+    shares = np.moveaxis(ONWARDS[np.maximum(touches, 1) - 1, : len(pressures)], -1, 0)
+    if onset is None:
+        return np.asarray((shares * pressures).sum(axis=0))
+    logs = np.log(pressures + onset)
+    change = (shares * logs).sum(axis=0) - logs[0]
+    return np.asarray((pressures[0] + onset) * np.exp(np.clip(change, -MOST_ONWARDS, MOST_ONWARDS)) - onset)

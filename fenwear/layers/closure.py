@@ -32,6 +32,10 @@ STEPS = 4  # of Newton's method that find the distances at even places
 class Closure(Protocol):
     """A law of closure at n nodes, whose parameters are numbers or (n,)."""
 
+    @property
+    def onset(self) -> float | Array:
+        """Pressure up to which it is about linear, beyond which about logarithmic (n,), MPa."""
+
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm, at pressures (...), MPa; zero without pressure."""
 
@@ -46,6 +50,11 @@ class PowerClosure:
     reference: float | Array
     pressure: float | Array
     exponent: float
+
+    @property
+    def onset(self) -> float | Array:
+        """That from which the slope is that of the law, MPa."""
+        return LEAST * self.pressure
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -65,6 +74,11 @@ class ExponentialClosure:
 
     length: float | Array
     pressure: float | Array
+
+    @property
+    def onset(self) -> float | Array:
+        """The law's own, MPa."""
+        return self.pressure
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -86,6 +100,11 @@ class RoughClosure:
 
     height: float | Array
     stiffness: float | Array
+
+    @property
+    def onset(self) -> float | Array:
+        """That at `FIRST` heights, MPa."""
+        return self.stiffness * _inverse().first
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -114,6 +133,11 @@ class CoatedClosure:
 
     law: Closure | None
     coatings: tuple[tuple[Array, float], ...]
+
+    @property
+    def onset(self) -> float | Array:
+        """Of the law, or the stiffest modulus, MPa."""
+        return max(modulus for _, modulus in self.coatings) if self.law is None else self.law.onset
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""

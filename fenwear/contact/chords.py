@@ -1,0 +1,133 @@
+"""Newton's steps by the factor of an earlier derivative, where it changes with the solution.
+
+    step = -K^-1 F
+
+K is the derivative of an earlier place, whose factor is kept. What bends is local: the step of each unknown is taken
+over how its own diagonal has grown since. What is left of the error is corrected by Broyden's updates of rank one,
+whose steps of all solves since the factor tell how the derivative has changed (C. T. Kelley, Iterative Methods for
+Linear and Nonlinear Equations, SIAM 1995, 7.3). Unknowns that come to be free, and give way by themselves far more than
+by the bodies, as the last asperities that touch do, step by their diagonal alone. Another factor is made where the
+steps that it would have saved have cost as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fenwear.arrays import Array, Mask
+from fenwear.contact.operators import Indices, Operator, Solve
+
+MOST_UPDATES = 20  # of rank one, that are kept
+MOST_SHARE = 0.5  # of a step along the last one, that is corrected
+BENT = 1e-3  # change of a diagonal in a step, over it: beyond it the law's own bend is what is left of the residual
+NEWTONS = 2  # steps, that Newton's own take of a start that is near
+STEEP = 10.0  # times what the bodies give way by: what unknowns do alone whose set may change without a factor
+Diagonal = Callable[[Array], tuple[Array, Array] | None]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """The factor of the free rows and columns of an operator.
+
+    Attributes:
+        operator: What is factored.
+        key: Which of all are free, as bytes.
+        free: Their numbers; a slice where all are free.
+        bounded: The others.
+        solve: The solution operator.
+    """
+
+    operator: Operator
+    key: bytes
+    free: Indices | slice
+    bounded: Indices
+    solve: Solve
+
+
+@dataclass
+class Chord:
+    """Steps by one factor.
+
+    Attributes:
+        factor: Of the derivative where it was made.
+        cost: Of it, in steps.
+        bent: Diagonal of the derivative there (size,); None where it is not known.
+    """
+
+    factor: Factor
+    cost: float
+    bent: Array | None
+    _updates: list[tuple[Array, Array]] = field(default_factory=list)
+    _spent: int = 0
+    _last: Array | None = None
+    _at: Array | None = None  # diagonal at the last step
+
+    def solved(self, steps: int) -> None:
+        """Take note of a solve of so many steps."""
+        self._spent += max(steps - NEWTONS, 0)
+
+    @property
+    def worn_out(self) -> bool:
+        """Whether its steps beyond Newton's own have come to cost as much as another one."""
+        return self._spent > self.cost
+
+    def serves(self, free: Mask, bodies: Array, bends: Array) -> bool:
+        """Return whether all unknowns that are free (size,), but were not, or the reverse, bend by themselves alone.
+
+        Args:
+            free: Which are free now.
+            bodies, bends: The two parts of the diagonal, of what unknowns share and of what is their own.
+        """
+        changed = free != np.frombuffer(self.factor.key, dtype=bool)
+        return bool((bends[changed] > STEEP * bodies[changed]).all())
+
+    def step(self, f: Array, key: bytes, diagonal: Array | None) -> Array:
+        """Return the step (size,) of the free unknowns, nothing for the others.
+
+        Args:
+            f: The residual (size,).
+            key: Which unknowns are free, as bytes.
+            diagonal: Of the derivative here (size,); None where it is not known.
+        """
+        factor, opens = self.factor, np.zeros_like(f)
+        if key == factor.key:
+            opens[factor.free] = -factor.solve(f[factor.free])
+            if self.bent is not None:
+                opens *= self.bent
+        else:
+            assert self.bent is not None
+            free, before = (np.frombuffer(one, dtype=bool) for one in (key, factor.key))
+            opens[factor.free] = -factor.solve(np.where(free, f, 0.0)[factor.free])
+            opens = np.where(free, np.where(before, opens * self.bent, -f), 0.0)
+        bends = False
+        if diagonal is not None:
+            bends = self._at is not None and bool((np.abs(diagonal - self._at) > BENT * self._at).any())
+            self._at = diagonal
+        opens = self._corrected(opens, bends=bends)
+        return opens if diagonal is None else opens / diagonal
+
+    def _corrected(self, step: Array, *, bends: bool) -> Array:
+        """Return a step by Broyden's updates, in what unknowns open by themselves: in it those that bend are alike.
+
+        The last one tells of the derivative where nothing `bends` by itself.
+        """
+        for by, onto in self._updates:
+            step = step + onto * (by @ step)
+        last, self._last = self._last, step
+        if last is None:
+            return step
+        square = float(last @ last)
+        share = float(last @ step) / square
+        if bends or not share < MOST_SHARE:
+            return step
+        self._last = step = step / (1 - share)
+        if len(self._updates) < MOST_UPDATES:
+            self._updates.append((last / square, step))
+        return step
+
+    def begin(self) -> None:
+        """Forget the last step: the next one does not follow it."""
+        self._last = self._at = None

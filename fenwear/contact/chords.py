@@ -13,7 +13,7 @@ steps that it would have saved have cost as much.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,10 +60,14 @@ class Chord:
     factor: Factor
     cost: float
     bent: Array | None
-    _updates: list[tuple[Array, Array]] = field(default_factory=list)
     _spent: int = 0
     _last: Array | None = None
     _at: Array | None = None  # diagonal at the last step
+
+    def __post_init__(self) -> None:
+        size = len(self.factor.key)
+        self._by: Array = np.zeros((0, size))  # updates: what they add to a step is onto^T (by step)
+        self._onto: Array = np.zeros((0, size))
 
     def solved(self, steps: int) -> None:
         """Take note of a solve of so many steps."""
@@ -114,8 +118,8 @@ class Chord:
 
         The last one tells of the derivative where nothing `bends` by itself.
         """
-        for by, onto in self._updates:
-            step = step + onto * (by @ step)
+        if len(self._by):
+            step = step + self._onto.T @ (self._by @ step)
         last, self._last = self._last, step
         if last is None:
             return step
@@ -123,9 +127,12 @@ class Chord:
         share = float(last @ step) / square
         if bends or not share < MOST_SHARE:
             return step
-        self._last = step = step / (1 - share)
-        if len(self._updates) < MOST_UPDATES:
-            self._updates.append((last / square, step))
+        self._last = step = np.asarray(step / (1 - share))
+        if len(self._by) < MOST_UPDATES:  # (1 + onto by) after those before, as one sum
+            by = last / square
+            if len(self._by):
+                by = by + (self._onto @ by) @ self._by
+            self._by, self._onto = np.vstack([self._by, by]), np.vstack([self._onto, step])
         return step
 
     def begin(self) -> None:

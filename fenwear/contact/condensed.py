@@ -457,7 +457,8 @@ class CondensedContact:
         self.inequality.curved = self._mu is not None or (
             wearing is not None and (wearing.curved or (self.follows and not self._gridded))
         )
-        self.inequality.diagonal = self._diagonal if wearing is not None and wearing.curved else None
+        bends = wearing is not None and wearing.curved and n > SOME  # of fewer a factor costs less than to ask for it
+        self.inequality.diagonal = self._diagonal if bends else None
         x, f, iterations = self._solve(start)
         if self._gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)

@@ -272,7 +272,8 @@ class Inequality:
                     if not self._serves(chord, x, key):
                         chord = self._new_chord(x, key)
                     f = self._function(x)
-                size = self._size(f, key)
+                rest = f if b"\0" not in key else np.where(np.frombuffer(key, dtype=bool), f, 0.0)
+                size = math.sqrt(rest @ rest)
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
                 if small and same and (wanted if self.iterations else self._wanted(x, f, key)) == key:
                     self.residual = f
@@ -303,11 +304,6 @@ class Inequality:
         parts = None if self.diagonal is None or chord.bent is None else self.diagonal(x)
         return parts is not None and chord.serves(np.frombuffer(key, dtype=bool), *parts)
 
-    def _size(self, f: Array, key: bytes) -> float:
-        """Return the norm of the residual of free unknowns."""
-        rest = np.where(np.frombuffer(key, dtype=bool), f, 0.0)
-        return math.sqrt(rest @ rest)
-
     def _falls(self, size: float, before: float) -> bool:
         """Return whether the residual falls so fast that what is left of it costs less than a new factor."""
         if size <= FALLS * before:
@@ -316,9 +312,12 @@ class Inequality:
 
     def _wanted(self, x: Array, f: Array, key: bytes) -> bytes:
         """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""
-        free = np.frombuffer(key, dtype=bool)
-        wanted = np.where(free, x > self._lower, f < -TOLERANCE)
+        wanted = x > self._lower
+        if b"\0" in key:
+            free = np.frombuffer(key, dtype=bool)
+            wanted = np.where(free, wanted, f < -TOLERANCE)
         if self._bounded_above:
+            free = np.frombuffer(key, dtype=bool)
             above = np.where(free, x < self._upper, f > TOLERANCE)
             wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
         return wanted.tobytes()

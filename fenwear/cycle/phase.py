@@ -194,13 +194,13 @@ class PhaseStep:
         if before is None or len(known) < 2 or before is not known[0]:
             return before
         closure, hardness = self.system.layers.closure, self.system.layers.hardness
-        pressures, rigid = np.array([one.pressure for one in known]), np.array([one.rigid for one in known])
-        further = _onwards(pressures, None if closure is None else closure.onset)
-        kept = (before.pressure > 0) & (further > 0)
+        further = _onwards(np.array([one.pressure[0] for one in known]), None if closure is None else closure.onset)
+        own = before.pressure[0]
+        kept = (own > 0) & (further > 0)
         if hardness < np.inf:
-            kept &= (before.pressure < hardness) & (further < hardness)
-        rigid = np.tensordot(ONWARDS[len(known) - 1, : len(known)], rigid, 1)
-        return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
+            kept &= (own < hardness) & (further < hardness)
+        rigid = ONWARDS[len(known) - 1, : len(known)] @ np.array([one.rigid[0] for one in known])
+        return ContactState(np.where(kept, further, own)[None], before.gap, rigid[None], before.iterations)
 
     def _update(
         self,
@@ -353,14 +353,17 @@ class PhaseStep:
 
 
 def _onwards(pressures: Array, onset: float | Array | None) -> Array:
-    """Return what pressures (cycles, m, n) lead to (m, n), of rising age, as far back as their nodes touch.
+    """Return what pressures (cycles, n) lead to (n,), of rising age, as far back as their nodes touch.
 
     Layers give way by the logarithm of pressures beyond their onset, which goes on more evenly.
     """
-    touches = np.logical_and.accumulate(pressures > 0).sum(axis=0)
-    shares = np.moveaxis(ONWARDS[np.maximum(touches, 1) - 1, : len(pressures)], -1, 0)
+    values = pressures if onset is None else np.log(pressures + onset)
+    further: Array = ONWARDS[len(values) - 1, : len(values)] @ values
+    fresh = np.flatnonzero((pressures[-1] <= 0) & (pressures[0] > 0))
+    if len(fresh):
+        touch = np.logical_and.accumulate(pressures[:, fresh] > 0).sum(axis=0)
+        further[fresh] = (ONWARDS[np.maximum(touch, 1) - 1, : len(values)].T * values[:, fresh]).sum(axis=0)
     if onset is None:
-        return np.asarray((shares * pressures).sum(axis=0))
-    logs = np.log(pressures + onset)
-    change = (shares * logs).sum(axis=0) - logs[0]
-    return np.asarray((pressures[0] + onset) * np.exp(np.clip(change, -MOST_ONWARDS, MOST_ONWARDS)) - onset)
+        return further
+    change = np.minimum(np.maximum(further - values[0], -MOST_ONWARDS), MOST_ONWARDS)
+    return np.asarray((pressures[0] + onset) * np.exp(change) - onset)

@@ -1,7 +1,7 @@
 """What goes with what: laws of contact, what a case may have, and all that can be asked of it; read by the docs, too.
 
 A cell is closed where physics, or the model, has nothing to say there; its reason is in `CLOSED`. All others are open
-and walked by `test_combinations.py`, but for calibrations whose parts other cells walk.
+and walked by `test_combinations.py`, but for those whose parts other cells walk.
 """
 
 from __future__ import annotations

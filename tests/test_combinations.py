@@ -216,19 +216,24 @@ OPEN = [cell for cell in CELLS if not closed(*cell)]
 
 # A calibration is several runs and a run with heat many small steps: they are walked at length.
 LONG = {"calibrate", "sensitivity", "life"}
-# With stick a fit asks for the runs that sensitivities ask for, which every row walks, on jumps that it keeps: these
-# rows have a state of their own that the jumps keep, too.
-FITTED_WITH_STICK = ("in the plane", "heat, to and fro", "laws with memory", "in solids")
+# A fit asks for the runs that sensitivities ask for, which every row walks, on jumps that it keeps, and a life for
+# those of its samples. Rows with a state of their own that jumps keep are fitted, too.
+OWN_STATE = ("in the plane", "heat, to and fro", "heat on a closed track", "laws with memory", "in rings", "in solids")
 
 
 def repeats(feature: str, law: str, way: str) -> bool:
     """Return whether other cells walk all that an open one would."""
-    return way == "calibrate" and (
-        feature == "all that lies between"  # its parts have rows
-        or (LAWS[law] == "coulomb" and feature not in FITTED_WITH_STICK)
-    )
+    if way == "march":
+        return not closed(feature, law, "jump")  # which marches, too, farther, and checks the same
+    if way == "life" and LAWS[law] == "gross-sliding":
+        return False
+    return way in ("calibrate", "life") and feature not in OWN_STATE
 
 
+# Set-ups and states of heat are spread over ranks; what lies between and the laws rank 0 asks, with stick more often.
+RANKED = [
+    (feature, law) for feature, law, way in OPEN if way == "ranks" and (feature in OWN_STATE or LAWS[law] == "coulomb")
+]
 WALKS = [
     pytest.param(*cell, marks=pytest.mark.slow if cell[2] in LONG or cell[0] != "in the plane" else ())
     for cell in OPEN
@@ -244,7 +249,7 @@ def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -
 
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 @pytest.mark.mpi
-@pytest.mark.parametrize(("feature", "law"), [cell[:2] for cell in OPEN if cell[2] == "ranks"])
+@pytest.mark.parametrize(("feature", "law"), RANKED)
 def test_on_ranks(feature: str, law: str) -> None:
     """All ranks come to what one comes to.
 

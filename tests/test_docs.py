@@ -2,7 +2,8 @@
 
 A block of commands (`sh`, `console`) or Python runs as a reader would run it, in order, in one folder for each page.
 "Save this as `name`" before a block makes it a file. What a `console` block shows is what the command prints, without
-what stands for "...". A comment above a block says that it is slow, or why it is not run.
+what stands for "...". A comment above a block says that it is slow, or why it is not run. Runs end with a report and an
+uncertainty, which have tests of their own, on the pages for a start and on those that show them.
 """
 
 from __future__ import annotations
@@ -30,12 +31,17 @@ SHIM = f"""#!/bin/sh
 forked="{sys.executable} -IS {ROOT}/tests/forked.py DOOR"
 case " $* " in *" -- "*) forked="{sys.executable}" ;; esac
 case $1 in
-  run|steady|optimum|shape|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
+  run) shift && exec $forked -m fenwear run LEFT_OUT "$@" ;;
+  steady|optimum|shape|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
     exec $forked -m fenwear "$@" ;;
   python3) case $2 in *.py) shift && exec $forked "$@" ;; esac ;;
 esac
 exec "$@"
 """
+
+
+START = ("README", "first-steps")  # pages whose runs are as a reader's, to the last figure
+SHOWN = {"report": r"report|figures|fenwear plot|\.png", "uncertainty": r"uncertain|accuracy"}
 
 
 @dataclass(frozen=True)
@@ -72,9 +78,10 @@ def test_page(page: Path, tmp_path: Path, forks: str) -> None:
     tools, folder = tmp_path / "tools", tmp_path / "reader"
     (tools / "docker").mkdir(parents=True)
     folder.mkdir()
+    script = SHIM.replace("DOOR", forks).replace("LEFT_OUT", _left_out(page))
     for shim in (tools / "fenwear", folder / "docker" / "fenwear"):
         shim.parent.mkdir(exist_ok=True)
-        shim.write_text(SHIM.replace("DOOR", forks))
+        shim.write_text(script)
         shim.chmod(0o755)
     environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     del environment["FENWEAR_KEPT_GIB"]  # as for a reader, set-ups are kept from one command to the next
@@ -107,6 +114,13 @@ def test_page(page: Path, tmp_path: Path, forks: str) -> None:
         elif block.kind == "console":
             for command, shown in _sessions(block.text):
                 _compare(shown, done(command), command)
+
+
+def _left_out(page: Path) -> str:
+    """Return the options by which runs leave out what no command of the page asks for and no output shows."""
+    text = "".join(block.text for block in blocks(page) if block.kind in ("sh", "console"))
+    left = [key for key, words in SHOWN.items() if page.stem not in START and not re.search(words, text)]
+    return " ".join(f"--set output.{key}=false" for key in left)
 
 
 def _sessions(text: str) -> list[tuple[str, list[str]]]:

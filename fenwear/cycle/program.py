@@ -5,7 +5,8 @@ A stage begins with the depths and temperatures that the stage before it has lef
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,8 @@ from fenwear.cycle.driver import Loading, as_given
 from fenwear.cycle.follow import follow
 from fenwear.cycle.state import RunState, with_phases
 from fenwear.errors import CaseError, InputError
+
+MOST_RECURRING = 16  # systems of stages that are held at once, each with its steps of heat
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def follow_program(
         span = Span(half_cycles)
         yield from follow(system, lambda own, state, leave: integrate(own, state, leave, span), start)
         return
-    base, state = system, start
+    base, state, again = system, start, Recurring(stages)
     for stage in stages:
         done = 0 if state is None else state.half_cycle
         if stage.end <= done:
@@ -64,14 +67,15 @@ def follow_program(
         def adapt(moved: Tribosystem, stage: Stage = stage) -> Tribosystem:
             nonlocal base
             base = moved
-            return at_stage(base, stage)
+            again.forget()
+            return again.at_stage(base, stage)
 
         def run(
             own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span = span
         ) -> Iterator[Block]:
             return integrate(own, state, leave, span)
 
-        own = at_stage(base, stage)
+        own = again.at_stage(base, stage)
         for block in follow(own, run, with_phases(state, len(own.motion.phases)), adapt):
             yield block
             state = block.end
@@ -84,9 +88,40 @@ def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
         system: Of the case, on meshes as they are now.
         stage: Of its program.
     """
-    return replace(
-        with_case(system, stage.case), made_from=system.case, clock=Clock(stage.begin, stage.time, stage.slid)
-    )
+    return _at_its_time(with_case(system, stage.case), system, stage)
+
+
+def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
+    return replace(staged, made_from=system.case, clock=Clock(stage.begin, stage.time, stage.slid))
+
+
+class Recurring:
+    """The systems of stages that come again in their program: the heat of a motion may take longer than its cycles."""
+
+    def __init__(self, stages: Sequence[Stage]) -> None:
+        """Take the stages of a program."""
+        self._times = Counter(map(_changes, stages))
+        self._made: dict[str, tuple[Case, Tribosystem]] = {}
+
+    def forget(self) -> None:
+        """Make all systems anew from now on, on other meshes."""
+        self._made.clear()
+
+    def at_stage(self, system: Tribosystem, stage: Stage) -> Tribosystem:
+        """Return what `at_stage` returns; collective."""
+        key = _changes(stage)
+        case, staged = self._made.get(key, (None, None))
+        if staged is None or case != stage.case:
+            staged = with_case(system, stage.case)
+            if self._times[key] > 1 and len(self._made) < MOST_RECURRING:
+                self._made[key] = stage.case, staged
+        return _at_its_time(staged, system, stage)
+
+
+def _changes(stage: Stage) -> str:
+    """Return what differs from stage to stage, in a text."""
+    case = stage.case
+    return repr((case.motion, case.heat, case.punch.loads, case.strip.loads))
 
 
 def loading_of(system: Tribosystem, stage: Stage) -> Loading:

@@ -161,12 +161,12 @@ def test_with_stick_jumps_go_with_the_march_and_runs_go_on(tmp_path: Path) -> No
         run = {"half_cycles": count, "integration": how, "jump_tolerance": 0.01}
         return growing({"across": 10}, **{**STICKS, "wear": wear}, run=run)
 
-    marched, jumps = (list(evolve(assemble(case(40, how))))[-1] for how in ("explicit", "jump"))
+    marched, jumps = (list(evolve(assemble(case(24, how))))[-1] for how in ("explicit", "jump"))
     for body in ("punch", "strip"):
         wanted = marched.end.totals.of(f"volume_{body}")
         assert jumps.end.totals.of(f"volume_{body}") == pytest.approx(wanted, rel=0.01)
-    run_case(case(30, "explicit"), output=tmp_path, log=lambda _: None)
-    resumed, _ = run_case(case(40, "explicit"), output=tmp_path, log=lambda _: None, resume=True)
+    run_case(case(16, "explicit"), output=tmp_path, log=lambda _: None)
+    resumed, _ = run_case(case(24, "explicit"), output=tmp_path, log=lambda _: None, resume=True)
     assert resumed["punch"]["worn_volume_mm3"] == pytest.approx(marched.end.totals.of("volume_punch"), rel=1e-9)
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case, steady
 from fenwear.case.program import cycle_of, read_program, stages_of
-from fenwear.cycle import Block, Span, at_step, follow_program
+from fenwear.cycle import Block, Span, at_step, follow_program, program
 from fenwear.errors import CaseError
 from fenwear.plausibility import stroke_warnings
 from tests.results.test_contacts import two_pads
@@ -134,6 +134,23 @@ def test_amplitude_and_period(edited: Edited) -> None:
     worn = float(system.pair.weights @ blocks[-1].wear[-1])
     assert worn == pytest.approx(K * 1000 * (3 * 4 * 1.0 + 40 * 4 * 1.5), rel=1e-10)
     assert of(blocks, "time")[-1] == pytest.approx(3 * 0.5 + 40)
+
+
+def test_stages_that_come_again_are_set_up_once(edited: Edited, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the bits of a program in which every stage is."""
+    steps = [{"cycles": 1, "amplitude": "1.5 mm"}, {"cycles": 1, "amplitude": "1 mm"}] * 3
+    case = edited("example1-heat", steps_of(steps), *SMALL, "heat.steps=2")
+    system, state, made = assemble(case), None, []
+    for stage in stages_of(case):
+        *_, each = march(program.at_stage(system, stage), stage.end, start=state, implicit=True)
+        state = each.end
+    set_up = program.with_case
+    monkeypatch.setattr(program, "with_case", lambda *given: (made.append(given), set_up(*given))[1])
+    *_, last = follow_program(system, marched, case.run.half_cycles)
+    assert len(made) == 2
+    for name in ("pressure", "wear"):
+        np.testing.assert_array_equal(getattr(last, name), getattr(each, name), err_msg=name)
+    np.testing.assert_array_equal(last.heat.temperature_strip, each.heat.temperature_strip)
 
 
 def test_ambient(edited: Edited) -> None:

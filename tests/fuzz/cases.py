@@ -236,7 +236,7 @@ def other_unit(random_: random.Random, tables: dict[str, Any]) -> tuple[tuple[An
     if path[-1] == "unit":  # of a law's expression or table: its values stay, and mean something else
         number, written = size, name
     else:
-        written = f"{number / size!r} {name}"
+        written = f"{number / size:.15g} {name}"  # a quotient, whose last digit is rounding
     at(tables, path[:-1])[path[-1]] = written
     return path, None if wrong else number
 

@@ -22,7 +22,7 @@ from fenwear.errors import FenwearError, InputError
 
 
 @pytest.mark.process
-@pytest.mark.parametrize(("task", "count"), [(cases.try_case, 300), (cases.try_mesh, 20)])
+@pytest.mark.parametrize(("task", "count"), [(cases.try_case, 120), (cases.try_mesh, 20)])
 def test_sample(task: Any, count: int) -> None:
     """Mutated cases and meshes are computed or refused with words; both happens."""
     kinds, defects = cases.fuzz(task, count, first=1_000_000)

@@ -168,12 +168,6 @@ def coverage(problem: LeastSquares, repetitions: int) -> None:
     assert spread == pytest.approx(1.0, abs=4 / np.sqrt(2 * repetitions))
 
 
-def test_twin_experiments_of_one_unknown(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
-    case = small("example2")
-    data = read_data(profile(case, 50, 0.0, lines=["# sigma = 0.03 um"]), case)
-    coverage(LeastSquares(case, [data], [Unknown(K)]), 25)
-
-
 @pytest.mark.slow
 def test_twin_experiments_of_three_unknowns(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
     """Coefficient, exponent and friction from profiles at two loads; the full number is in tests/benchmarks."""
@@ -230,7 +224,7 @@ def test_bounds_that_exclude_the_data_are_told(small: Callable[..., Case]) -> No
 def test_a_posterior_of_one_unknown_is_that_of_least_squares(small: Callable[..., Case]) -> None:
     """Linear in k with normal noise: the posterior is normal with the mean and the error of least squares."""
     pytest.importorskip("emcee", reason="emcee is optional")
-    after = [10.0] * 3  # measured three times: one stop of each of some thousand runs
+    after = [2.0] * 3  # measured three times: one stop of each of some thousand runs
     work = LOAD * 4 * AMPLITUDE * np.array(after)
     case, data = small("example2"), [volumes(after, BETA * work, 0.05 * BETA * work)]
     found = calibrate(case, data, [K])
@@ -255,7 +249,7 @@ def test_block_on_ring_depths_are_those_published() -> None:
 @pytest.mark.slow
 def test_three_measured_scars() -> None:
     """K of each scar is that of its area, which needs no model; the three scatter by more than their errors."""
-    case = load_case(RING / "block_on_ring.toml", ["geometry.parameters.elements_along_contact=30"])
+    case = load_case(RING / "block_on_ring.toml", ["geometry.parameters.elements_along_contact=20"])
     found = []
     for number in (1, 2, 3):
         data = read_data(RING / f"block_on_ring_{number}.csv", case)

@@ -92,8 +92,8 @@ def test_indices_of_a_life_of_two_keys(small: Callable[..., Case]) -> None:
     scatter = first.and_also(parse_scatter(case, "motion.amplitude=lognormal(1.5 mm, 20 %)"))
     plain = lifetime(case, UNTIL, scatter, samples=8, comm=MPI.COMM_SELF)
     assert (len(plain.lives), plain.sobol) == (8, None)  # what was asked for is what is done
-    found = lifetime(case, UNTIL, scatter, samples=60, indices=True, comm=MPI.COMM_SELF)
-    assert len(found.lives) == 60 * 4
+    found = lifetime(case, UNTIL, scatter, samples=30, indices=True, comm=MPI.COMM_SELF)
+    assert len(found.lives) == 30 * 4
     assert found.sobol is not None
     assert "with 95 % intervals" in found.text()
     variances = np.log1p(np.array([0.4, 0.2]) ** 2)

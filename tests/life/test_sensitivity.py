@@ -95,7 +95,7 @@ def test_two_worn_bodies_that_slide_to_and_fro() -> None:
     """
     case = load_case("fretting", ["geometry.parameters.elements_along_contact=16", "motion.positions=3"])
     keys = ("wear.punch.coefficient", "wear.strip.coefficient", "materials.steel.young", "punch.loads.0.force.1")
-    wanted = ["volume of strip after 200 cycles", "depth of strip after 200 cycles"]
+    wanted = ["volume of strip after 60 cycles", "depth of strip after 60 cycles"]
     volume, depth = sensitivity(case, wanted, keys, spread=0, method="differences")
     assert [row.elasticity for row in volume.derivatives] == pytest.approx([0.0, 1.0, 0.0, 1.0], abs=1e-7)
     punch, strip, modulus, load = (row.elasticity for row in depth.derivatives)
@@ -103,7 +103,7 @@ def test_two_worn_bodies_that_slide_to_and_fro() -> None:
     assert punch + strip == pytest.approx(modulus + load, rel=1e-5)
 
 
-@pytest.mark.parametrize("elements", [40, 80])
+@pytest.mark.parametrize("elements", [20, 40])
 def test_a_growing_scar_keeps_its_exponents(elements: int) -> None:
     """Block on ring: widths, pressure and depth go by k^(1/3), k^(-1/3), k^(2/3); each within its error, which shrinks.
 
@@ -198,7 +198,7 @@ def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
     """
     conducting = "materials.composite.conductivity={expression='5 + 0.2 * T', unit='W/(m K)'}"
     case = small("example1-heat", conducting, "run.jump_tolerance=0.03", "heat.property_tolerance=0.2")
-    cycles, quantity = 400, parse_quantity("temperature after 400 cycles")
+    cycles, quantity = 200, parse_quantity("temperature after 200 cycles")
 
     def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         return jump(on, 2 * cycles, tolerance=0.03, start=start, leave=leave)

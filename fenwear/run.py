@@ -303,7 +303,7 @@ class _Run:
     ) -> Iterator[Block]:
         run = self.case.run
         course: dict[str, Any] = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
-        course["periodic_within"] = run.periodic_within
+        course["periodic_within"] = span.periodic_within(run.periodic_within)
         return integrate(system, run.integration, span, run.jump_tolerance, **course)
 
     def _take(self, block: Block) -> None:

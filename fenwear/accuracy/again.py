@@ -149,7 +149,7 @@ def changed(case: Case, **tables: Mapping[str, Any]) -> Case:
 def in_few_steps(case: Case, phases: int) -> Case:
     """Return the case to be run again: to its end, by jumps where it has many phases."""
     run: dict[str, Any] = {"periodic_within": None}
-    if case.run.integration != "jump" and phases > LONGEST and case.contact.solver == "condensed":
+    if case.run.integration != "jump" and phases > LONGEST:
         run |= {"integration": "jump", "jump_tolerance": TOLERANCE}
     return changed(case, run=run)
 

@@ -27,6 +27,7 @@ from fenwear.assembly.growing import (
     outgrown,
     regridded,
     relaid,
+    with_room,
 )
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.resource_report import body_lines, resources_text
@@ -110,4 +111,5 @@ __all__ = [
     "with_case",
     "with_exchange",
     "with_reduced_heat",
+    "with_room",
 ]

@@ -97,16 +97,25 @@ class Creep:
     @cached_property
     def grown(self) -> tuple[Interface, ...]:
         """What the surfaces answer in each phase of a march, creep within it and all."""
-        factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
         known: dict[tuple[float, ...], Interface] = {}
         found = []
         for phase, own in enumerate(self.interfaces):
-            times = [float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER)]
+            times = self._factors(phase)
             alike = (id(own), *times)
             if alike not in known:
                 known[alike] = self._scaled(own, times)
             found.append(known[alike])
         return tuple(found)
+
+    def softer(self, phase: int) -> tuple[float, float]:
+        """Return how many times as soft as at once punch and strip are over a phase of a march."""
+        punch, strip, _ = self._factors(phase)
+        return punch, strip
+
+    def _factors(self, phase: int) -> tuple[float, ...]:
+        """Return the same of punch, strip and layer."""
+        factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
+        return tuple(float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER))
 
     def _scaled(self, own: Interface, times: Sequence[float]) -> Interface:
         bodies = zip(both(own), times[:2], self.moved, strict=True)

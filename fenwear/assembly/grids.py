@@ -16,12 +16,13 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.assembly.strokes import Sliding
+from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
 from fenwear.case import CONDENSED, Case, Grid
+from fenwear.case.program import stages_of
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
 from fenwear.interface.patches import facet_side
@@ -56,7 +57,7 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
     level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
     own = _grid(case.grid, punch.surface, axis, level)
     _check_memory(punch.body.mesh.comm, own, sliding)
-    for body, grid in ((punch, own), (strip, _reached(own, sliding))):
+    for body, grid in ((punch, own), (strip, _reached(case, own, sliding))):
         surface, reading = _laid(case, body, grid)
         body.lay_grid(surface, reading, None if case.grid.across is None else grid)
 
@@ -70,7 +71,7 @@ def on_grid(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody
         CaseError: a grid reaches beyond the surface, or its nodes do not fit into the memory.
     """
     _check_memory(punch.body.mesh.comm, grid, sliding)
-    on_punch, on_strip = _laid(case, punch, grid), _laid(case, strip, _reached(grid, sliding))
+    on_punch, on_strip = _laid(case, punch, grid), _laid(case, strip, _reached(case, grid, sliding))
     return punch.on_grid(*on_punch), strip.on_grid(*on_strip)
 
 
@@ -149,13 +150,17 @@ def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> Reg
     return RegularGrid(tuple(corner), tuple(steps), tuple(int(k) for k in counts), axis, level)
 
 
-def _reached(grid: RegularGrid, sliding: Sliding) -> RegularGrid:
-    """Return the same grid, as much longer as the punch reaches on the strip during the motion."""
+def _reached(case: Case, grid: RegularGrid, sliding: Sliding) -> RegularGrid:
+    """Return the same grid, as much longer as the punch reaches on the strip during the motion, or a whole program."""
     along, corners = grid.axes, grid.points[:: max(len(grid.points) - 1, 1)]
     steps = np.array(grid.spacing)
     before = after = np.zeros(len(steps))
-    for offset in {phase.offset for phase in sliding.motion.phases}:
-        moved = (sliding.field.placement(offset).points_back(corners) - corners)[:, along]
+    slides, motions = [sliding], {stage.case.motion for stage in stages_of(case)}
+    if motions:
+        motions.add(case.motion)
+        slides = [make_sliding(case.model_copy(update={"motion": motion})) for motion in motions]
+    for there in {own.field.placement(phase.offset) for own in slides for phase in own.motion.phases}:
+        moved = (there.points_back(corners) - corners)[:, along]
         before, after = np.maximum(before, -moved.min(axis=0)), np.maximum(after, moved.max(axis=0))
     more = np.array([np.ceil(one / steps - 1e-6).astype(np.int64) for one in (before, after)])
     corner = np.array(grid.corner) - more[0] * steps

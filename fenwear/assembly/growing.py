@@ -4,6 +4,7 @@ All grids of a run are parts of lattices through one point, the middle of the la
 the one before, a coarser one every second of them. What is known at nodes stays there, nothing is interpolated, and
 depths are multiplied by what keeps the worn volume, 1 but for the square of a spacing over the contact's width.
 Nothing is factored again: half-spaces answer anywhere, and what a finite body does besides is known over the largest.
+The stages of a program go on with the grid of the one before; each begins with room for what its loads bring together.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import CONDENSED, Case
+from fenwear.case.program import stages_of
 from fenwear.sliding.wear import WornDepths
 
 ROOM, NEAR = 0.25, 0.08  # of the contact's width beside it: what a new grid has, and below which a larger one is due
@@ -107,6 +109,24 @@ def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
     return _part(grid, reach.grid, *wider, 2 if coarser else 1)
 
 
+def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float) -> RegularGrid | None:
+    """Return a larger grid where loads that begin to act ask for one, else None; collective.
+
+    Args:
+        system: On the grid as it is.
+        worn: Depths.
+        carries: Nodes of the punch that have touched or worn (n,).
+        load: Factor of all loads.
+    """
+
+    def found() -> RegularGrid | None:
+        contact = system.phase_contact((0,))
+        contact.press(load)
+        return outgrown(system, carries | (contact.solve(system.gap(0, worn)).pressure[0] > 0))
+
+    return system.team.lead(found)
+
+
 def at_rim(system: ContactSetup, touched: Mask) -> bool:
     """Return whether some nodes of the punch lie on the rim of a grid that can still grow there."""
     grid, reach = system.pair.punch.grid, system.bodies.punch.reach
@@ -120,6 +140,9 @@ def at_rim(system: ContactSetup, touched: Mask) -> bool:
 def carried(worn: WornDepths, before: ContactSetup, after: ContactSetup) -> WornDepths:
     """Return depths and states on another grid: where it has the same nodes theirs, elsewhere those of the start."""
     (on_punch, on_strip), start = node_maps(before, after), after.unworn()
+    if worn.crept.size:  # of what lies between: bodies that creep have grids that stay
+        of_layer = worn.crept.reshape(-1, len(before.pair.weights))
+        start = replace(start, crept=on_nodes(of_layer, on_punch, np.zeros((len(of_layer), len(on_punch)))).ravel())
     return replace(
         start,
         punch=kept_volume(worn.punch, on_punch, before.pair.weights, after.pair.weights),
@@ -157,6 +180,15 @@ def on_nodes(values: Array, nodes: NDArray[np.int64], start: Array) -> Array:
     if not values.size:
         return start
     return np.where(nodes >= 0, values[..., np.maximum(nodes, 0)], start)
+
+
+def _first_load(system: Tribosystem) -> float:
+    """Return the factor of all loads at the beginning of a run: that of a program, where the case has one."""
+    stages = stages_of(system.case)
+    if not stages:
+        return 1.0
+    load, factor = stages[0].load, stages[0].load_factor[0]
+    return factor if load is None or system.normal_force <= 0 else load[0] / system.normal_force
 
 
 def _ends(grid: RegularGrid, touched: Mask) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -197,7 +229,9 @@ def _around_first(system: Tribosystem) -> RegularGrid | None:
     assert wanted.across is not None
     assert grid is not None
     assert reach is not None
-    touched = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0] > 0
+    contact = system.phase_contact((0,))
+    contact.press(_first_load(system))
+    touched = contact.solve(system.gap(0, system.unworn())).pressure[0] > 0
     low, high = _ends(grid, touched)
     steps, width = np.array(grid.spacing), high - low + 1
     longest = int(np.argmax(width * steps))

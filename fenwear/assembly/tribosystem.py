@@ -133,12 +133,14 @@ class Tribosystem(ContactSetup):
         Args:
             directions: Sliding direction d of each phase that is solved for.
         """
-        return self._contact([SlidingContact(self.interface, self.friction_ratio(d)) for d in directions])
+        phases = [SlidingContact(self.interface, self.friction_ratio(d)) for d in directions]
+        return self._contact(phases, [self.bodies] * len(phases))
 
     def phase_contact(self, phases: Sequence[int]) -> ContactSolver:
         """Return the contact of phases of the motion, given by their numbers."""
         ratios = self.friction_ratios()
-        return self._contact([SlidingContact(self.interfaces[k], ratios[k]) for k in phases])
+        sliding = [SlidingContact(self.interfaces[k], ratios[k]) for k in phases]
+        return self._contact(sliding, [self.loaded[k] for k in phases])
 
     def passed_contact(self, phase: int, *, capped: bool = True, following: bool = False) -> ContactSolver:
         """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can.
@@ -148,8 +150,10 @@ class Tribosystem(ContactSetup):
         interface = self.interfaces[phase] if self.creep is None else self.creep.grown[phase]
         return self._contact(
             [SlidingContact(interface, self.friction_ratios()[phase])],
+            [self.loaded[phase]],
             self.layers.hardness if capped else np.inf,
             following=following,
+            softer=None if self.creep is None else self.creep.softer(phase),
         )
 
     def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
@@ -168,9 +172,18 @@ class Tribosystem(ContactSetup):
         found = super().unworn()
         return found if self.creep is None else replace(found, crept=self.creep.beginning())
 
-    def _contact(self, phases: list[SlidingContact], most: float = np.inf, *, following: bool = False) -> ContactSolver:
+    def _contact(
+        self,
+        phases: list[SlidingContact],
+        bodies: list[Bodies],
+        most: float = np.inf,
+        *,
+        following: bool = False,
+        softer: tuple[float, float] | None = None,
+    ) -> ContactSolver:
         if self.solver == "full":
-            return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
+            pairs = [(own.punch, own.strip) for own in bodies]
+            return FullContact(phases, pairs, None if softer is None else [softer])
         return CondensedContact(phases, self.remedies, self.team, most, following=following)
 
     @told_by_name

@@ -23,7 +23,8 @@ class Run(Part):
         description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
     )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
-        default=None, description="stop when pressure repeats within this fraction of its scale"
+        default=None,
+        description="stop when pressure repeats within this fraction of its scale; of a program within its last step",
     )
 
 
@@ -94,6 +95,12 @@ class ProgramStep(Part):
             if rests and self.distance is not None:
                 raise ValueError(f"distance: expected time or cycles: {key} is zero, and nothing slides in this step")
         return self
+
+    @property
+    def ramps(self) -> list[str]:
+        """The keys of what goes from one value to another."""
+        values = {key: getattr(self, key) for key in type(self).model_fields}
+        return [key for key, value in values.items() if isinstance(value, tuple) and len(set(value)) > 1]
 
 
 class Program(Part):

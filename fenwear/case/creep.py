@@ -40,20 +40,17 @@ class Creep(Part):
         return self
 
 
-def creep_problems(bodies: Mapping[str, Any], layer: Any, solver: str, *, passes_on: bool) -> list[str]:
+def creep_problems(bodies: Mapping[str, Any], layer: Any, *, passes_on: bool) -> list[str]:
     """Return what does not go with creep.
 
     Args:
         bodies: Punch and strip.
         layer: Of the contact; None without.
-        solver: Of the contact.
         passes_on: Whether the strip's material passes under the punch and does not come back.
     """
     given = {f"{name}.creep": body.creep for name, body in bodies.items()}
     creeps = [key for key, creep in {**given, "contact.layer.creep": getattr(layer, "creep", None)}.items() if creep]
     problems = []
-    if creeps and solver == "full":
-        problems.append(f"contact.solver: expected 'condensed' with {creeps[0]}")
     if "strip.creep" in creeps and passes_on:
         problems.append(
             "strip.creep: expected a motion to and fro: sliding one way, what has crept leaves the contact, and other "

@@ -101,8 +101,6 @@ class Case(Part):
             ]
         if self.heat is not None:
             problems += self._thermal_problems(self.heat)
-        if self.contact.solver == "full" and self.run.integration != "explicit":
-            problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
         problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
         problems += [*self._kind_problems(), *self._sliding_problems(), *self._operator_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
@@ -148,9 +146,12 @@ class Case(Part):
             f"with {' and '.join(f'{name}.topography' for name in rough)}, which a coarser grid would lose": bool(
                 rough
             ),
-            "with a program": self.program is not None,
-            "with creep": any(body.creep is not None for body in self.bodies.values()),
         }
+        creeps = [f"{name}.creep" for name, body in self.bodies.items() if body.creep is not None]
+        against[
+            f"with {' and '.join(creeps)}: a body that creeps remembers how far each place of its surface has been "
+            "displaced, and places that a grid comes to later were not followed"
+        ] = bool(creeps)
         return [f"grid.across: expected grid.nodes, of a grid that stays, {why}" for why, so in against.items() if so]
 
     def _kind_problems(self) -> list[str]:
@@ -187,8 +188,6 @@ class Case(Part):
             problems.append("motion.kind: expected rotation or oscillation, or a cycle, in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind != "plane" and self.contact.solver == "full" and not self.sticks:
-            problems.append("contact.solver: expected 'condensed' but in plane models and with contact.law = 'coulomb'")
         return problems
 
     def _cycle_problems(self, motion: Cycle) -> list[str]:
@@ -200,8 +199,6 @@ class Case(Part):
             problems += [f"motion.columns: expected no column {name} {why}" for name in leaving]
         if motion.course.rests and not self.sticks:
             problems.append("motion.columns: expected a motion: the strip stays in its place in all rows")
-        if self.contact.solver == "full" and not self.sticks:
-            problems.append("contact.solver: expected 'condensed' with motion.kind = 'cycle'")
         return problems
 
     def loads_of(self, body: str) -> tuple[Load | CourseLoad, ...]:
@@ -304,14 +301,8 @@ class Case(Part):
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
-        lies = [f"contact.{name}" for name in ("third_body", "layer", "hardness") if getattr(self.contact, name)]
-        lies += [f"wear.{body}.coating.modulus" for body, law in self.wear.by_body.items() if law and law.gives_way]
-        if self.contact.solver == "full" and lies:
-            problems.append(f"contact.solver: expected 'condensed' with {lies[0]}")
         passes_on = one_way and self.passes
-        problems += creep_problems(self.bodies, self.contact.layer, self.contact.solver, passes_on=passes_on)
-        if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
-            problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
+        problems += creep_problems(self.bodies, self.contact.layer, passes_on=passes_on)
         several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1
         if not self.passes and (several or (isinstance(motion, Cycle) and motion.positions == "steps")):
             problems.append("motion.positions: expected 1 for sliding out of the plane")
@@ -414,14 +405,17 @@ class Case(Part):
                 "program.radius: missing, but required where the strip turns and a step has a distance: the radius at "
                 "which it is slid, such as that of the middle of the wear track"
             )
-        if self.contact.solver == "full":
-            problems.append("contact.solver: expected 'condensed' with a program")
         if any(step.load for step in self.program.steps) and any(step.load_factors for step in self.program.steps):
             problems.append(
                 "program.steps: load is the sum of the case's loads; expected load_factor with load_factors"
             )
-        if self.run.periodic_within is not None:
-            problems.append("run.periodic_within: a program ends with its last step; expected none")
+        ramps = self.program.steps[-1].ramps
+        if self.run.periodic_within is not None and ramps:
+            at = f"program.steps.{len(self.program.steps) - 1}.{ramps[0]}"
+            problems.append(
+                f"run.periodic_within: expected a last step of the program that stays as it is: cycles do not repeat "
+                f"while {at} goes from one value to another"
+            )
         return problems
 
     def _other_cycle_problems(self, motion: Cycle, at: str) -> list[str]:
@@ -496,8 +490,6 @@ class Case(Part):
             for key in needed
             if getattr(self.materials[name], key) is None
         ]
-        if self.contact.solver == "full":
-            problems.append("contact.solver: expected 'condensed' with heat")
         if not isinstance(self.motion, OneWay | Rotation):
             problems += [
                 f"heat.{key}: expected one-way sliding: to and fro the same material stays, and none enters"

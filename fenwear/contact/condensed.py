@@ -116,6 +116,12 @@ class WearCompliance(Protocol):
 class ContactSolver(Protocol):
     """Contact in a fixed sequence of phases, kept for many solves."""
 
+    def press(self, factor: float) -> None:
+        """Take all loads times a factor."""
+
+    def slide(self, ratios: Sequence[Array]) -> None:
+        """Set tau of each phase, (n, d) each."""
+
     def solve(
         self,
         gap: Array,

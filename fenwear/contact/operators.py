@@ -338,7 +338,7 @@ class Phases:
         if m == 1 and coupling is None and border is None and local is None:
             self._whole = Dense(blocks[0])
         elif m == 1 or coupling is not None or m * size <= DENSE:
-            self._whole = Dense(_whole(blocks, coupling, border, local))
+            self._whole = Dense(whole(blocks, coupling, border, local))
         elif local is not None:
             unit, n = np.eye(local.shape[1]), local.shape[1]
             self.border = np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
@@ -395,7 +395,7 @@ class Phases:
         return solve
 
 
-def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None, local: Array | None) -> Array:
+def whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None, local: Array | None) -> Array:
     """Return the matrix as one (m size, m size)."""
     m, size, _ = blocks.shape
     matrix: Array = np.zeros((m * size, m * size))

@@ -58,7 +58,8 @@ def evolve(
         own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         bound = tolerance or run.jump_tolerance
-        return integrate(own, how, span, bound, start=state, leave=leave, periodic_within=run.periodic_within)
+        within = span.periodic_within(run.periodic_within)
+        return integrate(own, how, span, bound, start=state, leave=leave, periodic_within=within)
 
     if how == "jump":
         system = with_reduced_heat(system)

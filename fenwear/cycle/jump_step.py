@@ -349,7 +349,7 @@ class Stepper:
     def _press(self, half_cycle: int, cycles: float) -> None:
         """Take the time and the loads so many cycles after a half-cycle."""
         self._done = half_cycle + cycles * self.system.motion.half_cycles
-        if self.loading is not as_given and isinstance(self.contact, CondensedContact):
+        if self.loading is not as_given:
             self._load = self.loading(self._done)
             self.contact.press(self._load)
 
@@ -433,8 +433,7 @@ class Stepper:
         if system.friction.constant:
             return
         self.ratios = system.friction_ratios(conditions)
-        if isinstance(self.contact, CondensedContact):
-            self.contact.slide(self.ratios)
+        self.contact.slide(self.ratios)
 
     def _measure(self, friction: Sequence[Array]) -> None:
         self.meters = [PhaseMeter(self.system, k, mu, self.wear.some([k])) for k, mu in enumerate(friction)]

@@ -104,7 +104,7 @@ class PhaseStep:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
         temperature = temperature or self._initial
-        if load != self._load and isinstance(self._contact, CondensedContact):
+        if load != self._load:
             self._contact.press(load)
             self._load = load
         if self._thermal is not None and temperature is not None:
@@ -233,7 +233,7 @@ class PhaseStep:
             (conditions,), end, _ = evolution.through(system.layers.held(worn))
         # Once the phase has ended its friction is known, but for one that has followed the pressure.
         changes = not system.friction.constant and (self._follows or not ended)
-        if changes and isinstance(self._contact, CondensedContact):
+        if changes:
             mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = self._bare + mu[:, None] * self._along
             if not ended:
@@ -269,9 +269,8 @@ class PhaseStep:
                 return self._capped(temperature, gap, start, passing, worn)
             except ConvergenceError:  # so much flows that too little else carries on the way to the solution
                 contact = self._uncapped
-                if isinstance(contact, CondensedContact):
-                    contact.press(self._load)
-                    contact.slide([self._friction_ratio])
+                contact.press(self._load)
+                contact.slide([self._friction_ratio])
         return self._flowing(contact, temperature, gap, start, passing, worn)
 
     def _capped(

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fenwear.assembly import Clock, ContactSetup, Tribosystem, with_case
+from fenwear.assembly import Clock, ContactLaw, ContactSetup, Tribosystem, grows, regridded, with_case, with_room
 from fenwear.case import Case, Cycle
 from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import Loading, as_given
 from fenwear.cycle.follow import follow
-from fenwear.cycle.state import RunState, with_phases
+from fenwear.cycle.state import RunState, carried_by, on_other_grid, with_phases
 from fenwear.errors import CaseError, InputError
 
 MOST_RECURRING = 16  # systems of stages that are held at once, each with its steps of heat
@@ -24,10 +24,18 @@ MOST_RECURRING = 16  # systems of stages that are held at once, each with its st
 
 @dataclass(frozen=True)
 class Span:
-    """Where an integration ends, and the factor of all loads on the way."""
+    """Where an integration ends at the latest, the factor of all loads on the way, and whether it is the last one.
+
+    The last one may end before, where its cycles repeat.
+    """
 
     until: int
     loading: Loading = as_given
+    last: bool = True
+
+    def periodic_within(self, asked: float | None) -> float | None:
+        """Return within what its cycles have to repeat to end it, as a case asks for; None where they cannot."""
+        return asked if self.last else None
 
 
 # Runs a system from a state over a span, and leaves at the first state for which it is told to.
@@ -62,7 +70,7 @@ def follow_program(
             continue
         if stage.begin >= half_cycles:
             return
-        span = Span(min(stage.end, half_cycles), loading_of(base, stage))
+        span = Span(min(stage.end, half_cycles), loading_of(base, stage), stage is stages[-1])
 
         def adapt(moved: Tribosystem, stage: Stage = stage) -> Tribosystem:
             nonlocal base
@@ -75,10 +83,37 @@ def follow_program(
         ) -> Iterator[Block]:
             return integrate(own, state, leave, span)
 
+        larger, state = _with_larger_grid(base, stage, state, span.loading(max(done, stage.begin)))
+        if larger is not base:
+            base = larger
+            again.forget()
         own = again.at_stage(base, stage)
         for block in follow(own, run, with_phases(state, len(own.motion.phases)), adapt):
             yield block
             state = block.end
+            if state.half_cycle >= span.until:  # what it asks for by now the next stage has
+                break
+
+
+def _with_larger_grid(
+    base: Tribosystem, stage: Stage, state: RunState | None, load: float
+) -> tuple[Tribosystem, RunState | None]:
+    """Return both on a grid that has room for the contact under loads that begin to act; collective.
+
+    Args:
+        base: Of the case.
+        stage: That begins.
+        state: Where a run is; None at its beginning, whose grid is around its first contact.
+        load: Factor of all loads.
+    """
+    while state is not None and grows(base):
+        own = at_stage(base, stage)
+        grid = with_room(own, state.worn, carried_by(state), load)
+        if grid is None:
+            break
+        base, before = regridded(base, grid), with_phases(state, len(own.motion.phases)) or state
+        state = on_other_grid(before, own, at_stage(base, stage))
+    return base, state
 
 
 def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
@@ -88,7 +123,13 @@ def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
         system: Of the case, on meshes as they are now.
         stage: Of its program.
     """
-    return _at_its_time(with_case(system, stage.case), system, stage)
+    return _at_its_time(_varied(system, stage), system, stage)
+
+
+def _varied(system: Tribosystem, stage: Stage) -> Tribosystem:
+    """Return the system of the case of a stage, which leaves the bodies and their grids as they are; collective."""
+    law: ContactLaw = system.contact_law
+    return law.varied(system, stage.case)
 
 
 def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
@@ -112,7 +153,7 @@ class Recurring:
         key = _changes(stage)
         case, staged = self._made.get(key, (None, None))
         if staged is None or case != stage.case:
-            staged = with_case(system, stage.case)
+            staged = _varied(system, stage)
             if self._times[key] > 1 and len(self._made) < MOST_RECURRING:
                 self._made[key] = stage.case, staged
         return _at_its_time(staged, system, stage)

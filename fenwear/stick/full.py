@@ -2,10 +2,11 @@
 
 What the tractions f = (p, t) do to the bodies is solved for in every Newton step together with them,
 
-    K_1 u_1 - J_1^T W f = 0,    K_2 u_2 + J_2^T W f = 0,    A f + B (J_1 u_1 - J_2 u_2 + H a - V delta + free) = 0,
+    K_1 u_1 - J_1^T W f = 0,    K_2 u_2 + J_2^T W f = 0,    A f + B (J_1 u_1 - J_2 u_2 + H a - V delta + free) = b,
 
-with the balance of the rigid modes and of an imposed force; A and B say of each node whether it is open, sticks or
-slips (`equations`). The loads' own displacements are in `free`, as there. Rank 0 has all of it: cases must be small.
+with the balance of the rigid modes and of an imposed force; A and B say of each node whether it is open, sticks, slips
+or flows (`equations`), and how what lies between gives way. A body that has crept to c times its compliance over the
+step has K / c. The loads' own displacements are in `free`, as there. Rank 0 has all of it: cases must be small.
 """
 
 from __future__ import annotations
@@ -43,39 +44,64 @@ class FullStep(Step):
     def _solve(self, whole: WholeBodies, status: ContactStatus) -> StatusSolution:
         position, r, loose = self.position, self.position.modes.shape[1], self.imposed.force is not None
         count, size = self.d * self.n, whole.stiffness.shape[0]
-        A, B = self._laws_of(status)
+        softer = (1.0, 1.0, 1.0) if self.creep is None else self.creep.factors(self.imposed.duration)
+        gives, closed_at_none = self._given_way(status)
+        A, B = self._laws_of(status, gives)
         rigid = csr_array(position.modes * self.units)
         drive = csr_array(-position.drive[:, None] * self.length)
         none = csr_array((size, 1))
         rows: list[list[Any]] = [
-            [whole.stiffness, -whole.pushed, csr_array((size, r))],
+            [whole.softened(softer[0], softer[1]), -whole.pushed, csr_array((size, r))],
             [B @ whole.seen, A, B @ rigid],
             [None, csr_array(position.balance * (self.units / (self.length * self.area))[:, None]), None],
         ]
-        rest, right = self.free, [np.zeros(size)]
+        rest, right = self.free.copy(), [np.zeros(size)]
+        rest[: self.n] += closed_at_none
         if loose:
             rows = [[*row, extra] for row, extra in zip(rows, (none, B @ drive, None), strict=True)]
             rows.append([None, csr_array((position.pull / self.area)[None]), None, None])
         else:
             rest = rest - position.drive * (self.imposed.displacement or 0.0)
-        right += [-(B @ rest), -self.imposed.loaded.resultant * self.units / (self.length * self.area)]
+        laws = -(B @ rest)
+        laws[: self.n][status.flowing] = self.hardness
+        right += [laws, -self.imposed.loaded.resultant * self.units / (self.length * self.area)]
         right += [np.array([(self.imposed.force or 0.0) / self.area])] if loose else []
         if not r:
             rows = [[part for k, part in enumerate(row) if k != 2] for row in (*rows[:2], *rows[3:])]
         x, sign = _solved(csc_array(block_array(rows)), np.concatenate(right))
         u, f, a, problem = np.split(x, np.cumsum([size, count, r]))
         displacement = float(problem[0] * self.length) if loose else float(self.imposed.displacement or 0.0)
-        on_punch, on_strip = ((trace @ u).reshape(self.d, -1).T for trace in whole.trace)
-        moved = SurfaceDisplacement(whole.seen @ u, on_punch, on_strip)
+        on_punch, on_strip = (
+            (trace @ u).reshape(self.d, -1).T / times for trace, times in zip(whole.trace, softer, strict=False)
+        )
+        apart = whole.seen @ u
+        if (layer := position.interface.layer) is not None:
+            apart[: self.n] += layer * f[: self.n]
+        moved = SurfaceDisplacement(apart, on_punch, on_strip)
         return StatusSolution(f, a * self.units, displacement, sign * (-1) ** r, moved)
 
-    def _laws_of(self, status: ContactStatus) -> tuple[csr_array, csr_array]:
-        """Return A and B (d n, d n) of the laws A f + B j = 0 of a contact status."""
+    def _given_way(self, status: ContactStatus) -> tuple[Array, Array]:
+        """Return how what lies between gives way at the pressures of a status: slope, closure at no pressure (n,)."""
+        layer = self.position.interface.layer
+        slope = np.zeros(self.n) if layer is None else layer
+        if self.closure is None:
+            return slope, np.zeros(self.n)
+        own, pressure = self.closure.slope(status.pressure), status.pressure
+        return slope + own, np.where(status.closed, self.closure.closure(pressure) - own * pressure, 0.0)
+
+    def _laws_of(self, status: ContactStatus, gives: Array) -> tuple[csr_array, csr_array]:
+        """Return A and B (d n, d n) of the laws A f + B j = b of a contact status, where unit pressures give way.
+
+        Without pressure it may give way as much as it likes: those rows are made of one size.
+        """
         n, m, closed, slips = self.n, self.m, status.closed, status.closed & status.slipping
         A = np.zeros((self.d, self.d, n))
         B = np.zeros((self.d, self.d, n))
         unit = 1 / self.scale
-        A[0, 0], B[0, 0] = ~closed, closed * unit[0]
+        size = unit[0] / (1 + gives * unit[0])
+        A[0, 0] = np.where(closed, gives * size, 1.0)
+        B[0, 0] = np.where(closed, size, 0.0)
+        A[0, 0, status.flowing], B[0, 0, status.flowing] = 1.0, 0.0
         K, direction = np.zeros((n, m, m)), np.zeros((n, m))
         if slips.any():
             K[slips], direction[slips] = derivative(status.trial[slips], status.radius[slips])

@@ -28,12 +28,24 @@ class WholeBodies:
         seen: J_1 and -J_2: the gap and the tangential displacements that displacements make (d n, N).
         pushed: What tractions add to the nodal forces (N, d n), N/mm or N.
         trace: Of the contact nodes of the punch, and of what the strip was condensed onto, each (k d, N).
+        sizes: Of the displacements of punch and strip.
     """
 
     stiffness: csr_array
     seen: csr_array
     pushed: csr_array
     trace: tuple[csr_array, csr_array]
+    sizes: tuple[int, int]
+
+    def softened(self, punch: float, strip: float) -> csr_array:
+        """Return the stiffness of bodies so many times as soft."""
+        if punch == strip == 1.0:
+            return self.stiffness
+        found, (first, second) = self.stiffness.tocoo(), self.sizes
+        rows, columns = found.coords
+        last = np.maximum(rows, columns)
+        by = np.where(last < first, punch, np.where(last < first + second, strip, 1.0))
+        return csr_array((found.data / by, (rows, columns)), shape=found.shape)
 
 
 def whole_bodies(bodies: Bodies, position: Position, *, moves: bool) -> WholeBodies:
@@ -70,6 +82,7 @@ def whole_bodies(bodies: Bodies, position: Position, *, moves: bool) -> WholeBod
             csr_array(block_array([[traces[0], none[0]]])),
             csr_array(block_array([[none[1], traces[1]]])),
         ),
+        (sizes[0], sizes[1]),
     )
     return found if all(body.guides is None for body in both) else _guided(found, both, free, position.weights)
 
@@ -89,6 +102,7 @@ def _guided(whole: WholeBodies, both: tuple[ElasticBody, ElasticBody], free: Any
         shown(whole.seen),
         csr_array(block_array([[whole.pushed], [moments], [none]])),
         (shown(whole.trace[0]), shown(whole.trace[1])),
+        whole.sizes,
     )
 
 

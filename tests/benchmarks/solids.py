@@ -24,7 +24,7 @@ from mpi4py import MPI
 from fenwear import Tribosystem
 from fenwear.assembly import elastic, place_case, with_exchange
 from fenwear.case import Case, make_case
-from fenwear.contact import FullContact
+from fenwear.contact import FullContact, SlidingContact
 from fenwear.cycle import jump, march, steady
 
 PARTS = ("warm", "jumps", "steady", "full", "heat")
@@ -91,7 +91,7 @@ def full_space(system: Tribosystem, each: float) -> None:
     ratio = system.friction_ratio(1)
     gap = system.gap(0, system.unworn()) + 1e-5 * np.hypot(*system.pair.punch.x[:, :2].T) ** 2
     condensed = system.phase_contact((0,)).solve(gap).pressure[0]
-    full = FullContact(system.bodies.punch, system.bodies.strip, system.interfaces[0], ratio)
+    full = FullContact([SlidingContact(system.interfaces[0], ratio)], [(system.bodies.punch, system.bodies.strip)])
     begin = time.process_time()
     pressure = full.solve(gap).pressure[0]
     spent = time.process_time() - begin

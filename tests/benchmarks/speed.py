@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fenwear import Tribosystem, assemble, load_case, march, steady
-from fenwear.contact.full import FullContact
+from fenwear.contact import FullContact, SlidingContact
 from fenwear.cycle import jump
 
 
@@ -30,7 +30,10 @@ def full_against_condensed(system: Tribosystem, half_cycles: int = 100) -> None:
     solvers = [
         (
             system.contact((d,)),
-            FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d)),
+            FullContact(
+                [SlidingContact(system.interface, system.friction_ratio(d))],
+                [(system.bodies.punch, system.bodies.strip)],
+            ),
         )
         for d in (1, -1)
     ]

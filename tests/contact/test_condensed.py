@@ -15,6 +15,7 @@ from fenwear import ConvergenceError, Tribosystem, assemble, march
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.full import FullContact
+from fenwear.interface import Interface
 from fenwear.remedies import SOFTER_START
 from fenwear.sliding.wear import WornDepths
 
@@ -59,6 +60,11 @@ def test_wear_that_is_far_more_than_the_bodies_give(assembled: Callable[..., Tri
     np.testing.assert_allclose(found.rigid[0] + far, reference.rigid[0], rtol=0, atol=1e-12 * depth)
 
 
+def full_contact(system: Tribosystem, interface: Interface, ratio: Array) -> FullContact:
+    """Return one phase on all displacements of both bodies."""
+    return FullContact([SlidingContact(interface, ratio)], [(system.bodies.punch, system.bodies.strip)])
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_balance_and_complementarity(system: Tribosystem, direction: int) -> None:
     """Verification 5 and 7: force and moment to round-off; p >= 0, gap >= 0, p gap = 0 exactly."""
@@ -91,10 +97,7 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
 def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
     system = assembled(name, *OPENING, "geometry.parameters.elements_along_contact=8")
-    full = [
-        FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d))
-        for d in (1, -1)
-    ]
+    full = [full_contact(system, system.interface, system.friction_ratio(d)) for d in (1, -1)]
     condensed = [system.contact((d,)) for d in (1, -1)]
     wear, opened = np.zeros_like(system.pair.x), False
     for half_cycle in range(4):
@@ -111,8 +114,7 @@ def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str)
 
 def test_condensed_equals_full_on_unmatched_nodes(unmatched: Tribosystem) -> None:
     """The same where the nodes of the two surfaces do not coincide."""
-    bodies, ratio = unmatched.bodies, unmatched.friction_ratio(-1)
-    full = FullContact(bodies.punch, bodies.strip, unmatched.interface, ratio).solve(worn(unmatched))
+    full = full_contact(unmatched, unmatched.interface, unmatched.friction_ratio(-1)).solve(worn(unmatched))
     condensed = unmatched.contact((-1,)).solve(worn(unmatched))
     np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * condensed.pressure.max())
 
@@ -201,7 +203,7 @@ def test_no_convergence_is_said(assembled: Callable[..., Tribosystem], one_itera
     contact = (
         system.contact((1,))
         if solver == "condensed"
-        else FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(1))
+        else full_contact(system, system.interface, system.friction_ratio(1))
     )
     with pytest.raises(ConvergenceError, match=r"DIVERGED_MAX_IT after 1 .*-fenwear_.*contact_snes"):
         contact.solve(worn(system))
@@ -283,7 +285,7 @@ def test_action_is_reaction_on_a_scarred_surface(assembled: Callable[..., Tribos
         interface = system.interfaces[phase]
         gap = system.gap(phase, scar)
         condensed = CondensedContact([SlidingContact(interface, ratio)]).solve(gap)
-        full = FullContact(system.bodies.punch, system.bodies.strip, interface, ratio).solve(gap)
+        full = full_contact(system, interface, ratio).solve(gap)
         scale = condensed.pressure.max()
         np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * scale)
         force = (interface.pair.normal + ratio).T @ (interface.pair.weights * condensed.pressure[0])

@@ -122,6 +122,60 @@ def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
         assert (np.diff(volume) > 0).all()
 
 
+STEPS = [
+    {"cycles": 3, "load_factor": 0.3},
+    {"cycles": 4, "load_factor": [1.0, 1.5]},
+    {"cycles": 3, "load_factor": 0.5, "amplitude": 0.3},
+]
+
+
+def ends_on_rim(block: Block) -> float:
+    """Return the largest pressure on the rim of the grid of a block."""
+    grid = block.system.pair.punch.grid
+    assert grid is not None
+    whole = block.pressure[-1].reshape(grid.counts)
+    return float(max(whole[[0, -1]].max(), whole[:, [0, -1]].max()))
+
+
+@pytest.mark.parametrize("how", ["explicit", "jump"])
+def test_programs_go_on_with_the_grid_and_find_room_for_their_loads(how: str) -> None:
+    """No step up presses on the rim of the grid; volumes and depths are those of a wide grid that stays."""
+    run = {"half_cycles": 20, "integration": how, "jump_tolerance": 0.01}
+    more = {"program": {"steps": STEPS}, "run": run}
+    blocks = list(evolve(assemble(growing({"across": 12}, **more))))
+    wide = list(evolve(assemble(growing({"nodes": 73}, **more))))[-1]
+    counts = [block.system.pair.punch.grid.counts for block in blocks if block.system.pair.punch.grid]
+    assert len(set(counts)) > 2
+    assert {block.load_factor[-1] for block in blocks} >= {0.3, 0.5}
+    for block in blocks:
+        assert ends_on_rim(block) == 0
+        for body in ("punch", "strip"):
+            depth, weights = getattr(block.end.worn, body), getattr(block.system.pair, body).weights
+            assert depth @ weights == pytest.approx(block.end.totals.of(f"volume_{body}"), rel=1e-12)
+    last, at = blocks[-1], np.linspace(-0.6, 0.6, 49)
+    for body in ("punch", "strip"):
+        one, other = profile(last, body, at), profile(wide, body, at)
+        assert one == pytest.approx(other, abs=0.03 * other.max())
+        volume = wide.end.totals.of(f"volume_{body}")
+        assert last.end.totals.of(f"volume_{body}") == pytest.approx(volume, rel=2e-3)
+
+
+def test_what_a_layer_has_crept_stays_where_it_is() -> None:
+    """Node by node as on a grid that was as wide at first; where nothing pressed nothing has crept."""
+    layer = {"kind": "linear", "stiffness": "2e5 MPa/mm", "creep": {"terms": [{"compliance": 0.5, "time": "10 s"}]}}
+    contact = {"friction": 0.3, "layer": layer}
+    system = assemble(growing({"across": 10}, contact=contact, run={"half_cycles": 12}))
+    grown = list(evolve(system))
+    last = grown[-1]
+    assert len({block.system.pair.punch.grid for block in grown}) > 1
+    wide = list(evolve(regridded(system, last.system.pair.punch.grid)))[-1]
+    one, other = last.end.worn.crept, wide.end.worn.crept
+    assert other.max() > 0
+    assert one == pytest.approx(other, abs=1e-6 * other.max())
+    never = last.end.worn.punch == 0
+    assert np.abs(one[never]).max() == 0
+
+
 STILL = {"kind": "reciprocating", "amplitude": 0.02, "period": 1.0, "positions": 1}
 STICKS: dict[str, Any] = {
     "contact": {"friction": 0.8, "law": "coulomb"},
@@ -170,6 +224,22 @@ def test_with_stick_jumps_go_with_the_march_and_runs_go_on(tmp_path: Path) -> No
     assert resumed["punch"]["worn_volume_mm3"] == pytest.approx(marched.end.totals.of("volume_punch"), rel=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("sticks", [False, True])
+def test_a_program_goes_on_from_a_grid_that_has_grown(sticks: bool, tmp_path: Path) -> None:
+    """In parts it ends as in one piece, whether it was cut within a step or where its loads step up."""
+
+    def case(count: int) -> Case:
+        more = {**(STICKS if sticks else {}), "program": {"steps": [{**one, "amplitude": 0.02} for one in STEPS]}}
+        return growing({"across": 10}, **more, run={"half_cycles": count, "integration": "explicit"})
+
+    straight, _ = run_case(case(20), output=tmp_path / "whole", log=lambda _: None)
+    for count in (4, 6, 9, 20):
+        resumed, _ = run_case(case(count), output=tmp_path / "parts", log=lambda _: None, resume=count > 4)
+    for table in ("punch", "strip"):  # with stick to what solvers leave, who begin elsewhere where loads step up
+        assert resumed[table] == pytest.approx(straight[table], rel=1e-6 if sticks else 1e-9), table
+
+
 @pytest.mark.parametrize("sticks", [False, True])
 def test_the_end_is_that_of_a_grid_that_stays(sticks: bool) -> None:
     """The steady state, and the end of partial slip, on the grid that they have grown to."""
@@ -197,7 +267,7 @@ def test_the_end_is_that_of_a_grid_that_stays(sticks: bool) -> None:
         {"grid": {"across": 64, "nodes": 65}},
         {"strip": {"operator": "condensed"}},
         {"punch": {"topography": {"rms": "0.1 um", "longest": 1}}},
-        {"program": {"steps": [{"cycles": 10}]}},
+        {"punch": {"creep": {"terms": [{"compliance": 0.2, "time": "10 s"}]}}},
     ],
 )
 def test_what_does_not_go_with_a_grid_that_grows(more: dict[str, Any]) -> None:

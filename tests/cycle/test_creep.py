@@ -178,10 +178,6 @@ def test_growth_without_an_end() -> None:
         ("strip.creep={}", "strip.creep: expected terms"),
         ("strip.creep={per_decade=1}", "strip.creep.onset"),
         ("strip.creep={per_decade=0, onset=1}", "strip.creep.per_decade"),
-        (
-            "contact={solver='full', layer={kind='linear', stiffness=1, creep={per_decade=1, onset=1}}}",
-            "contact.solver",
-        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_by_its_key(setting: str, text: str) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case, steady
 from fenwear.case.program import cycle_of, read_program, stages_of
-from fenwear.cycle import Block, Span, at_step, follow_program, program
+from fenwear.cycle import Block, Span, at_step, evolve, follow_program, program
 from fenwear.errors import CaseError
 from fenwear.plausibility import stroke_warnings
 from tests.results.test_contacts import two_pads
@@ -33,6 +33,43 @@ def jumped(system: Tribosystem, state: Any, leave: Any, span: Span, tolerance: f
 
 def steps_of(steps: list[dict[str, Any]], **more: Any) -> Callable[[dict[str, Any]], object]:
     return lambda tables: tables.update(program={"steps": steps, **more}) or tables["run"].pop("half_cycles")
+
+
+def test_a_program_ends_where_the_cycles_of_its_last_step_repeat(edited: Edited, tmp_path: Path) -> None:
+    """Steps before it go on to their ends, though cycles repeat there; in parts it ends where it does in one piece."""
+    limit, first = 0.03, 200
+    steps = [{"cycles": first // 2, "load_factor": 0.5}, {"cycles": 5000, "load_factor": 1}]
+
+    def case(count: int, within: float | None = limit) -> Case:
+        def change(tables: dict[str, Any]) -> None:
+            tables.update(program={"steps": steps}, output={"report": False, "uncertainty": False})
+            tables["run"].update(half_cycles=count, integration="implicit")
+            tables["run"].update({} if within is None else {"periodic_within": within})
+
+        return edited("example1", change, *SMALL)
+
+    summary, _ = run_case(case(10_200), "whole", tmp_path / "whole", lambda _: None)
+    count = summary["half_cycles"]
+    assert summary["stop"] == "periodic"
+    history = read_history(tmp_path / "whole")
+    change = history["periodicity"].values
+    assert first < count < 10_200
+    assert (change[first - 2 : first] < limit).all()  # it was not asked for
+    assert not np.isnan(change[first:][2:]).any()
+    repeats = (change[first:] < limit) & (np.append(np.inf, change[first:-1]) < limit)
+    assert np.flatnonzero(repeats)[0] == count - first - 1  # the first whole cycle that does
+    *_, alone = evolve(assemble(case(count, None)))
+    np.testing.assert_allclose(history["pressure"].values[-1], alone.pressure[-1], rtol=0, atol=1e-9)
+    run_case(case(first + 3), "parts", tmp_path / "parts", lambda _: None)
+    resumed, _ = run_case(case(10_200), "parts", tmp_path / "parts", lambda _: None, resume=True)
+    assert resumed["half_cycles"] == count
+    with pytest.raises(CaseError, match=r"while program\.steps\.1\.load_factor goes"):
+        edited(
+            "example1",
+            steps_of([{"cycles": 9}, {"cycles": 9, "load_factor": [1, 2]}]),
+            *SMALL,
+            "run.periodic_within=0.1",
+        )
 
 
 def of(blocks: list[Block], name: str) -> np.ndarray:
@@ -144,8 +181,8 @@ def test_stages_that_come_again_are_set_up_once(edited: Edited, monkeypatch: pyt
     for stage in stages_of(case):
         *_, each = march(program.at_stage(system, stage), stage.end, start=state, implicit=True)
         state = each.end
-    set_up = program.with_case
-    monkeypatch.setattr(program, "with_case", lambda *given: (made.append(given), set_up(*given))[1])
+    set_up = program._varied
+    monkeypatch.setattr(program, "_varied", lambda *given: (made.append(given), set_up(*given))[1])
     *_, last = follow_program(system, marched, case.run.half_cycles)
     assert len(made) == 2
     for name in ("pressure", "wear"):

@@ -39,7 +39,6 @@ ISOLATED = ("heat.convection=0", "strip.temperatures=[]")
         (["heat.split_tolerance=1"], "heat.split_tolerance", "less than 1"),
         (["heat.operator=magic"], "heat.operator", "'reduced' or 'full'"),
         (["heat.partiton=0.5"], "heat.partiton", "did you mean 'partition'"),
-        (["contact.solver=full"], "contact.solver", "condensed"),
     ],
 )
 def test_refusal_names_the_key(settings: list[str], key: str, expected: str) -> None:

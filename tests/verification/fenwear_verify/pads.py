@@ -18,7 +18,7 @@ from scipy.interpolate import CloughTocher2DInterpolator
 from fenwear import vary
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
-from fenwear.contact.full import FullContact
+from fenwear.contact import FullContact, SlidingContact
 from fenwear_verify.bodies import builtin
 from fenwear_verify.brakes import INNER, OUTER, PADS, SPEED
 from fenwear_verify.suite import Result, Row, number, observed_order, profile, verification
@@ -165,7 +165,8 @@ def pads_apart() -> Result:
 def _in_full_space(both: Tribosystem) -> Row:
     """Compare the condensed contact of both pads with that of all displacements."""
     gap = both.pair.initial_gap + 2e-3 * np.cos(both.pair.punch.x[:, 0] / 7) ** 2
-    full = FullContact(both.bodies.punch, both.bodies.strip, both.interface, both.friction_ratio(1)).solve(gap)
+    whole = [(both.bodies.punch, both.bodies.strip)]
+    full = FullContact([SlidingContact(both.interface, both.friction_ratio(1))], whole).solve(gap)
     ours = both.contact((1,)).solve(gap).pressure.reshape(-1)
     known = full.pressure.reshape(-1)
     return profile("both pads in full space: pressure (MPa)", known, ours, 1e-8, scale=float(known.max()))

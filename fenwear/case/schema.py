@@ -457,10 +457,16 @@ class Case(Part):
         table = isinstance(self.motion, Cycle)
         columns = self.motion.column_names if isinstance(self.motion, Cycle) else ()
         wrong = {
-            "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
+            "contact.transverse_friction: expected 0, friction being against the slip that is found,": (
+                self.contact.transverse_friction != 0
+            ),
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
-            "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
-            "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
+            "heat.operator: expected 'reduced', whose heat each time step has as a matrix of its tractions,": (
+                self.heat is not None and self.heat.operator == "full"
+            ),
+            "heat.coupling: expected 'implicit', each time step being found together with its heat,": (
+                self.heat is not None and self.heat.coupling == "split"
+            ),
             "motion.kind: expected a motion to and fro, or a cycle,": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes and not table,
             "motion.columns: expected no column shift_y in a plane model, whose tractions lie in the plane,": (

@@ -60,6 +60,10 @@ FALLING = 0.7  # of the change of the properties in the pass before
 PASSES = 30
 JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
+NOTHING_WEARS = (
+    "no cyclic steady state of its own exists: pressures below the pressure_threshold balance the loads, so that "
+    "nothing wears and any of them stays. Follow the wear by `run`"
+)
 NO_ONE_MOTION = (
     "no cyclic steady state exists: no one rigid motion wears all that carries pressure, as where loads press a body "
     "to either side in turn, and both wear for ever. Follow the wear by `run`"
@@ -193,6 +197,8 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
         try:
             return _result(problem, *_solve(problem))
         except ConvergenceError as error:
+            if float(problem.wear.opening(np.full((problem.m, problem.n), problem.p_scale)).max()) == 0:
+                raise ConvergenceError(NOTHING_WEARS) from error
             if _loads_oppose(prepared):
                 raise ConvergenceError(NO_ONE_MOTION) from error
             raise
@@ -267,11 +273,6 @@ def _check_exists(system: Tribosystem) -> None:
         raise ConvergenceError(
             f"no cyclic steady state exists: {system.creep.endless} grows with the logarithm of time, for ever. Follow "
             "it by `run`, or give it terms alone"
-        )
-    if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
-        raise ConvergenceError(
-            "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "
-            "wear by `run`"
         )
     first = system.interfaces[0].rigid.rigid_normal
     if not np.abs(first).max(initial=0.0):
@@ -370,7 +371,9 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
             f"no cyclic steady state without plastic flow exists: its largest pressure of {peak:.4g} MPa is beyond "
             f"contact.hardness = {hardness:.4g} MPa, so that the surface flows in every cycle. Follow it by `run`"
         )
-    weights, motion = system.pair.weights, system.motion
+    weights, motion, worn = system.pair.weights, system.motion, problem.wear.opening(contact.pressure)[0]
+    if worn.max() <= ZERO * problem.wear_scale:
+        raise ConvergenceError(NOTHING_WEARS)
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
     if (contact.pressure[:, ~touched] > 0).any():  # its shape goes away from all others
@@ -387,7 +390,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
         contact.gap[middle],
         shape - system.pair.initial_gap,
         (contact.pressure[middle] > 0) @ weights,
-        problem.wear.opening(contact.pressure)[0],
+        worn,
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
         0.0,

@@ -64,7 +64,8 @@ class SteadyInequality:
         self.conditions: Sequence[ContactConditions] | None = None
         self.p_scale = rigid.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
-        self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
+        above = max((law.pressure_threshold for law in system.sliding.wear if law is not None), default=0.0)
+        self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale + above)).max()) / m
         self.lengths = system.mode_lengths
         self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
         self.omega = slice(m * n, m * n + n)

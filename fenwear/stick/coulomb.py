@@ -36,7 +36,7 @@ from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.gross_sliding import LAW as SLIDING
 from fenwear.cycle.state import RunState, beginning
 from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import WornDepths
@@ -179,7 +179,16 @@ class Coulomb:
             raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> FinalShape:  # noqa: ARG002
-        """Return the shape to which partial slip wears, of the grid that its scar has grown to; collective."""
+        """Return the shape to which partial slip wears, of the grid that its scar has grown to; collective.
+
+        Raises:
+            ConvergenceError: there is none, or none that does not depend on the way there.
+        """
+        if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
+            raise ConvergenceError(
+                "no one final shape exists with a pressure_threshold: what slips keeps any pressure below it, as the "
+                "way there has left it. Follow the wear by `run`"
+            )
         found = final_shape(system.law_state.problem)
         while grows(system):
             grid = outgrown(system, np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)))

@@ -11,6 +11,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
+from fenwear.memory import memory_size
 from fenwear.sliding.coating import coatings_of
 from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
@@ -138,12 +139,14 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
         CaseError: it does.
     """
     if surface.grid is not None and len(surface.x) > MOST_PASSING and _moves(case, surface):
+        matrix = memory_size(8.0 * surface.x.size**2)
         raise CaseError(
             InputError(
                 "motion.positions",
                 f"with stick, a strip that passes under the punch is solved by factors of its contact nodes, up to "
-                f"{MOST_PASSING:,} of a grid, got {len(surface.x):,}: expected 1 (surfaces stay opposite each other, "
-                "and any number of nodes goes), or fewer nodes of the grid",
+                f"{MOST_PASSING:,} of a grid, got {len(surface.x):,}: where all touch each Newton step factors a "
+                f"matrix of {matrix}, beside copies of it. Expected 1 (surfaces stay opposite each other, and any "
+                "number of nodes goes), or fewer nodes of the grid",
             )
         )
 

@@ -262,3 +262,33 @@ def test_cap_that_holds_nothing(assembled: Callable[..., Tribosystem]) -> None:
         steady(assembled("example2", *CAPPED, "wear.punch.pressure_cap=12"))
     with pytest.raises(ConvergenceError, match=r"pressure_cap = 20 MPa.*they grow without end.*without the cap 25 MPa"):
         steady(assembled("monotonic-lz20", *CAPPED, "wear.punch.pressure_cap=20"))
+
+
+@pytest.mark.parametrize(("name", "threshold"), [("example1", 14), ("fretting", 14)])
+def test_pressure_threshold(assembled: Callable[..., Tribosystem], name: str, threshold: int) -> None:
+    """Runs end there, node by node and in every phase, the nearer the longer they are; what wears is above it."""
+    few = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12", "geometry.follow_wear=never")
+    law = f"wear={{punch={{coefficient=1e-7, pressure_threshold={threshold}}}}}"
+    system = assembled(name, *few, law)
+    state, apart = steady(system), []
+    for cycles in (3_000, 100_000):
+        *_, last = jump(system, 2 * cycles, tolerance=1e-3)
+        pressure = np.concatenate([one.pressure for one in last.end.contacts if one is not None])
+        apart.append(float(np.abs(pressure - state.phase_pressure).max() / state.phase_pressure.max()))
+    assert apart[1] < 1e-8 < apart[0]
+    worn = state.wear_per_cycle > 0
+    assert (state.phase_pressure.max(axis=0)[worn] > threshold).all()
+
+
+@pytest.mark.parametrize("way", ["example1", "one way", "stick"])
+def test_pressures_below_the_threshold_have_no_end_of_their_own(
+    assembled: Callable[..., Tribosystem], way: str
+) -> None:
+    """Any of them stays: none is given. What slips partially has no end beside a threshold at all."""
+    few = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12", "geometry.follow_wear=never")
+    one_way = "motion={kind='one-way', direction='rightward', speed='10 mm/s', duration='0.1 s'}"
+    more = {"example1": few, "one way": (*few, one_way), "stick": ("geometry.parameters.elements_along_contact=8",)}
+    name = "fretting-partial-slip" if way == "stick" else "example1"
+    system = assembled(name, *more[way], "wear={punch={coefficient=1e-7, pressure_threshold=40}}")
+    with pytest.raises(ConvergenceError, match="pressure_threshold"):
+        steady(system)

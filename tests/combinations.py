@@ -72,6 +72,10 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "fretting-partial-slip",
         (*SMALL, "wear={punch={coefficient={expression='1e-7 * (1 + depth / 1e-5 + s / 1)', unit='1/MPa'}}}"),
     ),
+    "wear above a threshold": (
+        "fretting-partial-slip",
+        (*SMALL, "wear={punch={coefficient='1e-7 1/MPa', pressure_threshold='50 MPa'}}"),
+    ),
     "meshes that follow": ("fretting-partial-slip", (*SMALL, "geometry.follow_wear=1e-6")),
     "both bodies worn": (
         "fretting-partial-slip",
@@ -165,6 +169,7 @@ SLIDES = "what slides one way slips at every node after the first of it: gross s
 AROUND = "the model of rings has no displacement around the axis, along which they slide"
 PASSES = "changes as long as a run goes on: a cyclic steady state does not exist"
 DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
+KEEPS = "what slips keeps any pressure below the threshold, as the way there has left it: no end is known without it"
 FLOWS = "what flows beyond the hardness depends on the way there: no end is known without it"
 
 # Closed cells, by feature, law and way; None for all of them.
@@ -175,6 +180,7 @@ CLOSED: dict[tuple[str, str | None, str | None], str] = {
     ("wear by depth and distance", "gross sliding", "steady"): PASSES,
     ("both bodies worn", "gross sliding", "steady"): DEEPENS,
     ("debris on the strip", "gross sliding", "steady"): DEEPENS,
+    ("wear above a threshold", "stick (Coulomb)", "steady"): KEEPS,
     ("all that lies between", "stick (Coulomb)", "steady"): FLOWS,
 }
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -21,7 +22,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
-from fenwear.case import CONDENSED, Case, Grid
+from fenwear.case import AUTO, CONDENSED, Case, Grid
 from fenwear.case.program import stages_of
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
@@ -58,8 +59,10 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
     own = _grid(case.grid, punch.surface, axis, level)
     _check_memory(punch.body.mesh.comm, own, sliding)
     for body, grid in ((punch, own), (strip, _reached(case, own, sliding))):
+        if body.decides:
+            body.operator = AUTO
         surface, reading = _laid(case, body, grid)
-        body.lay_grid(surface, reading, None if case.grid.across is None else grid)
+        body.lay_grid(surface, reading, None if case.grid.across is None else grid, partial(_mortar, body, grid))
 
 
 def on_grid(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody, grid: RegularGrid) -> Both:

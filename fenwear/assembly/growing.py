@@ -81,7 +81,7 @@ def answers_anywhere(system: Tribosystem) -> bool:
     case, bodies = system.made_from, system.bodies
     if case is None or case.grid is None or bodies.followed is not None or bodies.warmed is not None:
         return False
-    return all(body.operator != CONDENSED for body in case.bodies.values())
+    return CONDENSED not in (bodies.punch.operator, bodies.strip.operator)
 
 
 def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:

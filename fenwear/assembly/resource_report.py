@@ -12,9 +12,11 @@ from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.condensation import deal
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.schur import available
-from fenwear.case import CONDENSED
+from fenwear.case import AUTO, CONDENSED
 from fenwear.memory import memory_size
 
+DECIDES = f"'fine' where its contact is far enough from edges, else '{CONDENSED}', one solution for each of its nodes"
+NO_FACTOR = "nothing is factored"
 DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
 
 
@@ -45,7 +47,7 @@ def body_lines(bodies: Bodies, wanted: Resources) -> list[str]:
     return [
         _text(body, need, ranks)
         if body.operator == CONDENSED
-        else f"{body.body.name}: operator '{body.operator}', nothing is factored"
+        else f"{body.body.name}: operator '{body.operator}', {DECIDES if body.operator == AUTO else NO_FACTOR}"
         for body, need, ranks in zip((bodies.punch, bodies.strip), own, dealt, strict=True)
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -31,7 +31,7 @@ from fenwear.bodies.mesh import BodyMesh
 from fenwear.bodies.multigrid import Multigrid
 from fenwear.bodies.substructure import Boundary, Substructures
 from fenwear.bodies.supports import Supports
-from fenwear.case import Body, Load, Setup
+from fenwear.case import AUTO, CONDENSED, Body, Load, Setup
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
@@ -108,7 +108,10 @@ class ElasticBody:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
         self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
-        self.operator, self.creep = description.operator, description.creep
+        self.operator = CONDENSED if description.operator == AUTO else description.operator
+        self.decides, self.taken = description.operator == AUTO, ""  # on a grid; what is to be said of the decision
+        self.mortar: Callable[[], csr_array] | None = None
+        self.creep = description.creep
         self.solver: Solver = "factor"
         self.holders = 1
         if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")
@@ -180,15 +183,22 @@ class ElasticBody:
             return np.zeros((*self.surface.trace.shape, 0))
         return self.on_surface(self.trace.pick(np.array(self.rigid_modes).T))
 
-    def lay_grid(self, surface: ContactSurface, reading: csr_array, reach: RegularGrid | None = None) -> None:
+    def lay_grid(
+        self,
+        surface: ContactSurface,
+        reading: csr_array,
+        reach: RegularGrid | None = None,
+        mortar: Callable[[], csr_array] | None = None,
+    ) -> None:
         """Let its contact surface be a grid of its own.
 
         Args:
             surface: The grid.
             reading: What takes values at the trace nodes of the mesh to it (N, N_mesh).
             reach: How far it may grow, for which this is the reading, too; None where it stays.
+            mortar: Makes the same by integrals, for a body that is condensed in the end, where its contact decides.
         """
-        self.surface, self.reading = surface, reading
+        self.surface, self.reading, self.mortar = surface, reading, mortar
         self.reach = None if reach is None else Reach(reach, reading)
 
     def on_grid(self, surface: ContactSurface, reading: csr_array) -> ElasticBody:

@@ -23,7 +23,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.fine import fine
 from fenwear.bodies.half_space import half_space
 from fenwear.bodies.response import Request
-from fenwear.case import CONDENSED, Case
+from fenwear.case import AUTO, CONDENSED, Case
 from fenwear.errors import CaseError, InputError
 
 
@@ -108,9 +108,11 @@ def register_operator(name: str, make: Make) -> None:
     Raises:
         CaseError: `name` is no word, or that of the condensed body, or `make` cannot be called.
     """
-    if not (isinstance(name, str) and name.replace("-", "_").isidentifier()) or name == CONDENSED:
+    if not (isinstance(name, str) and name.replace("-", "_").isidentifier()) or name in (AUTO, CONDENSED):
         raise CaseError(
-            InputError("operator", f"expected a word other than {CONDENSED!r} as a name, got {str(name)!r}")
+            InputError(
+                "operator", f"expected a word other than {AUTO!r} and {CONDENSED!r} as a name, got {str(name)!r}"
+            )
         )
     if not callable(make):
         raise CaseError(InputError(f"operator {name!r}", "expected a function of a request"))
@@ -123,7 +125,7 @@ def check_operators(case: Case) -> None:
     Raises:
         CaseError: one is not.
     """
-    known = ", ".join(map(repr, (CONDENSED, *sorted(OPERATORS))))
+    known = ", ".join(map(repr, (AUTO, CONDENSED, *sorted(OPERATORS))))
     problems = [
         InputError(
             f"{name}.operator",
@@ -131,7 +133,7 @@ def check_operators(case: Case) -> None:
             "Python, by fenwear.register_operator",
         )
         for name, body in case.bodies.items()
-        if body.operator not in (CONDENSED, *OPERATORS)
+        if body.operator not in (AUTO, CONDENSED, *OPERATORS)
     ]
     if problems:
         raise CaseError(problems)
@@ -149,9 +151,30 @@ def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: boo
         CaseError: a body is none for its operator.
         ConvergenceError: a stiffness has no factor.
     """
+    found = {k: _decided(one) for k, one in enumerate(requests) if one.elastic.operator == AUTO}
     wanted = [one.on_mesh() for one in requests if one.elastic.operator == CONDENSED]
     condensed = iter(condense_together(wanted, keep=keep, fresh=fresh) if wanted else [])
     return [
-        next(condensed) if one.elastic.operator == CONDENSED else OPERATORS[one.elastic.operator](one)
-        for one in requests
+        next(condensed) if one.elastic.operator == CONDENSED else found.get(k) or OPERATORS[one.elastic.operator](one)
+        for k, one in enumerate(requests)
     ]
+
+
+def _decided(request: Request) -> SurfaceOperator | None:
+    """Return how a body on a grid answers as the fine one, where it may; else let it be condensed; collective.
+
+    Raises:
+        CaseError: it is none, and its grid grows, which no condensed body goes with.
+    """
+    elastic, key = request.elastic, f"{request.elastic.body.name}.operator"
+    try:
+        found = fine(request)
+    except CaseError as error:
+        if elastic.reach is not None or elastic.mortar is None:
+            raise
+        elastic.operator, elastic.reading = CONDENSED, elastic.mortar()
+        elastic.taken = f"{key}: '{CONDENSED}' is taken: {error}"
+        return None
+    elastic.operator = "fine"
+    elastic.taken = f"{key}: 'fine' is taken: polynomials leave {100 * found.unresolved:.2g} % of the compliance"
+    return found

@@ -1,6 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
-from fenwear.case.bodies import CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support
+from fenwear.case.bodies import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support
 from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Run
 from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
@@ -16,6 +16,7 @@ from fenwear.case.thermal import Heat, Track
 from fenwear.case.topography import Topography
 
 __all__ = [
+    "AUTO",
     "CONDENSED",
     "Body",
     "Case",

@@ -28,6 +28,9 @@ from fenwear.case.topography import Topography
 from fenwear.case.units import convert, shown
 
 NOTHING = 1e-9  # of a load: what is called a factor still
+AUTO = (
+    "auto"  # operator of a body whose contact decides: on a grid of its own "fine" where that may be, else "condensed"
+)
 CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
 
 
@@ -320,10 +323,11 @@ class Body(Part):
         description="axes about which guides hold the body against turning, by a couple, where supports leave it free",
     )
     operator: str = Field(
-        default=CONDENSED,
+        default=AUTO,
         description="how its contact surface answers to forces: condensed: as its mesh does; half-space: as one of its "
         "material, or half-plane, without supports and other boundaries, fast for many nodes; fine: as a half-space "
-        "and what its mesh does otherwise, on a grid finer than the mesh; or one made in Python",
+        "and what its mesh does otherwise, on a grid finer than the mesh; auto: with the table grid fine, where the "
+        "contact is far enough from edges, else condensed; or one made in Python",
     )
     topography: Topography | None = Field(
         default=None, description="roughness or waves on top of its shape, measured or made; needs the table grid"

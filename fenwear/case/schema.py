@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Grid, Load, Model
+from fenwear.case.bodies import AUTO, CONDENSED, Body, CourseLoad, Geometry, Grid, Load, Model
 from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.creep import creep_problems
@@ -118,7 +118,7 @@ class Case(Part):
 
     def _operator_problems(self) -> list[str]:
         """Return what does not go with bodies whose meshes are not what answers to forces."""
-        others = [name for name, body in self.bodies.items() if body.operator != CONDENSED]
+        others = [name for name, body in self.bodies.items() if body.operator not in (AUTO, CONDENSED)]
         against = {
             "with heat: a contact finer than the meshes warms a layer as thin as its own nodes are wide, whose "
             "temperatures and expansion the meshes do not have": self.heat is not None,

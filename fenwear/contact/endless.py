@@ -34,7 +34,7 @@ from fenwear.interface.convolution import Box, Convolution, back, forward, in_ca
 
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
 SAME = 1e-12  # of symbols
-MARGIN = 1.25  # of a box: the period of what is solved, which does not end
+MARGIN = 1.0  # of a box: the period of what is solved, which does not end
 
 Waves = NDArray[np.complexfloating[Any, Any]]
 

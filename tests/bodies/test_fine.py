@@ -258,6 +258,30 @@ def test_other_positions_and_coarser_grids_share_what_bodies_do(monkeypatch: pyt
     assert few.pressure[0] @ rough.pair.weights == pytest.approx(20, rel=1e-9)
 
 
+def test_a_contact_decides() -> None:
+    """On a grid, of itself: fine far from edges, else condensed, each body for itself; the run says which, and why."""
+    ball = [one for one in BALL if "operator" not in one]
+    fine_of = assemble(load_case("ball-on-flat", [*ball, "grid.nodes=17"]))
+    asked = assemble(load_case("ball-on-flat", [*BALL, "grid.nodes=17"]))
+    pressures = [one.phase_contact([0]).solve(one.gap(0, one.unworn())).pressure[0] for one in (fine_of, asked)]
+    assert np.array_equal(*pressures)
+    assert [line.split(":")[:2] for line in fine_of.bodies.solved_by] == [
+        [f"{name}.operator", " 'fine' is taken"] for name in ("punch", "strip")
+    ]
+    assert not asked.bodies.solved_by
+    edges = assemble(load_case("example1-lz40", ["grid.nodes=81"]))
+    said = edges.bodies.solved_by
+    assert [edges.bodies.punch.operator, edges.bodies.strip.operator] == ["condensed", "fine"]
+    assert "'condensed' is taken" in said[0]
+    assert "polynomials" in said[0]
+    by_hand = assemble(
+        load_case("example1-lz40", ["grid.nodes=81", "punch.operator='condensed'", "strip.operator='fine'"])
+    )
+    pressures = [one.phase_contact([0]).solve(one.gap(0, one.unworn())).pressure[0] for one in (edges, by_hand)]
+    assert pressures[0] == pytest.approx(pressures[1], rel=1e-9)
+    assert assemble(load_case("example1")).bodies.punch.operator == "condensed"
+
+
 @pytest.mark.slow
 def test_each_body_for_itself() -> None:
     """One body fine, the other condensed on the same grid: on meshes as fine as the grid pressures are near."""

@@ -174,7 +174,9 @@ def test_bodies_that_are_no_half_space(name: str, settings: list[str], message: 
 
 
 @pytest.mark.usefixtures("registry")
-@pytest.mark.parametrize(("name", "make"), [("condensed", print), ("two words", print), (3, print), ("mine", 3)])
+@pytest.mark.parametrize(
+    ("name", "make"), [("condensed", print), ("auto", print), ("two words", print), (3, print), ("mine", 3)]
+)
 def test_what_cannot_be_registered(name: Any, make: Any) -> None:
     """A name that is taken or no word, and what cannot be called."""
     with pytest.raises(CaseError, match="operator"):

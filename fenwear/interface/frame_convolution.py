@@ -83,12 +83,6 @@ class FrameConvolution:
         return [[b for b in range(self.d) if row[b] > SAME * size.max()] for row in size]
 
     @cached_property
-    def mixes(self) -> bool:
-        """Whether pressures displace along the tangents, or tractions along the normal."""
-        apart = any((0 in row) != (a == 0) for a, row in enumerate(self.pairs)) or len(self.pairs[0]) > 1
-        return apart or any(np.abs(one[0, :, 1:]).max(initial=0.0) > 0 for _, one in self.smooth)
-
-    @cached_property
     def _size(self) -> tuple[int, ...]:
         return tuple(scipy.fft.next_fast_len(2 * count - 1, real=True) for count in self.counts)
 

@@ -29,7 +29,6 @@ from fenwear.life.quantities import Quantity, evaluate, of_case, parse_quantity
 from fenwear.life.sensitivity import sensitivity
 
 NAME, PROTOCOL = "forward", 1.0
-LOOPBACK, PORT = "127.0.0.1", 4242
 LONGEST = 2**20  # bytes of a request
 KEPT = 64  # Jacobians
 

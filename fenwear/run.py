@@ -41,6 +41,7 @@ from fenwear.plausibility import (
     HeatMonitor,
     StateMonitor,
     law_warnings,
+    passing_text,
     size_warnings,
     sliding_text,
     stroke_warnings,
@@ -379,7 +380,8 @@ class _Run:
         """Return what is to be said of all time steps, and log it."""
         if self.last is None:
             return []
-        found = [text for text in (unique_text(np.concatenate(self.unique)), sliding_text(self.last)) if text]
+        texts = unique_text(np.concatenate(self.unique)), sliding_text(self.last), passing_text(self.last)
+        found = [text for text in texts if text]
         for warning in found:
             self.log(f"warning: {warning}")
         return found

@@ -18,7 +18,7 @@ from fenwear.plausibility.fineness import fineness_text, fineness_warnings
 from fenwear.plausibility.heated import HeatMonitor
 from fenwear.plausibility.layer import HeatedLayer, heated_layer, layer_warnings
 from fenwear.plausibility.size import size_warnings
-from fenwear.plausibility.slip import law_warnings, sliding_text, unique_text, uniques
+from fenwear.plausibility.slip import law_warnings, passing_text, sliding_text, unique_text, uniques
 from fenwear.plausibility.states import StateMonitor, hot, initial_warnings, pressed, steady_warnings
 from fenwear.plausibility.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
 
@@ -36,6 +36,7 @@ __all__ = [
     "initial_warnings",
     "law_warnings",
     "layer_warnings",
+    "passing_text",
     "pressed",
     "size_warnings",
     "sliding_text",

@@ -43,6 +43,23 @@ def sliding_text(last: Block) -> str:
     return f"gross sliding: in {100 * float(np.mean(slipping)):.0f} % of the last cycle's time steps nothing sticks"
 
 
+def passing_text(last: Block) -> str:
+    """Say that a strip passes that slips less than a node, as it was asked to; "" if it does not."""
+    system = last.system
+    steps: tuple[Any, ...] = last.steps[-system.motion.half_cycles :]
+    if not steps or system.law_state is None or not system.law_state.problem.interface.moves:
+        return ""
+    slipped = sum(one.records.slipped(system.pair.weights) for one in steps) / (2 * system.motion.half_cycles)
+    apart = system.pair.punch.spacing()
+    if slipped > apart:
+        return ""
+    return (
+        f"the strip passes under the punch with its supports, but slips by {1e3 * slipped:.2g} µm each way, less than "
+        f"nodes are apart ({1e3 * apart:.2g} µm): where nodes stick its wear is smeared over them, and grows with "
+        "every cycle; expected motion.positions left away, or 1"
+    )
+
+
 def uniques(block: Block) -> Mask:
     """Return of each time step of a block whether its answer was the only one near (k,)."""
     steps: tuple[Any, ...] = block.steps

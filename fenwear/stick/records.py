@@ -96,6 +96,11 @@ class TimeStepRecords:
         """Which nodes carry pressure in any step (n,)."""
         return np.asarray((self.pressure > 0).any(axis=0))
 
+    def slipped(self, weights: Array) -> float:
+        """Return how far the surfaces slip in all steps together, the mean over the pressure of each, mm."""
+        carried = np.maximum(self.pressure @ weights, 1e-300)
+        return float(((self.pressure * self.slip_magnitude) @ weights / carried).sum())
+
     def energy(self, weights: Array) -> float:
         """Return what friction has dissipated, N in the plane and N mm in a solid."""
         return float(self.dissipated.sum(axis=0) @ weights)

@@ -189,8 +189,5 @@ def _slips_little(problem: PartialSlipProblem) -> bool:
 
 def _slipped(problem: PartialSlipProblem) -> float:
     """Return the amplitude of the slip in the first cycle, its mean over the pressure, mm."""
-    weights = problem.interface.middle.pair.weights
     cycle = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
-    carried = np.maximum(cycle.pressure @ weights, 1e-300)
-    ways = (cycle.pressure * np.linalg.norm(cycle.slip, axis=2)) @ weights / carried
-    return float(ways.sum()) / (2 * problem.program.half_cycles)
+    return cycle.slipped(problem.interface.middle.pair.weights) / (2 * problem.program.half_cycles)

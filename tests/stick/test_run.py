@@ -198,3 +198,21 @@ def test_time_steps_are_chosen_anew_where_others_are_asked_for() -> None:
         again = assemble(varied.case)
         if "stick.steps" in " ".join(settings):
             np.testing.assert_allclose(block.pressure, next(march(again, 2)).pressure, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("asked", [{"motion.positions": 3}, {"motion.positions": 3, "motion.amplitude": "20 um"}, {}])
+def test_a_strip_that_passes_in_vain_is_told_of(asked: dict[str, object], tmp_path: Path) -> None:
+    """Where positions are asked for and little slips; not where it slips by nodes, nor where it stays by default."""
+    wears = {f"wear.{body}.coefficient": "1e-8 1/MPa" for body in ("punch", "strip")}
+    small = {
+        "geometry.parameters.overlap": 0.1,
+        "motion.amplitude": "4 um",
+        "run.half_cycles": 4,
+        "output.report": False,
+        "output.uncertainty": False,
+    }
+    keys = {**small, **wears, **asked}
+    case = load_case("fretting-partial-slip", [*SMALL, *(f"{key}={json.dumps(keys[key])}" for key in keys)])
+    told: list[str] = []
+    run_case(case, "fretting", tmp_path / "out", told.append, progress="none")
+    assert any("smeared" in text for text in told) == (len(asked) == 1)

@@ -57,6 +57,7 @@ GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 PARTS = 8  # of a cycle that does not converge as a whole
 ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which a jump is solved whole, and in halves
+LOOSEST = 5e-3  # tolerance that these are of: contact of a rough run, too, is told to fulfil its conditions
 
 # What is worn from depths on in so many cycles, and what they add to the totals, from what they add without coatings.
 ThroughCoatings = Callable[[WornDepths, float, Totals], tuple[WornDepths, Totals]]
@@ -291,7 +292,7 @@ class Stepper:
     def _solve_to(self, share: float) -> None:
         """Solve contact to a share of the tolerance, where its digits cost."""
         if isinstance(self.contact, CondensedContact):
-            self.contact.inequality.close = share * self.tolerance
+            self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
 
     def step(self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None) -> RunState:
         """Return the state `cycles` cycles later, by the two stages of one step.

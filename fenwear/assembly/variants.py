@@ -154,5 +154,5 @@ def same_conduction(one: Case, other: Case) -> bool:
     if one.heat is None or other.heat is None:
         return one.heat is other.heat
     own, others = (case.heat.model_dump(exclude=set(Heat.exchange_keys)) for case in (one, other) if case.heat)
-    held = [(case.punch.temperatures, case.strip.temperatures) for case in (one, other)]
+    held = [(case.punch.boundary_of_heat, case.strip.boundary_of_heat) for case in (one, other)]
     return own == others and held[0] == held[1]

@@ -313,6 +313,9 @@ class Body(Part):
     supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
+    insulated: tuple[str, ...] = Field(
+        default=(), description="groups of the geometry that lose no heat, such as a plane of symmetry"
+    )
     pivot: Point | None = Field(
         default=None,
         description="the point O of lambda_F and lambda_M; by default the first support's centre, of each part that "
@@ -339,6 +342,11 @@ class Body(Part):
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"
     )
+
+    @property
+    def boundary_of_heat(self) -> tuple[object, ...]:
+        """What its boundary asks of its temperature."""
+        return (self.temperatures, self.insulated)
 
     def materials_at(self, shares: Mapping[str, Array]) -> set[str]:
         """Return the names of the materials at nodes, of which regions have these shares (n,), by their names."""

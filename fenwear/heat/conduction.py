@@ -2,8 +2,8 @@
 
     rho c (d theta/dt + v . grad theta) = div(k grad theta) - (2 h / t) (theta - theta_a)
 
-with convection h (theta - theta_a) on free boundaries, held temperatures, and a heat flux q into
-the contact surface. Where material that is new enters through a free boundary, v . n < 0, it brings
+with convection h (theta - theta_a) on free boundaries that are not insulated, held temperatures, and a
+heat flux q into the contact surface. Where material that is new enters through a free boundary, v . n < 0, it brings
 the heat of its temperature theta_in with it, and it leaves with its own:
 
     k d theta/dn = rho c (v . n) (theta - theta_in)   where v . n < 0,
@@ -42,7 +42,8 @@ from fenwear.parallel import total
 from fenwear.sliding.field import ALONG_X, SlidingField
 
 PREFIX = "fenwear_heat_"
-FREE, CONTACT, HELD = 1, 2, 3
+CONVECTING, CONTACT, HELD, INSULATED = 1, 2, 3, 4
+FREE = (CONVECTING, INSULATED)  # boundaries that material may move through
 END = 0.3  # cosine of the angle between v and n: below, a boundary of what turns is a chord of its round side, no end
 WARMER = 100.0  # K: the mean rise that a convection is proposed for
 CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
@@ -123,31 +124,43 @@ class HeatBody:
         self._tag_boundary(description)
 
     def _tag_boundary(self, description: Body) -> None:
-        """Mark every exterior facet as convecting, in contact, or held at a temperature."""
+        """Mark every exterior facet as convecting, insulated, in contact, or held at a temperature."""
         body, domain = self.body, self.body.mesh
         dim = domain.topology.dim - 1
         domain.topology.create_connectivity(dim, dim + 1)
         facets = mesh.exterior_facet_indices(domain.topology)
         marker = np.zeros(domain.topology.index_map(dim).size_local + domain.topology.index_map(dim).num_ghosts)
-        marker[facets] = FREE
+        marker[facets] = CONVECTING
+        for number, group in enumerate(description.insulated):
+            tag = self._own_group(group, f"{body.name}.insulated.{number}", "it cannot be insulated")
+            marker[body.facet_tags.find(tag)] = INSULATED
         marker[body.facet_tags.find(contact_tag(body))] = CONTACT
         held = fem.Function(self.space)
         held.x.array[:] = np.nan
         for number, prescribed in enumerate(description.temperatures):
-            tag = body.curve(prescribed.on, f"{body.name}.temperatures.{number}.on")
-            if prescribed.on == f"{body.name}_contact":
-                key = f"{body.name}.temperatures.{number}.on"
-                raise CaseError(InputError(key, "the contact surface takes friction heat: it cannot be held"))
+            tag = self._own_group(prescribed.on, f"{body.name}.temperatures.{number}.on", "it cannot be held")
             chosen = body.facet_tags.find(tag)
             marker[chosen] = HELD
             held.x.array[fem.locate_dofs_topological(self.space, dim, chosen)] = prescribed.temperature
         tagged = np.flatnonzero(marker).astype(np.int32)
         self.boundary = mesh.meshtags(domain, dim, tagged, marker[tagged].astype(np.int32))
+        convecting = domain.comm.allreduce(int((marker == CONVECTING).sum()))
+        self._convects = self.heat.convection > 0 and bool(convecting or self._faces)
         self.owned = self.space.dofmap.index_map.size_local
         self.held = np.flatnonzero(~np.isnan(held.x.array[: self.owned])).astype(np.int32)
         self.held_values = held.x.array[self.held]
 
-    def _ds(self, integrand: Any, tag: int) -> Any:
+    def _own_group(self, group: str, key: str, cannot: str) -> int:
+        """Return the tag of a group of the boundary.
+
+        Raises:
+            CaseError: it is unknown, or the contact surface.
+        """
+        if group == f"{self.body.name}_contact":
+            raise CaseError(InputError(key, f"the contact surface takes friction heat: {cannot}"))
+        return self.body.curve(group, key)
+
+    def _ds(self, integrand: Any, tag: int | tuple[int, ...]) -> Any:
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary, metadata=self._quadrature)
         return self._measure * integrand * ds(tag)
 
@@ -217,7 +230,7 @@ class HeatBody:
     def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
         """Return whether a heat sink exists: convection, a held temperature or new material; collective."""
         return (
-            self.heat.convection > 0
+            self._convects
             or self.body.mesh.comm.allreduce(len(self.held)) > 0
             or (surroundings.renewed and speed != 0 and self.flow(surroundings.sliding).is_open)
         )
@@ -232,7 +245,7 @@ class HeatBody:
             h, N/(mm s K).
         """
         one = fem.Constant(self.body.mesh, PETSc.ScalarType(1))
-        area = fem.assemble_scalar(compiled(self.on_free_boundary(one) + self._dx(self._faces * one)))
+        area = fem.assemble_scalar(compiled(self._ds(one, CONVECTING) + self._dx(self._faces * one)))
         return power / (WARMER * self.body.mesh.comm.allreduce(float(area)))
 
     def extremes(self, surroundings: Surroundings) -> tuple[float, float]:
@@ -295,7 +308,7 @@ class HeatBody:
         w = ufl.TestFunction(self.space)
         faces = fem.Constant(self.body.mesh, PETSc.ScalarType(self.face_loss))
         edges = fem.Constant(self.body.mesh, PETSc.ScalarType(self.heat.convection))
-        return assembled_vector(self._dx(faces * w) + self._ds(edges * w, FREE))
+        return assembled_vector(self._dx(faces * w) + self._ds(edges * w, CONVECTING))
 
 
 class _Flow:
@@ -367,10 +380,11 @@ class _Flow:
         conducted = law.flux(theta)
         residual = rho_c * (rate * theta + advected) + _divergence(conducted, body.kind) + faces * theta
         a = r * (rho_c * (rate * theta + advected) * w - ufl.inner(conducted, ufl.grad(w))) * dx
-        a += r * (faces * theta * w + upwind * residual) * dx + body._ds((edges + entering) * theta * w, FREE)
+        a += r * (faces * theta * w + upwind * residual) * dx
+        a += body._ds(edges * theta * w, CONVECTING) + body._ds(entering * theta * w, FREE)
         b = r * rho_c * rate * theta * (w + upwind) * dx
         f = r * faces * ambient * (w + upwind) * dx
-        f += body._ds((edges * ambient + entering * body.inflow) * w, FREE)
+        f += body._ds(edges * ambient * w, CONVECTING) + body._ds(entering * body.inflow * w, FREE)
         a_form, b_form, f_form, brought = (compiled(form) for form in (a, b, f, body._ds(entering * w, FREE)))
         return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
 

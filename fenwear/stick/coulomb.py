@@ -150,11 +150,8 @@ class Coulomb:
         if before.loading != case.loading:
             bodies = bodies.under(case)
             condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
-        if (before.heat, before.punch.temperatures, before.strip.temperatures) != (
-            case.heat,
-            case.punch.temperatures,
-            case.strip.temperatures,
-        ):
+        held, asked = ((one.heat, one.punch.boundary_of_heat, one.strip.boundary_of_heat) for one in (before, case))
+        if held != asked:
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
         moves = unheated_problem(case, bodies, condensed=condensed).interface.moves
         same = condensed if moves == system.condensed.strip_moves else None

@@ -171,7 +171,11 @@ def _sharing(variant: Variant, of: Of) -> tuple[str, str]:
     """Return what two variants share: the bodies, and with them the steps of their heat."""
     case = variant.case
     assert case is not None
-    heat = None if case.heat is None else (case.motion, case.heat, case.punch.temperatures, case.strip.temperatures)
+    heat = (
+        None
+        if case.heat is None
+        else (case.motion, case.heat, case.punch.boundary_of_heat, case.strip.boundary_of_heat)
+    )
     return repr((preparation_for(case, of), *set_up_by(case))), repr(heat)
 
 

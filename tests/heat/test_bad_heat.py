@@ -65,6 +65,9 @@ def test_held_temperature_off_the_body(group: str, expected: str) -> None:
     case = load_case("example1-heat", [*COARSE, f"strip.temperatures.1={{on='{group}'}}"])
     with pytest.raises(CaseError, match=rf"strip\.temperatures\.1\.on: .*{expected}"):
         assemble(case)
+    case = load_case("example1-heat", [*COARSE, f"strip.insulated=['{group}']"])
+    with pytest.raises(CaseError, match=rf"strip\.insulated\.0: .*{expected.replace('held', 'insulated')}"):
+        assemble(case)
 
 
 @pytest.mark.parametrize("settings", [ISOLATED, ("heat.convection=0",)])

@@ -100,3 +100,22 @@ def test_order_in_space(rectangle: Make, conducting: Make, degree: int, velocity
         best = norms(body, exact(*coordinates(body), module=np), partial(exact, module=ufl))  # of the interpolant
         assert (np.divide(errors[-1], best) < (5, 1.4)).all()
     assert np.log2(np.divide(*errors)) == pytest.approx([degree + 1, degree], abs=0.35)
+
+
+@pytest.mark.mpi
+def test_insulated_sides_lose_nothing(rectangle: Make, conducting: Make) -> None:
+    """A column that loses heat at its bottom alone: ambient + q (1 / h + z / k) everywhere, all that enters is lost.
+
+    And one that loses none there either has no steady state.
+    """
+    heat = {"convection": HEAT_TRANSFER, "ambient": AMBIENT, "convecting_faces": False}
+    body = conducting(rectangle(), 2, [MATERIAL], heat, insulated=["strip_sides"])
+    top = coordinates(body)[0][coordinates(body)[1] > 1 - 1e-9]
+    top = np.sort(np.concatenate(body.body.mesh.comm.allgather(top)))
+    step = body.step(0.0, math.inf)
+    load = body.load(np.full(len(top), 5.0))
+    theta = step.advance(np.zeros(body.owned)) + step.respond(load[:, None])[:, 0]
+    np.testing.assert_allclose(theta, AMBIENT + 5.0 * (1 / HEAT_TRANSFER + coordinates(body)[1] / K), rtol=1e-12)
+    lost = body.body.mesh.comm.allreduce(float(body.convected @ (theta - AMBIENT)))
+    assert lost == pytest.approx(5.0, rel=1e-12)
+    assert not conducting(rectangle(), 1, [MATERIAL], heat, insulated=["strip_sides", "strip_bottom"]).loses_heat()

@@ -17,6 +17,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.life.between_tests import between, between_as_json
 from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import read_data
+from fenwear.life.keys import with_values
 from fenwear.life.least_squares import LeastSquares
 from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
 from fenwear.life.model import Model
@@ -31,6 +32,7 @@ from fenwear.results.disk import write_text
 from fenwear.results.history import CASE, free_directory, make_directory, write_case
 
 Log = Callable[[str], None]
+FITTED = "fitted.toml"  # the case with the values that a calibration has found
 
 
 def _need(package: str, what: str) -> None:
@@ -113,7 +115,7 @@ def run_calibrate(
     log: Log,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[Calibration, Posterior | None, Path]:
-    """Calibrate; write calibration.json, residuals.csv and residuals.png, and on request posterior.csv; collective.
+    """Calibrate; write the fitted case, calibration.json, residuals, and on request posterior.csv; collective.
 
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
@@ -127,6 +129,7 @@ def run_calibrate(
 
     def write() -> None:
         write_case(folder, case)
+        write_text(folder / FITTED, with_values(case, found.values).to_toml())
         write_text(folder / "calibration.json", json.dumps(found.as_json(), indent=1))
         write_text(folder / "residuals.csv", _residual_table(found))
         save(residuals(found), folder / "residuals.png")

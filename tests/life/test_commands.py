@@ -49,7 +49,8 @@ def test_from_volumes_to_a_life(call: Call, tmp_path: Path) -> None:
     value = fit["unknowns"][0]["value"]
     assert value == pytest.approx(0.00247 / 6e4, rel=0.01)
     assert {p.name for p in (tmp_path / "fit").iterdir()} == {
-        "case.toml", "calibration.json", "residuals.csv", "residuals.png"}  # fmt: skip
+        "case.toml", "fitted.toml", "calibration.json", "residuals.csv", "residuals.png"}  # fmt: skip
+    assert load_case(tmp_path / "fit" / "fitted.toml").wear.punch.coefficient == pytest.approx(value, rel=1e-12)
     life = call("life", "example2", "--until", "volume 3 mm^3", "--from", tmp_path / "fit", "--samples", 5,
                 "--wanted", "600 m", "-o", tmp_path / "life")  # fmt: skip
     middle = next(row for row in life["quantiles"] if row["level"] == 0.5)

@@ -89,6 +89,11 @@ class Lifetime:
         first = (lives == lives.min(axis=0, initial=np.inf)).sum(axis=1)
         return [float(count) / max(lives.shape[1], 1) for count in first]
 
+    @property
+    def counted_in(self) -> str:
+        """The unit of the lives, or that they are cycles."""
+        return self.unit or ("cycles" if self.quantity.startswith("cycles") or " until " not in self.quantity else "")
+
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints and life.json holds."""
 
@@ -98,7 +103,7 @@ class Lifetime:
 
         return {
             "quantity": self.quantity,
-            "unit": self.unit,
+            "unit": self.counted_in,
             "samples": len(self.lives),
             "failed": len(self.failures),
             "never_reached": int(np.isinf(self.lives).sum()),
@@ -115,14 +120,17 @@ class Lifetime:
 
     def text(self) -> str:
         """Return a table for people."""
-        unit = self.unit or ("cycles" if self.quantity.startswith("cycles") or " until " not in self.quantity else "")
+        unit = self.counted_in
         lines = [f"{self.quantity}: {len(self.lives)} samples"]
         if self.failures:
             lines.append(f"  {len(self.failures)} of them did not converge and are left out")
         if np.isinf(self.lives).any():
             lines.append(f"  {np.isinf(self.lives).sum()} of them never get there")
-        lines.append(f"  {'share that fails before':24} {'life':>12} {'95 % interval':>27}  {unit}".rstrip())
-        lines += [f"  {one.level:24.0%} {one.value:12.5g} {one.low:13.5g} {one.high:13.5g}" for one in self.quantiles]
+        heading = f"life ({unit})" if unit else "life"
+        lines.append(f"  {'share that fails before':24} {heading:>13} {'95 % interval':>27}")
+        lines += [f"  {one.level:24.0%} {one.value:13.5g} {_end(one.low)} {_end(one.high)}" for one in self.quantiles]
+        if any(_end(end).endswith("-") for one in self.quantiles for end in (one.low, one.high)):
+            lines.append("  - an end that so few samples do not tell")
         if self.reliability is not None:
             one = self.reliability
             lines.append(
@@ -146,6 +154,11 @@ class Lifetime:
                     f"    {part.quantity:36} {known[0.01]:13.5g} {known[0.1]:12.5g} {known[0.5]:12.5g} {share:9.0%}"
                 )
         return "\n".join(lines)
+
+
+def _end(value: float) -> str:
+    """Return an end of an interval as text, of lives that it is not known of, too."""
+    return f"{'-':>13}" if value == 0 or np.isinf(value) else f"{value:13.5g}"
 
 
 def quantile(values: Array, level: float) -> Estimate:

@@ -13,7 +13,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import files
 from math import isfinite
 from typing import Any
 
@@ -64,8 +63,9 @@ def turned_map(history: xarray.Dataset, half_cycles: Sequence[int]) -> Turned:
 
 @lru_cache(maxsize=1)
 def _packed_script() -> str:
-    script = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()  # plotly.offline loads IPython
-    return base64.b64encode(gzip.compress(script, compresslevel=6, mtime=0)).decode()
+    from plotly.offline import get_plotlyjs  # where distributions have put it
+
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), compresslevel=6, mtime=0)).decode()
 
 
 def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[str, Any]:

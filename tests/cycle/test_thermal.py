@@ -227,7 +227,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
 @pytest.mark.mpi("settings1-0.5")
 def test_a_cycle_reproduces_the_steady_state(assembled: Assemble, partition: float, settings: tuple[str, ...]) -> None:
     """Stable or not, the steady state is a fixed point of the march where the wear of a half-cycle is negligible."""
-    quiet = ("wear.punch.coefficient=1e-11", "heat.partition=0.5")
+    quiet = ("wear.punch.coefficient=1e-11", f"heat.partition={partition}")
     system = assembled("example1-heat", *COARSE, *quiet, *settings)
     moment, state = from_steady(system)
     block = run(system, 2, implicit=True, start=moment)
@@ -240,7 +240,7 @@ def test_a_cycle_reproduces_the_steady_state(assembled: Assemble, partition: flo
 @pytest.mark.parametrize(("partition", "sign"), [(0.1, -1), (0.5, 1)])
 def test_sign_of_growth(assembled: Assemble, partition: float, sign: int) -> None:
     """Example 1's steady state loses its stability between kappa = 0.1 and 0.5."""
-    system = assembled("example1-heat", *COARSE, "heat.partition=0.5")
+    system = assembled("example1-heat", *COARSE, f"heat.partition={partition}")
     assert np.sign(growth_rate(system, steady(system).phase_pressure)) == sign
 
 

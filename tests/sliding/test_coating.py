@@ -407,9 +407,3 @@ def test_a_soft_coating_opens_a_gap_of_its_own(base: str, settings: tuple[str, .
         if exact.heat is not None and found.heat is not None:
             warm = found.heat.temperature_punch[-1]
             np.testing.assert_allclose(warm, exact.heat.temperature_punch[-1], rtol=0, atol=1e-9 * warm.max())
-
-
-def test_coatings_that_give_way_are_condensed() -> None:
-    """Told by the key."""
-    with pytest.raises(CaseError, match=r"contact.solver: expected 'condensed' with wear.punch.coating.modulus"):
-        load_case("example2", [*SMALL, "contact.solver='full'", SOFT % "punch"])

@@ -173,11 +173,11 @@ class FullContact:
         for k, (own,) in enumerate(self._parts(found)):
             both, rigid = self._bodies[k], self.phases[k].interface.rigid
             forces = [_pushed(body, times) for body, times in zip(both, self._softer[k], strict=True)]
+            guided = guided_equilibrium(self.phases[k].interface.pair, *both)
             own[: self._free] = -np.concatenate(forces) / self._force_scale
             if self.comm.rank == 0:
                 after = self._free + n
                 own[after : after + modes] = rigid.resultant / self._force_scale
-                guided = guided_equilibrium(self.phases[k].interface.pair, *both)
                 own[after + modes : after + modes + guides] = guided.resultant / self._force_scale
         return found
 

@@ -97,9 +97,10 @@ class Chord:
             diagonal: Of the derivative here (size,); None where it is not known.
         """
         factor, opens = self.factor, np.zeros_like(f)
+        diagonal = None if self.bent is None else diagonal
         if key == factor.key:
             opens[factor.free] = -factor.solve(f[factor.free])
-            if self.bent is not None:
+            if self.bent is not None and diagonal is not None:
                 opens *= self.bent
         else:
             assert self.bent is not None

@@ -38,14 +38,18 @@ class Layer:
         return Shifted(self.matrix, self.bends(p))
 
 
-@pytest.mark.parametrize("told", [False, True])
+@pytest.mark.parametrize("told", [(False,), (True,), (True, True, False)])
 @pytest.mark.parametrize("slope", [1e-4, 1e-2])
-def test_solutions_along_a_way(slope: float, told: bool) -> None:
-    """Gaps that rise and fall, by which nodes come and go: each solution is that of SNES, to 1e-10."""
+def test_solutions_along_a_way(slope: float, told: tuple[bool, ...]) -> None:
+    """Gaps that rise and fall, by which nodes come and go: each solution is that of SNES, to 1e-10.
+
+    Whether slopes are told always, never or now and then.
+    """
     n = 40
-    way, apart = Layer(n, slope, told=told), Layer(n, slope, told=False)
-    p = way.inequality.solve(np.ones(n))
+    way, apart = Layer(n, slope, told=True), Layer(n, slope, told=False)
+    diagonal, p = way.inequality.diagonal, way.inequality.solve(np.ones(n))
     for step in range(40):
+        way.inequality.diagonal = diagonal if told[step % len(told)] else None
         way.gap = apart.gap = np.linspace(-1, 0.5 + 0.2 * np.sin(step / 6), n)
         p = way.inequality.solve(p, near=True)
         assert (p >= 0).all()

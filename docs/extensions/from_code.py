@@ -117,7 +117,7 @@ class Results(Written):
 
     def lines(self) -> Iterable[str]:
         """Return a table of each group."""
-        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in history.HEAT_TERMS.items()}
+        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in {**history.HEAT_TERMS, **history.HEAT_CROSSING}.items()}
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
             "What a tribometer measures; with _strip of the strip": {

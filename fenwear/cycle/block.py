@@ -18,6 +18,7 @@ from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
+from fenwear.heat.exchange import TERMS
 from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.cross_shear import SlidingTensor
 from fenwear.sliding.wear import WornDepths
@@ -30,7 +31,7 @@ class BlockHeat:
     Attributes:
         temperature_punch: Of the punch's contact surface at the end of each half-cycle (k, n), K.
         temperature_strip: Of the strip's (k, n), K.
-        terms: Heat of each half-cycle by `fenwear.heat.exchange.TERMS` (k, 6), mJ.
+        terms: Heat of each half-cycle by `fenwear.heat.exchange.TERMS`, and by `CROSSING` (k, 8), mJ.
         coupling_iterations: Of heat and contact (k,).
         temperature_bulk: Of the bulk of the strip's closed track at the end (k,), K; NaN where there is none.
     """
@@ -49,8 +50,9 @@ class BlockHeat:
     @property
     def balance_error(self) -> Array:
         """Missing heat of each half-cycle relative to its largest term (k,)."""
-        missing = self.terms[:, 0] - self.terms[:, 1:].sum(axis=1)
-        return np.abs(missing) / np.maximum(np.abs(self.terms).max(axis=1), 1e-300)
+        balance = self.terms[:, : len(TERMS)]
+        missing = balance[:, 0] - balance[:, 1:].sum(axis=1)
+        return np.abs(missing) / np.maximum(np.abs(balance).max(axis=1), 1e-300)
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,8 @@ OVERSHOOT, DRIFT = 0.1, 1e-3
 # The heat of a half-cycle: done by friction, carried off by debris, gained by both bodies, lost to the
 # surroundings, lost through boundaries of held temperature, carried out by the strip's material less what it brings.
 TERMS = ("friction", "debris", "stored", "convected", "held", "carried")
+# And what crosses the contact where it conducts: all of friction that debris does not carry off.
+CROSSING = ("into_punch", "into_strip")
 
 
 class HeatExchange:
@@ -281,7 +283,7 @@ class HeatExchange:
             return self._conduct_few(values, phase, pressure, conductance, sources=sources)
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
         heated: Array = np.zeros_like(pressure)
-        entered: Array = np.zeros_like(pressure)
+        entered = [np.zeros_like(pressure), np.zeros_like(pressure)]
         surfaces, spans = None, []
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
@@ -293,7 +295,7 @@ class HeatExchange:
                 starts += counts * values
                 reached += counts * ends
                 heated += counts * plan.seconds * heat
-                entered += counts * plan.seconds * (fluxes[0] + fluxes[1])
+                entered = [one + counts * plan.seconds * q for one, q in zip(entered, fluxes, strict=True)]
                 values = values + counts * (ends - values)
             spans.append((plan, starts, reached))
             if len(spans) * pressure[:1].size >= AT_ONCE:
@@ -301,10 +303,11 @@ class HeatExchange:
                 spans = []
         if spans:
             terms += self._kept(spans, sources=sources)
-        terms += self._led(partial(self._made, heated, entered))
+        terms += self._led(partial(self._made, heated, entered[0] + entered[1]))
+        crossed = [self._crossing(conductance) @ q for q in entered]
         if sources and any(side.field.contact_responses is not None for side in self.sides):
             surfaces = self._read(phase, values, fluxes)
-        return values, terms, surfaces
+        return values, np.concatenate([terms, crossed]), surfaces
 
     def _conduct_few(
         self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
@@ -312,7 +315,8 @@ class HeatExchange:
         """Return the same on small bases and of few nodes, whose stages are matrices."""
         heated = (self.friction[phase] * pressure.T).T
         slid = sum(self._stages) * sum(plan.speed * plan.seconds for plan in self.plans[phase])
-        terms = self._made(slid * heated, np.zeros_like(pressure))
+        made = self._made(slid * heated, np.zeros_like(pressure))
+        terms: Array = np.concatenate([made, np.zeros((len(CROSSING), *made.shape[1:]))])
         for plan in self.plans[phase]:
             stage = self._stage_of(plan, conductance)
             entering = stage.entering(plan.speed * heated, sources=sources)
@@ -335,7 +339,7 @@ class HeatExchange:
             if kinds not in self._prepared_few:
                 self._prepared_few[kinds] = self._prepared_stage(plan)
             fluxes = cast("FluxMap", self._flux_map(kinds, conductance))  # which those of few nodes are
-            self._few[key] = self._prepared_few[kinds].at(fluxes)
+            self._few[key] = self._prepared_few[kinds].at(fluxes, plan.seconds * self._crossing(conductance))
         return self._few[key]
 
     def _prepared_stage(self, plan: StepPlan) -> PreparedStage:
@@ -518,6 +522,10 @@ class HeatExchange:
         # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
         lost = friction - debris - self.weights @ entered
         return np.array([friction, debris, none, lost, none, none])
+
+    def _crossing(self, conductance: Array) -> Array:
+        """Return the weights of the fluxes that cross the contact, which they do where it conducts (n,), mm."""
+        return np.where(np.isnan(conductance), 0.0, self.weights)
 
     def step_map(self, kinds: tuple[int, int], conductance: Array) -> StepMap:
         """Return what a step does to the coordinates; for both on a small basis.

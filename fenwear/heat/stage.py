@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.heat.field import Functional, Propagation
@@ -77,11 +78,19 @@ class PreparedStage:
             self._decay = np.concatenate([one.decay for one in motions])
         self._source = np.concatenate([one.source for one in motions])
 
-    def at(self, fluxes: FluxMap) -> Stage:
-        """Return the stage with these fluxes."""
-        level = fluxes.by_temperature.sum(axis=1) + fluxes.by_ambient
-        into = fluxes.by_temperature @ self._bare + np.diag(self.given_back)
-        return Stage(self, into, fluxes.by_heat, level * self._ambient)
+    def at(self, fluxes: FluxMap, crossing: Array) -> Stage:
+        """Return the stage with these fluxes.
+
+        Args:
+            fluxes: At its conductances.
+            crossing: What a unit of a node's flux carries across the contact in the stage (n,), mm s.
+        """
+        level = (fluxes.by_temperature.sum(axis=1) + fluxes.by_ambient) * self._ambient
+        by_contact = fluxes.by_temperature @ self._bare
+        into = by_contact + np.diag(self.given_back)
+        summed = scipy.linalg.block_diag(crossing, crossing)
+        parts = ((into, by_contact), (fluxes.by_heat, fluxes.by_heat), (level, level))
+        return Stage(self, *(np.concatenate([every, summed @ flux]) for every, flux in parts))
 
     def met(self, values: Array, *, sources: bool) -> tuple[Array, Array]:
         """Return theta_c - theta_a (2 n,), K, and the terms without what enters (terms,); or their changes (., k)."""
@@ -117,9 +126,10 @@ class Stage:
 
     Attributes:
         prepared: What it is whatever conducts.
-        by_contact: What enters, q + h_b (theta_c - theta_a), from theta_c - theta_a (2 n, 2 n).
-        by_heat: From the friction heat (2 n, n).
-        constant: At the ambient temperature without any (2 n,).
+        by_contact: What enters, q + h_b (theta_c - theta_a), and what of q crosses the contact into each body, from
+            theta_c - theta_a (2 n + 2, 2 n).
+        by_heat: From the friction heat (2 n + 2, n).
+        constant: At the ambient temperature without any (2 n + 2,).
     """
 
     prepared: PreparedStage
@@ -128,7 +138,7 @@ class Stage:
     constant: Array
 
     def entering(self, heat: Array, *, sources: bool) -> Array:
-        """Return what enters at the ambient temperature (2 n,) or (2 n, k), mW/mm².
+        """Return what enters at the ambient temperature, mW/mm², and what crosses (2 n + 2,) or (2 n + 2, k).
 
         Args:
             heat: Of friction (n,), or (n, k), mW/mm².
@@ -138,7 +148,7 @@ class Stage:
         return found + self.constant if sources else found
 
     def of(self, values: Array, entering: Array, *, sources: bool) -> tuple[Array, Array]:
-        """Return the coordinates of both bodies at the end (dim,) and the heat terms (terms,), or their changes.
+        """Return the coordinates of both bodies at the end (dim,), and the heat terms and what crosses, or changes.
 
         Args:
             values: Coordinates at the start (dim,), or without sources their changes (dim, k).
@@ -146,11 +156,12 @@ class Stage:
             sources: Whether there is more than changes.
         """
         met, terms = self.prepared.met(values, sources=sources)
-        into = self.by_contact @ met + entering
+        found = self.by_contact @ met + entering
+        into, crossing = found[: len(met)], found[len(met) :]
         terms += self.prepared.terms(into)
-        return self.prepared.ends(values, into, sources=sources), terms
+        return self.prepared.ends(values, into, sources=sources), np.concatenate([terms, crossing])
 
     def fluxes(self, values: Array, entering: Array) -> Array:
         """Return the fluxes q of the same (2 n,), mW/mm²."""
         met, _ = self.prepared.met(values, sources=True)
-        return np.asarray(self.by_contact @ met + entering - self.prepared.given_back * met)
+        return np.asarray((self.by_contact @ met + entering)[: len(met)] - self.prepared.given_back * met)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.results.steps import STEP
 
 STEPS = {"displacement": "displacement", "tangential_force": "tangential_force", "pressure": "step_pressure",
@@ -66,7 +66,7 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
     work = history.friction_work_increment.values[rows].sum(axis=1)
     put("dissipated_energy", ("cycle",), work, "friction_work_increment")
     put("accumulated_energy", ("cycle",), history.friction_work.values[last], "friction_work")
-    for term in TERMS if "heat_friction" in history else ():
+    for term in (*TERMS, *CROSSING) if "heat_friction" in history else ():
         put(f"heat_{term}", ("cycle",), history[f"heat_{term}"].values[rows].sum(axis=1), f"heat_{term}")
     if "temperature_punch" in data:
         hottest = np.maximum(*(data[f"temperature_{body}"][1].max(axis=(1, 2)) for body in ("punch", "strip")))

@@ -23,7 +23,7 @@ from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
@@ -86,6 +86,10 @@ HEAT_TERMS = {
     "held": "heat lost through boundaries of held temperature",
     "carried": "heat that the strip's material carries out of the model",
 }
+HEAT_CROSSING = {
+    "into_punch": "heat that enters the punch across the contact in the half-cycle",
+    "into_strip": "heat that enters the strip across the contact in the half-cycle",
+}
 
 
 # the same where the strip wears
@@ -118,7 +122,7 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
         turning = ANGULAR_SPEED if case.turns else {}
         variables = {**variables, **PROGRAM_VARIABLES, **turning, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
-        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
+        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in {**HEAT_TERMS, **HEAT_CROSSING}.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
     variables = {
         **variables,
@@ -205,7 +209,7 @@ def _values(block: Block, name: str) -> NDArray[Any]:
         return block.heat.balance_error
     if name in HEAT_VARIABLES or name in BULK:
         return getattr(block.heat, name)
-    return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
+    return block.heat.terms[:, (*TERMS, *CROSSING).index(name.removeprefix("heat_"))]
 
 
 def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:

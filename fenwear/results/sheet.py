@@ -240,6 +240,8 @@ LINES = {
     "heat_mJ.convected": Line("... lost to the surroundings", "J", 1e-3),
     "heat_mJ.held": Line("... lost where temperature is held", "J", 1e-3),
     "heat_mJ.carried": Line("... carried out by the strip's material", "J", 1e-3),
+    "heat_mJ.into_punch": Line("of it across the contact into the punch", "J", 1e-3),
+    "heat_mJ.into_strip": Line("... into the strip", "J", 1e-3),
     "largest_force_N": Line("largest tangential force in the last cycle", "N"),
     "largest_torque_N_mm": Line("largest torque in the last cycle", "N m", 1e-3),
     "largest_pressure_in_cycle_MPa": Line("largest pressure in it", "MPa"),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.cycle import Block
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.results import between, creep, place, sheet, steps
 from fenwear.results.contacts import CONTACTS, contact_sheets
 from fenwear.results.degrees import degrees_of
@@ -125,5 +125,5 @@ def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str,
         f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
         f"{HOTTEST}_{degrees.unit}": hottest - degrees.zero,
         **along,
-        "heat_mJ": dict(zip(TERMS, heat.terms[-1].tolist(), strict=True)),
+        "heat_mJ": dict(zip((*TERMS, *CROSSING), heat.terms[-1].tolist(), strict=True)),
     }

@@ -23,7 +23,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
@@ -55,7 +55,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class HeatedStep:
-    """What a time step leads to: temperatures (dim,), terms of its balance (6,), mJ, and both surfaces (2, n), K."""
+    """What a time step leads to: temperatures (dim,), terms of its balance (8,), mJ, and both surfaces (2, n), K."""
 
     values: Array
     terms: Array
@@ -110,7 +110,7 @@ class StickHeat:
 
         Args:
             before, after: Temperatures (dim,).
-            terms: Of the balances of its time steps (k, 6), mJ.
+            terms: Of the balances of its time steps (k, 8), mJ.
 
         Raises:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
@@ -199,9 +199,9 @@ class HeatHistory:
 
 
 def balance_error(terms: Array) -> float:
-    """Return what is missing in a balance of heat (k, 6) of all steps together, over its largest term."""
-    friction, debris, stored, convected, held, carried = terms.sum(axis=0)
-    largest = max(np.abs(terms).sum(axis=0).max(), 1e-300)
+    """Return what is missing in a balance of heat (k, 8) of all steps together, over its largest term."""
+    friction, debris, stored, convected, held, carried = terms.sum(axis=0)[: len(TERMS)]
+    largest = max(np.abs(terms[:, : len(TERMS)]).sum(axis=0).max(), 1e-300)
     return float(abs(friction - debris - stored - convected - held - carried) / largest)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.arrays import Mask
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Preparation, Tribosystem, regridded, renewed
 from fenwear.case import Case, plausibility_warnings
 from fenwear.cycle import (
@@ -61,7 +61,7 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
-from fenwear.results.summary import HOTTEST, summarise
+from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
 from fenwear.run_monitor import RunMonitor
 from fenwear.signals import Signals
 
@@ -324,7 +324,7 @@ class _Run:
         self._note("largest_complementarity_error", block.complementarity_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
-            self._note(HOTTEST, block.heat.max_temperature)
+            self._note_hottest(block, steps.hottest(block, block.heat))
         for name, value in steps.extremes(block).items():
             self._note(name, np.array(value))
         self.unique.append(uniques(block))
@@ -356,6 +356,12 @@ class _Run:
 
     def _note(self, name: str, values: Any) -> None:
         self.extremes[name] = max(self.extremes.get(name, -np.inf), float(values.max()))
+
+    def _note_hottest(self, block: Block, temperatures: Array) -> None:
+        at = int(temperatures.argmax())
+        if temperatures[at] > self.extremes.get(HOTTEST, -np.inf):
+            self.extremes[HOTTEST] = float(temperatures[at])
+            self.extremes[HOTTEST_AT] = int(block.half_cycle[at])
 
     def _write_fields(self, block: Block) -> None:
         temperature = block.end.temperature

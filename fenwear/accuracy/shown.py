@@ -95,7 +95,9 @@ def text(system: Tribosystem, found: Uncertainty) -> str:
             continue
         worst = max(shares, key=lambda quantity: shares[quantity])
         by = f", most by the {found.largest(worst)}" if name in helps else ""
-        told.append(f"{words} {100 * shares[worst]:.2g} %{by}")
+        # A share of kelvins tells nothing, nor one of a rise above a temperature that bodies have in part.
+        size = f"{total[worst]:.2g} K" if name == "temperature" else f"{100 * shares[worst]:.2g} %"
+        told.append(f"{words} {size}{by}")
     lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
     lines += [f"not told of the {source}: {why}" for source, why in found.untold.items()]
     lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import time
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,6 +29,7 @@ from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
 from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
+from fenwear.progress import LINE_SECONDS
 from fenwear.results.disk import write_text
 from fenwear.results.history import CASE, free_directory, make_directory, write_case
 
@@ -64,13 +66,13 @@ def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
 
 
 def _counter(log: Log, what: str) -> Callable[[int, int], None]:
-    """Return what tells of progress, at most a hundred times."""
-    told = [-1]
+    """Return what tells of progress: first, last, and now and then."""
+    told = [-LINE_SECONDS]
 
     def tell(done: int, total: int) -> None:
-        share = 100 * done // max(total, 1)
-        if share > told[0]:
-            told[0] = share
+        now = time.monotonic()
+        if done == total or now > told[0] + LINE_SECONDS:
+            told[0] = now
             log(f"{what} {done:,} of {total:,}")
 
     return tell

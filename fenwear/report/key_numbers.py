@@ -42,6 +42,7 @@ LABELS = {
     "largest_temperature_degC": "largest temperature of the contact surfaces over the run",
     "max_temperature_K": "largest temperature of the contact surfaces at the end",
     "largest_temperature_K": "largest temperature of the contact surfaces over the run",
+    "largest_temperature_half_cycle": "half-cycle in which it was largest",
     "wear_mm": "worn depth of the punch",
     "pressure_MPa": "contact pressure",
     "mean_pressure_MPa": "mean pressure",

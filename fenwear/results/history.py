@@ -122,7 +122,8 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
         turning = ANGULAR_SPEED if case.turns else {}
         variables = {**variables, **PROGRAM_VARIABLES, **turning, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
-        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in {**HEAT_TERMS, **HEAT_CROSSING}.items()}
+        told = {**HEAT_TERMS, **HEAT_CROSSING}
+        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in told.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
     variables = {
         **variables,

@@ -150,10 +150,10 @@ def values(block: Block) -> dict[str, Array]:
     found = {
         "cycles": block.half_cycle / system.motion.half_cycles,
         "sliding_distance": totals.of("distance"),
-        "normal_force": _over(adds.of("load_distance"), adds.of("distance")),
+        "normal_force": _over(adds.of("load_distance"), adds.of("distance"), block.load),  # at rest: what rests
         "pressure_integral": thickness * (block.pressure * system.pair.weights).sum(axis=1),
-        "friction_force": _over(adds.of("drag_distance"), adds.of("distance")),
-        **({"friction_torque": _over(adds.of("work"), _angles(block))} if turns(system) else {}),
+        "friction_force": _over(adds.of("drag_distance"), adds.of("distance"), np.zeros(len(block))),
+        **({"friction_torque": _over(adds.of("work"), _angles(block), np.zeros(len(block)))} if turns(system) else {}),
         "friction_work": totals.of("work"),
         "dissipated_energy": totals.energy,
         "pressure_sum": totals.pressure,
@@ -196,7 +196,7 @@ def _angles(block: Block) -> Array:
     return np.asarray(each[(block.half_cycle - 1) % motion.half_cycles])
 
 
-def _over(above: Array, below: Array, otherwise: float = np.nan) -> Array:
+def _over(above: Array, below: Array, otherwise: Array | float = np.nan) -> Array:
     """Return the quotient, or another value where nothing slides or presses."""
     return np.where(below > 0, above, otherwise) / np.where(below > 0, below, 1.0)
 
@@ -234,6 +234,7 @@ LINES = {
         for unit, shown in (("K", "K"), ("degC", "°C"))
         for name, when in (("max_temperature", "at the end"), ("largest_temperature", "over the run"))
     },
+    "largest_temperature_half_cycle": Line("... in half-cycle", ""),
     "heat_mJ.friction": Line("heat of friction in the last half-cycle", "J", 1e-3),
     "heat_mJ.debris": Line("... carried off by debris", "J", 1e-3),
     "heat_mJ.stored": Line("... gained by the bodies", "J", 1e-3),

@@ -17,6 +17,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
+from fenwear.cycle.block import BlockHeat
 from fenwear.interface import ContactPair
 from fenwear.results.surfaces import Column, Variable
 from fenwear.stick.edge import beside, stick_edges, zone_width
@@ -239,13 +240,17 @@ def numbers(last: Block) -> dict[str, Any]:
 
 @of_time_steps
 def extremes(block: Block) -> dict[str, float]:
-    """Return what is largest over the time steps of a block, by the names of a run's extremes; temperatures in K."""
+    """Return what is largest over the time steps of a block, by the names of a run's extremes."""
     weights = block.system.law_state.problem.weights
     steps = steps_of(block)
-    found = {
+    return {
         "largest_energy_balance_error": max(one.records.balance_error(weights) for one in steps),
         "largest_jump_error": max(one.jump_error for one in steps),
     }
-    if steps[0].records.heat.size:
-        found["largest_temperature"] = max(float(one.records.temperature.max()) for one in steps)
-    return found
+
+
+def hottest(block: Block, heat: BlockHeat) -> Array:
+    """Return the largest temperature of each half-cycle of a block (k,), K: of its time steps, or at its end."""
+    if not block.system.sticks:
+        return heat.max_temperature
+    return np.array([one.records.temperature.max() for one in steps_of(block)])

@@ -18,7 +18,8 @@ from fenwear.results.shakedown import shakedown_limit
 from fenwear.results.zone import ContactNet, contact_net, without_noise
 from fenwear.versions import versions
 
-HOTTEST = "largest_temperature"  # over a run; at its end it is max_temperature
+# Over a run, and when; at its end it is max_temperature.
+HOTTEST, HOTTEST_AT = "largest_temperature", "largest_temperature_half_cycle"
 
 
 def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:

@@ -40,7 +40,8 @@ class TimeStepRecords:
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
         duration: s (k,).
-        heat: Terms of the balance of heat (k, 8), mJ, as `heat.exchange.TERMS` and `CROSSING`; (k, 0) without heat, as the next two.
+        heat: Terms of the balance of heat (k, 8), mJ, as `heat.exchange.TERMS` and `CROSSING`; (k, 0) without heat, as
+            the next two.
         temperature: Of both contact surfaces, punch and strip, at the end (k, 2, n), K.
         conductance: Of each node (k, n), N/(mm s K); NaN where none conducts.
         coupling: Iterations of contact and heat (k,); 0 without heat.

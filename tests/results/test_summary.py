@@ -60,11 +60,14 @@ def test_of_a_stop(tmp_path: Path, integration: str) -> None:
     for told in (parts, summary):
         assert told["largest_temperature_degC"] == pytest.approx(peak, rel=1e-9)
         assert told["max_temperature_degC"] == pytest.approx(end, rel=1e-9)
+        assert told["largest_temperature_half_cycle"] == int(hottest.half_cycle[np.argmax(hottest.data)])
     sheet = lines(sheet_text(summary))
     assert float(sheet["largest temperature over the run (°C)"]) == pytest.approx(peak, rel=1e-4)
     assert float(sheet["largest temperature at the end (°C)"]) == pytest.approx(end, rel=1e-4)
 
     history = load_history(tmp_path / "parts")
+    assert summary["sliding"]["normal_force_N"] == pytest.approx(float(history["load"][-1]), rel=1e-9)  # at rest, too
+    assert summary["sliding"]["friction_force_N"] == 0
     assert history.speed.attrs["units"] == "rad s-1"
     assert "angular" in history.speed.attrs["long_name"]
     assert history.speed.values[[0, -1]] == pytest.approx([20.0, 0.0])

@@ -117,7 +117,8 @@ class Results(Written):
 
     def lines(self) -> Iterable[str]:
         """Return a table of each group."""
-        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in {**history.HEAT_TERMS, **history.HEAT_CROSSING}.items()}
+        terms = {**history.HEAT_TERMS, **history.HEAT_CROSSING}
+        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in terms.items()}
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
             "What a tribometer measures; with _strip of the strip": {

@@ -527,9 +527,10 @@ class Meter:
         sums = dict.fromkeys(SUMS, 0.0)
         sums["distance"] = float(distance.sum())
         sums["load_path"] = thick * float(((pressure * slid) @ problem.weights).sum())
-        steps = problem.program.steps
-        for k, way in enumerate(distance):
-            position = problem.interface.position(steps[(first + k) % len(steps)].offset)
+        program = problem.program.steps
+        steps = [program[(first + k) % len(program)] for k in range(len(distance))]
+        for k, (step, way) in enumerate(zip(steps, distance, strict=True)):
+            position = problem.interface.position(step.offset)
             f = np.concatenate([pressure[k], records.traction[k].T.ravel()])
             force = thick * position.in_space(f * position.weights)
             normal = thick * (pressure[k] * position.pair.weights)[:, None] * position.pair.normal
@@ -537,7 +538,8 @@ class Meter:
             sums["drag_distance"] += float(np.linalg.norm((force - normal).sum(axis=0))) * float(way)
         sums["work"] = thick * records.energy(problem.weights)
         energy = records.dissipated.sum(axis=0)
-        share = records.duration / records.duration.sum()
+        of = np.array([step.half_cycle for step in steps])
+        share = records.duration / np.bincount(of, records.duration)[of]  # of its half-cycle: there may be several
         found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
         return self.with_wear(found, worn)
 

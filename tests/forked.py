@@ -52,6 +52,8 @@ def _load() -> None:
 
     petsc4py.init([sys.argv[0], "-no_signal_handler"])
     import matplotlib.figure  # noqa: F401
+    import pint  # noqa: F401
+    import xarray  # noqa: F401
 
     import fenwear.cli
     import fenwear.run  # noqa: F401

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import xarray
-
 from fenwear.case.names import Names, renamed
 from fenwear.report.boundary import boundary_figure
 from fenwear.report.captions import caption
@@ -18,6 +16,7 @@ from fenwear.report.sections import geometry_figure, stress_figure
 from fenwear.report.style import STANDARD, Style, name_bodies, save, wrapped
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text
+from fenwear.results.netcdf import load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,13 +30,13 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Style = STANDA
     files = sorted((directory / "fields").glob("half_cycle_*.nc"))
     if not files:
         return {}
-    with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
-        own = renamed(case, Names.of(case).by_role)  # fields have the groups so
-        drawn = {"geometry": geometry_figure(fields, own, look)}
-        if "punch_stress_xx" in fields:
-            drawn["surface_stress"] = stress_figure(fields, look)
-        if "punch_temperature" in fields:
-            drawn["boundary_temperature"] = boundary_figure(fields, look)
+    fields = load(files[-1])
+    own = renamed(case, Names.of(case).by_role)  # fields have the groups so
+    drawn = {"geometry": geometry_figure(fields, own, look)}
+    if "punch_stress_xx" in fields:
+        drawn["surface_stress"] = stress_figure(fields, look)
+    if "punch_temperature" in fields:
+        drawn["boundary_temperature"] = boundary_figure(fields, look)
     return wrapped(drawn)
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from fenwear.report.course import shown_unit
@@ -24,8 +23,10 @@ from fenwear.report.key_numbers import names_in
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
 from fenwear.report.style import direction_words, further, name_bodies, save, save_gif, strip_moves
+from fenwear.results.netcdf import load
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.figure import Figure
 
 FIELDS, FIGURES = "fields", "figures"
@@ -105,7 +106,7 @@ def draw_here(directory: Path, formats: Sequence[str] = ()) -> list[Path]:
     files = field_files(directory)
     if len(files) > MOST_FRAMES:
         files = [files[k] for k in np.unique(np.linspace(0, len(files) - 1, MOST_FRAMES).round().astype(int))]
-    datasets = [_loaded(path) for path in files]
+    datasets = [load(path) for path in files]
     folder = directory / FIGURES
     folder.mkdir(exist_ok=True)
     paths = []
@@ -258,11 +259,6 @@ def _inside(data: xarray.Dataset, body: str, box: tuple[float, ...], margin: flo
     x, z = data[f"{body}_x"].values, data[f"{body}_z"].values
     dx, dz = margin * (box[1] - box[0]), margin * (box[3] - box[2])
     return np.asarray((x >= box[0] - dx) & (x <= box[1] + dx) & (z >= box[2] - dz) & (z <= box[3] + dz))
-
-
-def _loaded(path: Path) -> xarray.Dataset:
-    with xarray.open_dataset(path, engine="h5netcdf") as data:
-        return data.load()
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from fenwear.compat import facet_nodes
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
+from fenwear.results import netcdf
 from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import check_room, writing
 from fenwear.results.series import step_of
@@ -329,7 +330,7 @@ def _make_folder(folder: Path, size: int) -> None:
 def _write_nodal(dataset: xarray.Dataset, folder: Path, stem: str) -> None:
     path, part = folder / f"{stem}.nc", folder / f"{stem}.part"
     with writing(path):
-        dataset.to_netcdf(part, engine="h5netcdf")
+        netcdf.write(part, dataset)
         part.replace(path)
     append(folder / SERIES, step_of(dataset))
 

@@ -11,7 +11,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
 import h5py
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
+from fenwear.results.netcdf import Netcdf
 from fenwear.results.scar import conforming
 from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, part_columns, surface_columns
 from fenwear.versions import versions
@@ -351,31 +351,28 @@ class HistoryWriter:
         """Begin a file, without rows, in place of the twin."""
         columns = sum(column.values.nbytes + INDEX for column in self._columns.values())
         check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + columns)
-        with h5netcdf.File(self._twin, "w") as file:
-            file.attrs["title"] = system.case.title or "fenwear run"
-            file.attrs["Conventions"] = "CF-1.11"
-            file.attrs["case"] = system.case.to_toml()
-            file.attrs["directions"] = " ".join(system.direction_words.values())  # of d = 1 and d = -1
-            file.attrs["conforming"] = int(conforming(system.pair))
-            file.attrs["versions"] = json.dumps(versions())
-            file.attrs.update(steps.attributes(system))
+        sizes, about = self._sizes(), system.pair.punch.dim
+        with Netcdf(self._twin, {"half_cycle": None, **sizes}) as file:
+            file.attributes["title"] = system.case.title or "fenwear run"
+            file.attributes["Conventions"] = "CF-1.11"
+            file.attributes["case"] = system.case.to_toml()
+            file.attributes["directions"] = " ".join(system.direction_words.values())  # of d = 1 and d = -1
+            file.attributes["conforming"] = int(conforming(system.pair))
+            file.attributes["versions"] = json.dumps(versions())
+            file.attributes.update(steps.attributes(system))
             if grows(system) and system.pair.punch.grid is not None:
-                file.attrs[GRID] = system.pair.punch.grid.numbers
-            sizes = self._sizes()
-            file.dimensions = {"half_cycle": None, **sizes}
+                file.attributes[GRID] = system.pair.punch.grid.numbers
             if system.case.model.kind != "plane":
-                file.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
-                file.attrs["model"] = system.case.model.kind
+                file.attributes["Conventions"] = "CF-1.11 UGRID-1.0"
+                file.attributes["model"] = system.case.model.kind
             for name, column in self._columns.items():
-                variable = file.create_variable(name, column.dimensions, column.values.dtype)
-                variable[...] = column.values
-                variable.attrs.update(column.attributes)
+                file.add(name, column.dimensions, column.attributes, column.values)
             for name, (dimensions, units, long_name) in self._variables.items():
-                kind = int if name in INTEGERS else float
                 inner = tuple(sizes[d] for d in dimensions[1:])
-                variable = file.create_variable(name, dimensions, kind, chunks=(_chunk(inner), *inner))
                 own = self._degrees.unit if units == KELVIN.unit else units
-                variable.attrs.update(units=own, long_name=long_name, **on_mesh(dimensions, system.pair.punch.dim))
+                told = {"units": own, "long_name": long_name, **on_mesh(dimensions, about)}
+                kind = int if name in INTEGERS else float
+                file.add(name, dimensions, told, kind=kind, chunks=(_chunk(inner), *inner))
 
     def _cut(self, half_cycle: int) -> None:
         """Drop what a killed run wrote after its last checkpoint."""
@@ -393,8 +390,9 @@ class HistoryWriter:
         self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
         if self.rows < len(stored):
             self._copy()
-            with h5netcdf.File(self._twin, "a") as file:
-                file.resize_dimension("half_cycle", self.rows)
+            with h5py.File(self._twin, "r+") as file:
+                for name in self._variables:
+                    file[name].resize(self.rows, axis=0)
             self._twin.replace(self.path)
 
     def add(self, block: Block) -> None:
@@ -469,10 +467,7 @@ class HistoryWriter:
         self._change_places()
 
     def _open_twin(self, rows: int) -> h5py.File:
-        """Open the twin, with room for so many rows in all.
-
-        Straight from HDF5: h5netcdf asks every variable for the size of a dimension that grows, at each turn.
-        """
+        """Open the twin, with room for so many rows in all."""
         if not self._twin.exists():
             self._copy()
         claim(self._twin, self._bytes(rows - self._twin_rows))

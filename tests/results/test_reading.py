@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+from ctypes.util import find_library
 from pathlib import Path
 
 import h5netcdf
@@ -12,7 +14,8 @@ import xarray
 
 from fenwear import CaseError, load_case
 from fenwear.results.history import HISTORY
-from fenwear.results.reading import load, load_history
+from fenwear.results.netcdf import load
+from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
 SMALL = (
@@ -36,6 +39,26 @@ def same(path: Path) -> None:
     assert list(found.sizes) == list(expected.sizes)
 
 
+def as_netcdf_has_it(path: Path) -> dict[str, list[tuple[str, int]]]:
+    """Return the dimensions and their sizes of each variable, as Unidata's own library reads a file."""
+    library, file, count = ctypes.CDLL(find_library("netcdf")), ctypes.c_int(), ctypes.c_int()
+    name, size = ctypes.create_string_buffer(257), ctypes.c_size_t()
+    found: dict[str, list[tuple[str, int]]] = {}
+    assert library.nc_open(str(path).encode(), 0, ctypes.byref(file)) == 0
+    assert library.nc_inq_nvars(file, ctypes.byref(count)) == 0
+    for variable in range(count.value):
+        ids, rank = (ctypes.c_int * 9)(), ctypes.c_int()
+        assert library.nc_inq_varname(file, variable, name) == 0
+        own = found[name.value.decode()] = []
+        assert library.nc_inq_varndims(file, variable, ctypes.byref(rank)) == 0
+        assert library.nc_inq_vardimid(file, variable, ids) == 0
+        for dimension in ids[: rank.value]:
+            assert library.nc_inq_dim(file, dimension, name, ctypes.byref(size)) == 0
+            own.append((name.value.decode(), size.value))
+    assert library.nc_close(file) == 0
+    return found
+
+
 def test_a_run_is_read_as_by_xarray(tmp_path: Path) -> None:
     """History and fields of bodies with heat."""
     folder = run_case(
@@ -43,6 +66,9 @@ def test_a_run_is_read_as_by_xarray(tmp_path: Path) -> None:
     )[1]
     for path in (folder / HISTORY, *(folder / "fields").glob("*.nc")):
         same(path)
+        if find_library("netcdf"):
+            expected = {str(name): list(one.sizes.items()) for name, one in load(path).variables.items()}
+            assert as_netcdf_has_it(path) == expected
     assert load_history(folder).sizes["half_cycle"] == 4
 
 

@@ -156,10 +156,8 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "in solids": (
         "fretting-sphere",
         ("geometry.parameters.across=4", "geometry.follow_wear='never'", "run.half_cycles=4", "output.report=false",
-         "output.fields_at=[]",
-         "output.uncertainty=false",
-    "output.fields_at=[]",
-         "run.integration='explicit'", "wear={punch={coefficient='1e-7 1/MPa'}}"),
+         "output.uncertainty=false", "output.fields_at=[]", "run.integration='explicit'",
+         "wear={punch={coefficient='1e-7 1/MPa'}}"),
     ),
 }  # fmt: skip
 

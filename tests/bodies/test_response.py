@@ -19,7 +19,7 @@ from fenwear.bodies.response import Request
 from fenwear.errors import ConvergenceError
 
 SMALL = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
-BALL = ("geometry.order=1", "geometry.parameters.across=8", "geometry.parameters.core=0")
+BALL = ("geometry.order=1", "geometry.parameters.across=4", "geometry.parameters.core=0")
 WAYS: dict[str, tuple[int, float, int]] = {  # shares of the surface, of boundaries; the largest factor on one rank
     "substructures": (0, np.inf, factor.SPREAD),
     "surface": (0, 0, factor.SPREAD),

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.interface.convolution import Box, Convolution, back, forward, in_cache, over_period
@@ -79,7 +79,7 @@ class EndlessGrid:
         if passing is not None:
             self._read = _short([self._transfer(one.read, -one.read_at) for one in passing])
             self._put = _short([self._transfer(one.put, one.put_at) for one in passing])
-        self.take(None, None, 0.0, np.float64)
+        self.take(None, None, 0.0)
 
     def _transfer(self, numbers: Array, at: NDArray[np.int64]) -> Waves:
         """Return the waves (i, j) of numbers at places (k, axes)."""
@@ -87,14 +87,13 @@ class EndlessGrid:
         np.add.at(wrapped, tuple((at % np.array(self.period)).T), numbers)
         return _rows(scipy.fft.rfftn(wrapped))
 
-    def take(self, common: Array | None, strip: Array | None, own: float, dtype: DTypeLike) -> None:
+    def take(self, common: Array | None, strip: Array | None, own: float) -> None:
         """Take what unit pressures open besides the bodies, on average.
 
         Args:
             common: Worn off the punch in each phase (m,); None for nothing.
             strip: Worn off the strip (m,); None for nothing.
             own: In their own phase alone.
-            dtype: Of the numbers that products are made with.
         """
         symbol = self._symbol + own
         pairs: list[tuple[Waves, Waves]] = []  # of U (i, j, m) and V
@@ -102,7 +101,7 @@ class EndlessGrid:
             pairs.append((np.ones((1, 1, len(common)), dtype=complex), common[None, None].astype(complex)))
         if strip is not None and self._read is not None and self._put is not None:
             pairs.append((self._read, strip * self._put))
-        self.inverse: Array = (1 / symbol).astype(dtype)[:, None]
+        self.inverse: Array = 1 / symbol[:, None]
         self._worn: tuple[Waves, Waves, Waves] | None = None
         if not pairs:
             return
@@ -115,12 +114,13 @@ class EndlessGrid:
             by, to = by[:, 0], to[:, 0].swapaxes(1, 2)
         else:  # (i, pairs, m, j), (i, m, pairs, j)
             by, to = by.transpose(0, 2, 3, 1), to.transpose(0, 3, 2, 1)
-        self._worn = _as(by, dtype), _as(to, dtype), _as(small.transpose(0, 2, 3, 1), dtype)
+        small = small.transpose(0, 2, 3, 1)
+        self._worn = np.ascontiguousarray(by), np.ascontiguousarray(to), np.ascontiguousarray(small)
 
     def forward(self, fields: Array) -> Waves:
         """Return the waves of fields in the box (m, ...)."""
         i, _, j = self.inverse.shape
-        found = np.empty((i, len(fields), j), dtype=_complex(fields.dtype))
+        found = np.empty((i, len(fields), j), dtype=np.complex128)
         for some in in_cache(len(fields), found[:, :1].nbytes):
             found[:, some] = forward(fields[some], self.period).reshape(-1, i, j).swapaxes(0, 1)
         return found
@@ -128,7 +128,7 @@ class EndlessGrid:
     def back(self, waves: Waves) -> Array:
         """Return the fields in the box of waves."""
         i, m, j = waves.shape
-        found: Array = np.empty((m, *self.box.counts), dtype=waves.real.dtype)
+        found: Array = np.empty((m, *self.box.counts))
         shape = (-1, i, j) if len(self.period) == 2 else (-1, i)
         for some in in_cache(m, waves[:, :1].nbytes):
             image = np.ascontiguousarray(waves[:, some].swapaxes(0, 1)).reshape(shape)
@@ -168,7 +168,7 @@ class EndlessGrid:
         if self.period[-1] % 2 == 0:
             twice[-1] = 1.0
         shaped = twice if len(self.period) == 2 else twice[:, None, None]
-        return np.asarray(waves.conj() * (shaped / np.prod(self.period))).astype(waves.dtype)
+        return np.asarray(waves.conj() * (shaped / np.prod(self.period)))
 
 
 class Patch:
@@ -210,16 +210,8 @@ class Patch:
             left = self._forces(endless.solve(waves)) - forces
             a = np.linalg.solve(self._schur, left.ravel()).reshape(self._m, self._r)
             for s, moved in enumerate(self._moved):
-                waves -= moved * a[:, s, None].astype(gaps.dtype)
-        return endless.back(endless.solve(waves)), a.astype(gaps.dtype)
-
-
-def _complex(dtype: DTypeLike) -> DTypeLike:
-    return np.result_type(dtype, np.complex64)
-
-
-def _as(values: Waves, dtype: DTypeLike) -> Waves:
-    return np.ascontiguousarray(values, dtype=_complex(dtype))
+                waves -= moved * a[:, s, None]
+        return endless.back(endless.solve(waves)), a
 
 
 def _rows(waves: Waves) -> Waves:

@@ -121,11 +121,11 @@ class _Near:
         self.worn = free[m * n : (m + 1) * n] & (sums > 0)
         self.alone = np.where(of.held > 0, of.held, 1.0)
         self.length = min(LONGEST, 1 / max(float(of.held[self.worn].max(initial=0.0)), 1e-300))
-        self.on = on = self.equations.grid.around(touched, np.float64)
+        self.on = on = self.equations.grid.around(touched)
         self.touching = on.box.spread(touching.astype(float))
         rate = np.array([own.diagonal()[touched].mean() for own in of.wear])
         endless = EndlessGrid(self.equations.grid.of[0], on.box, None)
-        endless.take(self.length * rate, None, 0.0, np.float64)
+        endless.take(self.length * rate, None, 0.0)
         moved, balanced = (
             on.box.spread(values.reshape(-1, n)).reshape(m, r, *on.box.counts) * self.touching[:, None]
             for values in (np.broadcast_to(self.equations.modes.T, (m, r, n)), self.equations.balances)

@@ -5,8 +5,8 @@ rows and columns of nodes in contact are solved by GMRES, with products by Fouri
 The preconditioner is the inverse on an endless grid (`endless`), restricted to the nodes in contact, with the balance
 of forces held exactly: about as many iterations for any number of nodes and any length of the step.
 
-Newton's method takes its residuals in double precision and its steps to some digits, by transforms in single
-precision.
+Newton's method takes its steps to some digits, in double precision: rounding in single precision, other for every last
+bit of what comes in, would be left in pressures that few digits are asked of (1e-7 of them from one rank to two).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 from scipy.sparse import csr_array, hstack, vstack
 
 from fenwear.arrays import Array
@@ -29,11 +29,11 @@ from fenwear.interface.convolution import Box, Convolution, OnBox
 
 ACCURACY = 1e-12  # residual over the right-hand side
 FAR = 1e-5  # the same that is no solution, where the accuracy was not reached
-ROUGH, DIGITS = 0.1, 2e-6  # residual over that before, of a set that may change, and of what single precision gives
+ROUGH = 0.1  # residual over that before, of a set that may change
 SETS = 60  # of nodes, after each other
 FEW = 1e-3  # of a set: by how much the next one may differ for it to be solved to all digits
-SHARE = 0.3  # of a residual that is enough, to be below it in double precision, too
-FALLS = 0.5  # of the residual on a set that stays: by less single precision is at its end
+SHARE = 0.3  # of a residual that is enough, to be below it with all nodes, too
+FALLS = 0.5  # of the residual on a set that stays: by less rounding is at its end
 RESTART, RESTARTS = 40, 15
 SLIGHT = 1e-2  # of pressures: what brings them into balance
 WASTE = 1.3  # of a box: how much larger than needed it may be
@@ -80,19 +80,19 @@ class PhasesGrid:
         self.blocks, self.pairs = list(blocks), list(pairs)
         self.of = [block.compliance for block in blocks if isinstance(block.compliance, Convolution)]
         self.places, self.shape = self.of[0].places, self.of[0].shape
-        self._boxes: dict[DTypeLike, PhasesBox] = {}
+        self._box: PhasesBox | None = None
 
     @cached_property
     def whole(self) -> PhasesBox:
         """Products on all of it."""
-        return PhasesBox(self, Box.around(self.places, self.shape), np.float64)
+        return PhasesBox(self, Box.around(self.places, self.shape))
 
-    def around(self, touched: NDArray[np.int64], dtype: DTypeLike) -> PhasesBox:
+    def around(self, touched: NDArray[np.int64]) -> PhasesBox:
         """Return a box that holds these nodes, the last one if it does."""
-        last, box = self._boxes.get(dtype), Box.around(self.places, self.shape, touched)
+        last, box = self._box, Box.around(self.places, self.shape, touched)
         size = float(np.prod(box.counts))
         if last is None or not last.box.holds(self.places[touched]) or np.prod(last.box.counts) > WASTE * size:
-            self._boxes[dtype] = last = PhasesBox(self, box, dtype)
+            self._box = last = PhasesBox(self, box)
         return last
 
     @cached_property
@@ -119,12 +119,11 @@ class PhasesBox:
     Args:
         grid: What they are of.
         box: The box.
-        dtype: Precision of the products.
     """
 
-    def __init__(self, grid: PhasesGrid, box: Box, dtype: DTypeLike) -> None:
-        self.grid, self.box, self.dtype = grid, box, np.dtype(dtype)
-        self.products = OnBox(grid.of, box, dtype)
+    def __init__(self, grid: PhasesGrid, box: Box) -> None:
+        self.grid, self.box = grid, box
+        self.products = OnBox(grid.of, box)
         self.modes = self._boxed(np.array([block.modes.T for block in grid.blocks]))  # (m, r, ...)
         self.balance = self._boxed(np.array([block.balance for block in grid.blocks]))
 
@@ -138,7 +137,7 @@ class PhasesBox:
 
     def _boxed(self, values: Array) -> Array:
         m, r, n = values.shape
-        return self.box.spread(values.reshape(m * r, n)).reshape(m, r, *self.box.counts).astype(self.dtype)
+        return self.box.spread(values.reshape(m * r, n)).reshape(m, r, *self.box.counts)
 
     @cached_property
     def endless(self) -> EndlessGrid:
@@ -150,8 +149,8 @@ class PhasesBox:
     def _strip(self) -> tuple[csr_array, csr_array]:
         """What all phases put on the strip, and what all read there, over the nodes of the box."""
         nodes, pairs = self.box.nodes, self.grid.pairs
-        to = hstack([csr_array(pair.wear_projection)[:, nodes] for pair in pairs], format="csr", dtype=self.dtype)
-        back = vstack([csr_array(pair.wear_interpolation)[nodes] for pair in pairs], format="csr", dtype=self.dtype)
+        to = hstack([csr_array(pair.wear_projection)[:, nodes] for pair in pairs], format="csr")
+        back = vstack([csr_array(pair.wear_interpolation)[nodes] for pair in pairs], format="csr")
         return csr_array(to), csr_array(back)
 
     def opened(self, by: Opened, p: Array) -> Array:
@@ -169,7 +168,7 @@ class PhasesBox:
 
     def slopes(self, by: Opened) -> Opened:
         """Return slopes of all nodes in the box."""
-        return Opened(*(None if one is None else self.box.spread(one).astype(self.dtype) for one in by.parts))
+        return Opened(*(None if one is None else self.box.spread(one) for one in by.parts))
 
 
 class GriddedPhases:
@@ -203,7 +202,7 @@ class GriddedPhases:
         touched = np.flatnonzero(parts[:, : self.n].any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
-        on = self.grid.around(touched, np.float64)
+        on = self.grid.around(touched)
         slopes = None if self.opened is None else on.slopes(self.opened)
         closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]) > 0, parts[:, self.n :])
 
@@ -223,7 +222,7 @@ class GriddedPhases:
     def improved(self, x: Array, f: Array, enough: float, below: float) -> Array:
         """Return a solution of the inequality, better by some digits, from one with pressures >= 0.
 
-        The change is looked for in single precision, on a box around what touches: f is what changes are worth there.
+        The change is looked for on a box around what touches: f is what changes are worth there.
 
         Args:
             x: Unknowns.
@@ -238,13 +237,13 @@ class GriddedPhases:
         touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -below)).any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
-        on = self.grid.around(touched, np.float32)
+        on = self.grid.around(touched)
         slopes = None if self.opened is None else on.slopes(self.opened)
         change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
         p, a, touches = change.solve(enough, below)
         found = parts.copy()
         changed = found[:, on.box.nodes] + on.box.values(p)
-        found[:, on.box.nodes] = np.where(on.box.values(touches.astype(on.dtype)) > 0, np.maximum(changed, 0.0), 0.0)
+        found[:, on.box.nodes] = np.where(on.box.values(touches), np.maximum(changed, 0.0), 0.0)
         found[:, n:] += a
         return found.ravel()
 
@@ -278,7 +277,7 @@ class _Change:
 
     def __init__(self, on: PhasesBox, slopes: Opened | None, before: Array, gaps: Array, forces: Array) -> None:
         self.on, self.slopes = on, slopes
-        self.before, self.gaps, self.forces = (one.astype(on.dtype) for one in (before, gaps, forces))
+        self.before, self.gaps, self.forces = before, gaps, forces
 
     def solve(self, enough: float, below: float) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return the changes of pressures (m, ...) and motions (m, r), and what touches, sets of nodes in turn."""
@@ -286,13 +285,12 @@ class _Change:
         p, a = np.zeros_like(self.before), np.zeros_like(self.forces)
         gaps, forces = self.gaps, self.forces
         closed, all_motions = (self.before > 0) | (gaps < -below), np.ones(forces.shape, dtype=bool)
-        first, last, changed, idle = 0.0, np.inf, closed.sum(), False
+        last, changed, idle = np.inf, closed.sum(), False
         solver: _Closed | None = None
         for number in range(SETS):
             wrong = closed | (gaps < -below)  # as of what asks for the change
             size = float(np.sqrt((gaps[wrong] ** 2).sum() + (forces**2).sum()))
-            first = max(first, size)
-            wanted, stays = max(SHARE * enough, DIGITS * first), size > FALLS * last
+            wanted, stays = SHARE * enough, size > FALLS * last
             if number and (size <= wanted or (stays and (idle or not changed))):
                 break
             last, idle = size, stays
@@ -332,7 +330,7 @@ class _Closed:
         before: _Closed | None = None,
     ) -> None:
         self.on, self.slopes, self.rigid = on, slopes, rigid
-        self.closed = closed.astype(on.dtype)
+        self.closed = closed.astype(np.float64)
         self._shape = (len(closed), -1)
         if before is None:
             self._mean(slopes or Opened())
@@ -348,7 +346,7 @@ class _Closed:
             return None if values is None else np.asarray((values * self.closed).sum(axis=inner) / count)
 
         common, strip, own = map(mean, slopes.parts)
-        self.on.endless.take(common, strip, 0.0 if own is None else float(own.mean()), self.on.dtype)
+        self.on.endless.take(common, strip, 0.0 if own is None else float(own.mean()))
 
     def _parts(self, x: Array) -> tuple[Array, Array]:
         """Return pressures (m, ...) and rigid motions (m, r) of a vector."""
@@ -363,7 +361,7 @@ class _Closed:
         return self._joined(*self.patch.solve(*self._parts(x)))
 
     def _joined(self, p: Array, a: Array) -> Array:
-        return np.concatenate([(p * self.closed).ravel(), (a * self.rigid).ravel()], dtype=self.on.dtype)
+        return np.concatenate([(p * self.closed).ravel(), (a * self.rigid).ravel()])
 
     def solve(self, gaps: Array, forces: Array, accuracy: float) -> tuple[Array, Array, float]:
         """Return pressures (m, ...) and rigid motions (m, r), and what residual is left over the right-hand side."""

@@ -20,7 +20,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.fft
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.tensor import TensorWeights
@@ -194,20 +194,18 @@ class OnBox:
     Args:
         of: The convolutions, on one grid.
         box: Where pressures are, and gaps are asked for.
-        dtype: Precision.
     """
 
-    def __init__(self, of: Sequence[Convolution], box: Box, dtype: DTypeLike = np.float64) -> None:
+    def __init__(self, of: Sequence[Convolution], box: Box) -> None:
         self.box, self.size = box, tuple(scipy.fft.next_fast_len(2 * k - 1, real=True) for k in box.counts)
-        self._dtype = np.dtype(dtype)
-        self._weights = box.spread(of[0].weights[None])[0].astype(dtype)
+        self._weights = box.spread(of[0].weights[None])[0]
         tables = {id(one.numbers): one for one in of}
         self._kernels = [self._transformed(one) for one in tables.values()]
         self._of = [np.array([k for k, one in enumerate(of) if id(one.numbers) == key]) for key in tables]
         local = [one.local for one in of if one.local is not None]
-        self._local = box.spread(np.array(local)).astype(dtype) if local else None
+        self._local = box.spread(np.array(local)) if local else None
         self._smooth = [
-            _Smooth([one.smooth[k] for one in of], box, dtype) for k in range(min(len(one.smooth) for one in of))
+            _Smooth([one.smooth[k] for one in of], box) for k in range(min(len(one.smooth) for one in of))
         ]
 
     def numbers(self, of: Convolution) -> Array:
@@ -216,8 +214,7 @@ class OnBox:
         return of.numbers[cut]
 
     def _transformed(self, of: Convolution) -> NDArray[np.complexfloating[Any, Any]]:
-        waves = scipy.fft.rfftn(over_period(self.numbers(of), self.size))
-        return np.asarray(waves).astype(np.result_type(self._dtype, np.complex64))
+        return np.asarray(scipy.fft.rfftn(over_period(self.numbers(of), self.size)))
 
     def apply(self, x: Array) -> Array:
         """Return the gaps (m, ...) of pressures (m, ...) of each convolution, in the box."""
@@ -283,10 +280,10 @@ def over_period(numbers: Array, size: Sequence[int]) -> Array:
 class _Smooth:
     """The corrections of one body in several phases, on a box."""
 
-    def __init__(self, parts: Sequence[tuple[TensorWeights, Array]], box: Box, dtype: DTypeLike) -> None:
+    def __init__(self, parts: Sequence[tuple[TensorWeights, Array]], box: Box) -> None:
         factors = [weights.within(box.low, box.counts) for weights, _ in parts]
-        self._factors = [np.array(own, dtype=dtype) for own in zip(*factors, strict=True)]  # of each axis (m, k, c)
-        self._response = np.array([response for _, response in parts], dtype=dtype)
+        self._factors = [np.array(own) for own in zip(*factors, strict=True)]  # of each axis (m, k, c)
+        self._response = np.array([response for _, response in parts])
 
     def add(self, force: Array, to: Array) -> None:
         """Add the gaps of forces (m, ...) to others."""

@@ -160,6 +160,19 @@ def test_programs_go_on_with_the_grid_and_find_room_for_their_loads(how: str) ->
         assert last.end.totals.of(f"volume_{body}") == pytest.approx(volume, rel=2e-3)
 
 
+@pytest.mark.parametrize("program", [False, True])
+def test_last_bits_of_what_comes_in_stay_last_bits(program: bool) -> None:
+    """Of rough jumps, too: they are other ones on every number of ranks, each of which adds up its own cells."""
+    more = {"program": {"steps": STEPS}} if program else {}
+    ends = []
+    for force in (60.0, 60.0 * (1 + 1e-14)):
+        case = ball(force, grid={"across": 10}, run={"half_cycles": 20, "integration": "jump"}, **more)
+        ends.append(list(evolve(assemble(case)))[-1])
+    for of in (lambda block: block.pressure, lambda block: block.end.worn.punch, lambda block: block.end.worn.strip):
+        one, other = (of(end) for end in ends)
+        assert one == pytest.approx(other, abs=1e-11 * other.max())
+
+
 def test_what_a_layer_has_crept_stays_where_it_is() -> None:
     """Node by node as on a grid that was as wide at first; where nothing pressed nothing has crept."""
     layer = {"kind": "linear", "stiffness": "2e5 MPa/mm", "creep": {"terms": [{"compliance": 0.5, "time": "10 s"}]}}

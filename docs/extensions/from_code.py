@@ -194,6 +194,18 @@ class Combinations(Written):
         yield from (f"{number}. {_plain(reason)}" for number, reason in enumerate(reasons, 1))
 
 
+class Refusals(Written):
+    """What does not go together, from the list that a test holds against the source."""
+
+    def lines(self) -> Iterable[str]:
+        """Return a list for each kind of reason."""
+        listed = import_module("refusals")
+        for kind, title in listed.KINDS.items():
+            reasons = [text for of in listed.REFUSALS.values() for one, text in of.values() if one == kind]
+            yield f"\n**{title}**\n"
+            yield from (f"- {reason}" for reason in dict.fromkeys(reasons))
+
+
 class Verification(Written):
     """The problems that `fenwear verify` solves."""
 
@@ -251,6 +263,7 @@ def setup(app: Any) -> dict[str, bool]:
         ("results", Results),
         ("cases", Cases),
         ("combinations", Combinations),
+        ("refusals", Refusals),
         ("geometries", Geometries),
         ("verification", Verification),
     ):

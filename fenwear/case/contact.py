@@ -54,13 +54,22 @@ class Contact(Part):
 
     def asks(self, name: str, wear: Iterable[WearLaw | None]) -> bool:
         """Return whether friction, these wear laws or the loss of debris depend on a variable of coefficients."""
-        given = [self.friction, *(law.given_coefficient for law in wear if law is not None)]
-        if self.third_body is not None and self.third_body.asks(name):
-            return True
-        return any(isinstance(one, Dependence) and one.depends_on(name) for one in given)
+        lost = self.third_body is not None and self.third_body.asks(name)
+        given = (law.given_coefficient for law in wear if law is not None)
+        return lost or self.friction_asks(name) or any(_asks(one, name) for one in given)
+
+    def friction_asks(self, *names: str, of_share: bool = True) -> bool:
+        """Return whether friction, or that of asperities alone, depends on one of these variables of coefficients."""
+        share = self.lubrication.given[1] if of_share and self.lubrication is not None else None
+        return _asks(self.friction, *names) or _asks(share, *names)
 
     @model_validator(mode="after")
     def _pure_number(self) -> Self:
         if isinstance(self.friction, Dependence) and self.friction.unit:
             raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
         return self
+
+
+def _asks(value: object, *names: str) -> bool:
+    """Return whether a coefficient depends on one of these variables."""
+    return isinstance(value, Dependence) and any(map(value.depends_on, names))

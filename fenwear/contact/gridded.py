@@ -243,7 +243,7 @@ class GriddedPhases:
         p, a, touches = change.solve(enough, below)
         found = parts.copy()
         changed = found[:, on.box.nodes] + on.box.values(p)
-        found[:, on.box.nodes] = np.where(on.box.values(touches), np.maximum(changed, 0.0), 0.0)
+        found[:, on.box.nodes] = np.where(on.box.values(touches.astype(np.float64)) > 0, np.maximum(changed, 0.0), 0.0)
         found[:, n:] += a
         return found.ravel()
 

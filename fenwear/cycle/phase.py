@@ -60,11 +60,11 @@ class PhaseStep:
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         # Explicitly, wear and what remembers follow the pressure, and do not change it.
-        friction = system.friction
-        apart = not self._constant and not implicit and not friction.remembers and not friction.asks("edge")
+        friction, asks = system.friction, system.friction.contact.friction_asks
+        apart = not self._constant and not implicit and not friction.remembers and not asks("edge")
         self._wears_after = apart and friction.constant
-        self._slides_before = apart and not friction.constant and not friction.asks("p", "pm")
-        follows = apart and exchange is None and friction.asks("p", "pm")
+        self._slides_before = apart and not friction.constant and not asks("p", "pm")
+        follows = apart and exchange is None and asks("p", "pm")
         self._contact = system.passed_contact(phase, following=follows)
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)

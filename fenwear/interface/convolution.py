@@ -204,9 +204,7 @@ class OnBox:
         self._of = [np.array([k for k, one in enumerate(of) if id(one.numbers) == key]) for key in tables]
         local = [one.local for one in of if one.local is not None]
         self._local = box.spread(np.array(local)) if local else None
-        self._smooth = [
-            _Smooth([one.smooth[k] for one in of], box) for k in range(min(len(one.smooth) for one in of))
-        ]
+        self._smooth = [_Smooth([one.smooth[k] for one in of], box) for k in range(min(len(one.smooth) for one in of))]
 
     def numbers(self, of: Convolution) -> Array:
         """Return the table of a convolution over the distances within the box (2 b - 1, ...)."""

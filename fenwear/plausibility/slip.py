@@ -8,6 +8,7 @@ import numpy as np
 
 from fenwear.arrays import Mask
 from fenwear.assembly import Tribosystem
+from fenwear.stick.program import passes
 
 if TYPE_CHECKING:
     from fenwear.cycle import Block
@@ -49,14 +50,14 @@ def passing_text(last: Block) -> str:
     steps: tuple[Any, ...] = last.steps[-system.motion.half_cycles :]
     if not steps or system.law_state is None or not system.law_state.problem.interface.moves:
         return ""
-    slipped = sum(one.records.slipped(system.pair.weights) for one in steps) / (2 * system.motion.half_cycles)
-    apart = system.pair.punch.spacing()
-    if slipped > apart:
+    pair = system.pair
+    slipped = sum(one.records.slip_amplitude(pair.weights, len(steps)) for one in steps)
+    if passes(slipped, pair.punch):
         return ""
     return (
         f"the strip passes under the punch with its supports, but slips by {1e3 * slipped:.2g} µm each way, less than "
-        f"nodes are apart ({1e3 * apart:.2g} µm): where nodes stick its wear is smeared over them, and grows with "
-        "every cycle; expected motion.positions left away, or 1"
+        f"nodes are apart ({1e3 * pair.punch.spacing():.2g} µm): where nodes stick its wear is smeared over them, and "
+        "grows with every cycle; expected motion.positions left away, or 1"
     )
 
 

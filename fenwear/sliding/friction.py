@@ -154,12 +154,6 @@ class Friction:
         """Whether the share of the load that asperities carry changes with more than the place."""
         return self.contact.lubrication is not None and self.contact.lubrication.varies
 
-    def asks(self, *names: str, of_share: bool = True) -> bool:
-        """Return whether mu, or that of asperities alone, depends on one of these variables of coefficients."""
-        lubrication = self.contact.lubrication if of_share else None
-        given = (self.contact.friction, None if lubrication is None else lubrication.given[1])
-        return any(isinstance(one, Dependence) and any(map(one.depends_on, names)) for one in given)
-
     @property
     def remembers(self) -> bool:
         """Whether mu is a law that has states of its own."""
@@ -169,7 +163,7 @@ class Friction:
         """Return mu (n,) by the pressure (n,), as `values`, where all else is as in these conditions."""
         state, with_cycle, lubrication = dict(conditions.of("mean")), conditions.cycle is None, self.contact.lubrication
         shape, fluid = conditions.shape, 0.0 if lubrication is None else lubrication.fluid_friction
-        alike = not self.asks("p", "pm", of_share=False)
+        alike = not self.contact.friction_asks("p", "pm", of_share=False)
         more = self._of_asperities(state, conditions) - fluid if alike else None  # than the fluid, of asperities
 
         def values(pressure: Array) -> Array:

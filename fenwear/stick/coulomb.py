@@ -7,6 +7,7 @@ cycles is that of `jump`. What a time step must remember of the one before goes 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -199,7 +200,8 @@ class Coulomb:
         """Return what a run remembers on another contact grid; collective. Jumps go on from a cycle made there."""
         (nodes, _), stuck = node_maps(before, after), memory.stuck
         problems = before.law_state.problem, after.law_state.problem
-        at = on_other_grid(memory.at, *problems, nodes, carried(memory.at.worn, before, after))
+        worn = carried(memory.at.worn, before, after)
+        at = problems[1].led(partial(on_other_grid, memory.at, *problems, nodes, worn))
         stuck = None if stuck is None else on_nodes(stuck, nodes, np.zeros(len(nodes)))
         return Memory(at, stuck=stuck, meshes=memory.meshes)
 

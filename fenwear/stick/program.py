@@ -198,9 +198,14 @@ def far_enough(case: Case, surface: ContactSurface) -> bool:
     if isinstance(case.motion, Cycle):
         ends = make_motion(case.motion).ends(SlidingField())
         moved = max(float(np.linalg.norm(end.points(surface.x) - surface.x, axis=1).max()) for end in ends)
-        return moved > SPACINGS * surface.spacing()
+        return passes(moved, surface)
     motion = make_motion(case.motion.model_copy(update={"positions": 2}))
     far = _largest(motion)
     if isinstance(case.motion, Oscillation):
         far *= float(np.linalg.norm(surface.x[:, :2] - np.array(case.motion.centre)[:2], axis=1).max())
+    return passes(far, surface)
+
+
+def passes(far: float, surface: ContactSurface) -> bool:
+    """Return whether a strip that moves or slips so far to each side, mm, passes nodes of a contact surface."""
     return far > SPACINGS * surface.spacing()

@@ -97,10 +97,13 @@ class TimeStepRecords:
         """Which nodes carry pressure in any step (n,)."""
         return np.asarray((self.pressure > 0).any(axis=0))
 
-    def slipped(self, weights: Array) -> float:
-        """Return how far the surfaces slip in all steps together, the mean over the pressure of each, mm."""
+    def slip_amplitude(self, weights: Array, half_cycles: int) -> float:
+        """Return how far the surfaces slip to each side in steps of so many half-cycles, mm.
+
+        Its mean over the pressure: where nodes stick, the strip's surface goes with the punch's.
+        """
         carried = np.maximum(self.pressure @ weights, 1e-300)
-        return float(((self.pressure * self.slip_magnitude) @ weights / carried).sum())
+        return float(((self.pressure * self.slip_magnitude) @ weights / carried).sum()) / (2 * half_cycles)
 
     def energy(self, weights: Array) -> float:
         """Return what friction has dissipated, N in the plane and N mm in a solid."""

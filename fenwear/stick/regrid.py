@@ -6,7 +6,6 @@ What surfaces are moved by is that of the tractions there, as the next time step
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ def on_other_grid(
     nodes: NDArray[np.int64],
     worn: WornDepths,
 ) -> PartialSlipState:
-    """Return where a run is on another grid; collective.
+    """Return where a run is on another grid; for rank 0 that leads.
 
     Args:
         at: Where it is, between half-cycles.
@@ -33,16 +32,6 @@ def on_other_grid(
         nodes: The old node of each new one (n_new,), -1 for none.
         worn: Depths there.
     """
-    return after.led(partial(_moved, at, before, after, nodes, worn))
-
-
-def _moved(
-    at: PartialSlipState,
-    before: PartialSlipProblem,
-    after: PartialSlipProblem,
-    nodes: NDArray[np.int64],
-    worn: WornDepths,
-) -> PartialSlipState:
     interface, contact, step = after.interface, at.contact, after.program.steps[at.next_step - 1]
     position = interface.position(step.offset)
     loaded = after.expanded(interface.loaded(step.fraction).times(at.load), step.offset)

@@ -17,7 +17,7 @@ from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
-from fenwear.stick.program import SPACINGS, far_enough, make_program
+from fenwear.stick.program import far_enough, make_program, passes
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.wear import LocalLaws
 
@@ -67,7 +67,7 @@ def placed_by_slip(
     Arguments as of `partial_slip_problem`, bodies being built.
     """
     problem = unheated_problem(case, bodies, steps, fresh=fresh, condensed=condensed)
-    if _asks_for_slip(problem, case) and touches(problem) and _slips_little(problem):
+    if _asks_for_slip(problem, case) and touches(problem) and not _slips_far(problem):
         return unheated_problem(case, bodies, steps, fresh=fresh, moves=False)
     return problem
 
@@ -178,16 +178,11 @@ def _asks_for_slip(problem: PartialSlipProblem, case: Case) -> bool:
     return problem.interface.moves and by_default
 
 
-def _slips_little(problem: PartialSlipProblem) -> bool:
-    """Return whether a strip slips less than a node to each side in the first cycle; collective.
+def _slips_far(problem: PartialSlipProblem) -> bool:
+    """Return whether what slips in the first cycle passes nodes, however far the supports go; collective."""
 
-    Where nodes stick, the strip's surface goes with the punch's, however far its supports go: what slips passes,
-    by the mean over the pressure.
-    """
-    return problem.led(lambda: _slipped(problem) <= SPACINGS * problem.interface.middle.pair.punch.spacing())
+    def found() -> bool:
+        pair, cycle = problem.interface.middle.pair, TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
+        return passes(cycle.slip_amplitude(pair.weights, problem.program.half_cycles), pair.punch)
 
-
-def _slipped(problem: PartialSlipProblem) -> float:
-    """Return the amplitude of the slip in the first cycle, its mean over the pressure, mm."""
-    cycle = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
-    return cycle.slipped(problem.interface.middle.pair.weights) / (2 * problem.program.half_cycles)
+    return problem.led(found)

@@ -64,6 +64,7 @@ from fenwear.results.history import (
 from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
 from fenwear.run_monitor import RunMonitor
 from fenwear.signals import Signals
+from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
@@ -224,6 +225,8 @@ class _Run:
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
         self.warnings += [*law_warnings(system), *stroke_warnings(system)]
+        if getattr(self.case.motion, "positions", 0) is None and system.motion.positions > DEFAULT_POSITIONS:
+            log(f"motion.positions: {system.motion.positions} are taken, about as near to each other as contact nodes")
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._heat_watch = HeatMonitor(self.extremes)

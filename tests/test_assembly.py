@@ -152,6 +152,34 @@ def test_a_variant_equals_a_new_system(assembled: Callable[..., Tribosystem]) ->
             np.testing.assert_allclose(one.load_gap, other.load_gap, rtol=0, atol=1e-9 * np.abs(other.load_gap).max())
 
 
+def test_a_long_stroke_takes_as_many_positions_as_nodes_ask_for() -> None:
+    """Where the whole punch passes, the strip loses k times the integral of p a half-cycle, everywhere; nine comb it.
+
+    And no more where they are given; variants and programs have those of the longest stroke.
+    """
+    stroke = "motion={kind='reciprocating', amplitude=45, period=1, profile='triangular'}"
+    long = (stroke, "geometry.parameters.overlap=47", "geometry.parameters.elements_along_contact=12")
+    settings = (*long, "geometry.degree=1", "wear.punch.coefficient=1e-12", "wear.strip.coefficient=1e-9")
+    off = []
+    for more in ((), ("motion.positions=9",)):
+        system = assemble(load_case("example1", [*settings, *more]))
+        (block,) = march(system, 2)
+        strip, load = system.pair.strip, system.normal_force / system.bodies.punch.thickness
+        depth = block.wear_strip[-1][np.abs(strip.x[:, 0] - strip.x[:, 0].mean()) < 10]
+        off.append(np.abs(depth / (2 * 1e-9 * load) - 1).max())
+        if not more:
+            assert system.motion.positions % 2
+            assert system.position_spacing < 1 < 9 < system.motion.positions
+            assert vary(system, "motion.amplitude=40").motion.positions == system.motion.positions
+            steps = "program={steps=[{time=2, amplitude=5}, {time=2, amplitude=45}]}"
+            short = assemble(load_case("example1", [*settings, "motion.amplitude=5", steps, "run.half_cycles=8"]))
+            assert short.motion.positions == system.motion.positions
+        else:
+            assert system.motion.positions == 9
+    assert off[0] < 0.01
+    assert off[1] > 3 * off[0]
+
+
 def test_a_variant_takes_the_operator_of_its_own_settings() -> None:
     """Whatever that of the system was; what was reduced for whole cycles stays so."""
     small = ("geometry.parameters.elements_along_contact=4", "geometry.degree=1", "heat.steps=1")

@@ -146,11 +146,19 @@ def changed(case: Case, **tables: Mapping[str, Any]) -> Case:
     )
 
 
-def in_few_steps(case: Case, phases: int) -> Case:
-    """Return the case to be run again: to its end, by jumps where it has many phases."""
+def in_few_steps(case: Case, system: Tribosystem, until: int) -> Case:
+    """Return the case to be run again: to its end, by jumps where it has many phases.
+
+    Args:
+        case: The problem.
+        system: Of the run itself, whose positions of the strip are kept where other nodes would ask for others.
+        until: The half-cycle it ends with.
+    """
     run: dict[str, Any] = {"periodic_within": None}
-    if case.run.integration != "jump" and phases > LONGEST:
+    if case.run.integration != "jump" and until * system.motion.positions > LONGEST:
         run |= {"integration": "jump", "jump_tolerance": TOLERANCE}
+    if not system.sticks and getattr(case.motion, "positions", 0) is None and system.track_changes:
+        return changed(case, run=run, motion={"positions": system.motion.positions})
     return changed(case, run=run)
 
 

@@ -86,7 +86,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
     if lower is None:
         untold["mesh"] = NOTHING_BELOW
     try:
-        base = in_few_steps(case if lower is None else lower.case, until * last.system.motion.positions)
+        base = in_few_steps(case if lower is None else lower.case, last.system, until)
         by_jumps = case.run.integration == "jump"
         longer = by_jumps and are_dear(last)
         share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
@@ -147,8 +147,9 @@ def _steps(
             yield "slip steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
     fewer = max(2, 2 * (positions // 4) + positions % 2)
     if positions > fewer:
-        apart = _apart(before, again.otherwise(motion={"positions": fewer}).values(), fewer / (positions - fewer))
-        yield "positions", apart
+        other, factor = again.otherwise(motion={"positions": fewer}).values(), fewer / (positions - fewer)
+        # By the fields, too: combs of unlike teeth may be as deep.
+        yield "positions", {quantity: factor * value.apart(other[quantity]) for quantity, value in before.items()}
     if last.system.bodies.followed is not None and follow is not None:
         yield "following", _apart(before, again.otherwise(geometry={"follow_wear": 2 * follow}).values(), 1.0)
 
@@ -197,7 +198,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     begin = time.perf_counter()
     case, until = system.case, system.case.run.half_cycles
     below = coarser(case, system) if case.geometry.degree > 2 or case.grid is not None else None
-    base = in_few_steps(case if below is None else below.case, until * system.motion.positions)
+    base = in_few_steps(case if below is None else below.case, system, until)
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles
     one = replace(system, made_from=base) if below is None else set_up(base, system, below)

@@ -30,6 +30,7 @@ from fenwear.assembly.growing import (
     with_room,
 )
 from fenwear.assembly.laws import law_named, register_contact_law
+from fenwear.assembly.positions import place_case_bodies
 from fenwear.assembly.resource_report import body_lines, resources_text
 from fenwear.assembly.resources import Resources, body_resources
 from fenwear.assembly.solver_choice import choose_solvers
@@ -93,6 +94,7 @@ __all__ = [
     "place",
     "place_at_rest",
     "place_case",
+    "place_case_bodies",
     "preparation",
     "properties_outdated",
     "property_change",

@@ -13,7 +13,7 @@ from fenwear.interface import ContactPair, Placement
 from fenwear.interface.placement import in_space
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import Friction
-from fenwear.sliding.motion import Motion, Phase, make_motion
+from fenwear.sliding.motion import DEFAULT_POSITIONS, Motion, Phase, make_motion
 
 OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 FACET = 0.1  # the same at a single node, beside facets of no regular form
@@ -54,9 +54,9 @@ class Sliding:
         return phase.place if self.motion.steps else self.field.placement(phase.offset)
 
 
-def make_sliding(case: Case, parts: int = 1) -> Sliding:
-    """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
-    motion = make_motion(case.motion, strip_wears=case.strip_changes and case.passes).in_parts(parts)
+def make_sliding(case: Case, *, positions: int = DEFAULT_POSITIONS) -> Sliding:
+    """Return the sliding of a case, in so many positions of a strip that wears where the case leaves them open."""
+    motion = make_motion(case.motion, strip_wears=case.strip_changes and case.passes, positions=positions)
     sliding_field = _sliding_field(case, motion)
     one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(

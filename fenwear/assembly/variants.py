@@ -12,7 +12,7 @@ from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup, place
 from fenwear.assembly.growing import answers_anywhere, on_first_contact, relaid
 from fenwear.assembly.laws import law_named
-from fenwear.assembly.strokes import make_sliding
+from fenwear.assembly.positions import place_case_bodies
 from fenwear.assembly.tribosystem import (
     Preparation,
     Tribosystem,
@@ -88,8 +88,7 @@ def place_case(
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    bodies = build_bodies(case, comm, followed, warmed)
-    return place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case)
+    return place_case_bodies(case, build_bodies(case, comm, followed, warmed))
 
 
 def vary(system: Tribosystem, *settings: str) -> Tribosystem:

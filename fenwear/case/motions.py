@@ -47,7 +47,7 @@ class _ToAndFro(Part):
     positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
         default=None,
         description="of the strip under the punch in each half-cycle; 1: opposite each other throughout; "
-        "by default 1 unless the strip wears, then 9",
+        "by default 1 unless the strip wears, then as many as contact nodes ask for, 9 to 61; on grids and with heat 9",
     )
 
 

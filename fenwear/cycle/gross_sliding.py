@@ -29,7 +29,7 @@ from fenwear.assembly import (
     make_sliding,
     on_first_contact,
     outgrown,
-    place,
+    place_case_bodies,
     preparation,
     property_change,
     regridded,
@@ -50,6 +50,7 @@ from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SHORTER_JUMPS
+from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
@@ -182,7 +183,8 @@ class GrossSliding:
         """
         before, bodies, condensed, sliding = system.case, system.bodies, system.condensed, system.sliding
         if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
-            sliding = make_sliding(case)
+            least = 0 if system.motion.steps else system.motion.positions
+            sliding = make_sliding(case, positions=max(DEFAULT_POSITIONS, least))
         if before.loading != case.loading:
             bodies = bodies.under(case)
         conducts_alike = same_conduction(before, case)
@@ -201,7 +203,7 @@ class GrossSliding:
         return joined(placed, condensed, exchange.through(placed.layer_conductance()))
 
     def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> ContactSetup:
-        placed = place(bodies, sliding or make_sliding(case), case.heat, solver=case.contact.solver, case=case)
+        placed = place_case_bodies(case, bodies, sliding)
         return placed if placed.law == self.name else replace(placed, law=self.name)
 
     def replicated(self, system: Tribosystem) -> bool:

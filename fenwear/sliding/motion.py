@@ -29,7 +29,7 @@ from fenwear.interface.placement import HERE, Placement, Vector
 from fenwear.sliding.field import ALONG_X, SlidingField
 from fenwear.sliding.screw import Screw, Slide, Way
 
-DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
+DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears, at least; odd, so that one is the middle of the stroke
 
 
 @dataclass(frozen=True)
@@ -320,12 +320,13 @@ class Motion:
         return [field.placement(float(end)) for end in self.offsets(1)[:, -1]]
 
 
-def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
+def make_motion(description: Motions, *, strip_wears: bool = False, positions: int = DEFAULT_POSITIONS) -> Motion:
     """Return the motion that the case describes.
 
     Args:
         description: Of the case.
         strip_wears: Whether the strip wears and passes under the punch, so that its positions matter by default.
+        positions: How many it takes then, where the case leaves them open.
 
     Raises:
         CaseError: it is faster than numbers are large.
@@ -338,11 +339,11 @@ def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
     if isinstance(description, Cycle):
         moves = strip_wears if description.positions is None else description.positions == "steps"
         return _table_motion(description, moves=moves)
-    positions = description.positions or (DEFAULT_POSITIONS if strip_wears else 1)
+    count = description.positions or (positions if strip_wears else 1)
     if isinstance(description, Tabulated):
-        return _motion(_table_strokes(description), positions)
+        return _motion(_table_strokes(description), count)
     stroke, amplitude = _to_and_fro(description), description.amplitude
-    return _motion(((1, -amplitude, stroke), (-1, amplitude, stroke)), positions)
+    return _motion(((1, -amplitude, stroke), (-1, amplitude, stroke)), count)
 
 
 def _power(stroke: _Stroke, begin: float, end: float, exponent: float) -> float:

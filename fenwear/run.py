@@ -36,7 +36,7 @@ from fenwear.errors import (
     OutputError,
 )
 from fenwear.law_choice import resolve_law
-from fenwear.parallel import on_root
+from fenwear.parallel import agreed, on_root
 from fenwear.plausibility import (
     HeatMonitor,
     StateMonitor,
@@ -143,14 +143,11 @@ def _run(
     begin = time.perf_counter()
 
     def finish() -> dict[str, Any]:
-        # Who interrupts a run is in a hurry: its figures can be drawn later.
-        report = system.case.output.report and not isinstance(failure, InterruptedRunError)
         warnings = [*run.all_warnings(), *run.watch.warnings(), *run.told_at_the_end()]
         seconds = time.perf_counter() - begin
         ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
         said = [system.names.told(text) for text in warnings]
-        ending = {**ended, "warnings": said, "retries": run.remedies}
-        return run.finish(ending, report=report, uncertain=failure is None)
+        return run.finish({**ended, "warnings": said, "retries": run.remedies})
 
     with noted as signals:
         try:
@@ -159,9 +156,10 @@ def _run(
             failure = error
         except InterruptedRunError as error:
             failure = error
-            summary = finish()  # a second signal does not wait for it
-    if not isinstance(failure, InterruptedRunError):
-        summary = finish()
+        summary = finish()  # only a second signal does not wait for it
+    # Who interrupts a run is in a hurry: its figures can be drawn later.
+    if not (isinstance(failure, InterruptedRunError) or agreed(system.comm, signals.received)):
+        summary = run.tell_more(summary, uncertain=failure is None)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -411,23 +409,29 @@ class _Run:
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
         return f"{reached}, to go on: --resume{how}"
 
-    def finish(self, how: dict[str, Any], *, report: bool, uncertain: bool) -> dict[str, Any]:
-        """Write what a run ends with, and return the summary; collective."""
+    def finish(self, how: dict[str, Any]) -> dict[str, Any]:
+        """Write what a run ends with, from where it can go on first, and return the summary; collective."""
         self._on_history(HistoryWriter.close)
         if self.last is None:
             return {}
+        self._save()
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
             self._write_fields(self.last)
-        self._save()
         reason = self._note_growth(self.last)
         if reason:
             how = {**how, "no_growth_rate": reason}
         summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
+        return summary
+
+    def tell_more(self, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
+        """Tell the uncertainty of what is written, draw it, and return the summary with it; collective."""
+        if self.last is None:
+            return summary
         if uncertain and self.case.output.uncertainty:
             summary |= self._uncertainty(self.last)
             on_root(self.comm, lambda: write_summary(self.directory, summary))
-        if report:
+        if self.case.output.report:
             from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
 
             on_root(self.comm, lambda: try_report(self.directory, self.log))

@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear import load_case, run
+from fenwear.results.checkpoint import reached
 from fenwear.results.reading import load_history
 
 Run = Callable[..., Any]
@@ -570,3 +572,19 @@ def test_signals_until_the_end(tmp_path: Path) -> None:
         messages = process.communicate()[1]
     assert process.returncode == 1, messages
     check_gone(ranks)
+
+
+def test_a_signal_while_the_end_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that was computed is there, to go on from and told; uncertainty and report, which take longer, are left out."""
+
+    def interrupted(*_: Any) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(run, "write_fields", interrupted)
+    case = load_case("example1", ["geometry.parameters.elements_along_contact=8", "run.half_cycles=4"])
+    summary, folder = run.run_case(case, "short", tmp_path / "out", lambda _: None, progress="none")
+    assert summary["half_cycles"] == 4
+    assert reached(folder) == 4
+    assert "uncertainty" not in summary
+    assert (folder / "summary.json").is_file()
+    assert not (folder / "report.html").exists()

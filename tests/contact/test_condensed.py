@@ -96,7 +96,7 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
 @pytest.mark.parametrize("name", ["example1", "example2"])
 def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
-    system = assembled(name, *OPENING, "geometry.parameters.elements_along_contact=8")
+    system = assembled(name, *OPENING, "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
     full = [full_contact(system, system.interface, system.friction_ratio(d)) for d in (1, -1)]
     condensed = [system.contact((d,)) for d in (1, -1)]
     wear, opened = np.zeros_like(system.pair.x), False
@@ -274,7 +274,12 @@ def test_action_is_reaction_on_a_scarred_surface(assembled: Callable[..., Tribos
 
     The frame turns with the scar, and what acts on one body acts on the other the other way: forces balance.
     """
-    small = ("geometry.parameters.elements_along_contact=12", "motion.positions=3", "contact.friction=0.3")
+    small = (
+        "geometry.parameters.elements_along_contact=12",
+        "geometry.degree=1",
+        "motion.positions=3",
+        "contact.friction=0.3",
+    )
     flat = assembled("fretting", *small)
     x = flat.pair.strip.x[:, 0]
     scar = WornDepths(np.zeros(len(flat.pair.weights)), 4e-3 * np.maximum(1 - (x / 0.25) ** 2, 0) ** 2)

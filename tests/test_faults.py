@@ -575,7 +575,7 @@ def test_signals_until_the_end(tmp_path: Path) -> None:
 
 
 def test_a_signal_while_the_end_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that was computed is there, to go on from and told; uncertainty and report, which take longer, are left out."""
+    """All that was computed is there, to go on from and told; uncertainty and report, which take long, are left out."""
 
     def interrupted(*_: Any) -> None:
         os.kill(os.getpid(), signal.SIGINT)

@@ -102,11 +102,11 @@ def _with_larger_grid(
 
     Args:
         base: Of the case.
-        stage: That begins.
+        stage: That begins, or within which a run goes on: its grid grows as it would have, not to a wider one.
         state: Where a run is; None at its beginning, whose grid is around its first contact.
         load: Factor of all loads.
     """
-    while state is not None and grows(base):
+    while state is not None and state.half_cycle == stage.begin and grows(base):
         own = at_stage(base, stage)
         grid = with_room(own, state.worn, carried_by(state), load)
         if grid is None:

@@ -14,7 +14,8 @@ from functools import partial
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
 
 from fenwear.arrays import Array
 from fenwear.assembly.strokes import Sliding, make_sliding
@@ -26,6 +27,7 @@ from fenwear.case import AUTO, CONDENSED, Case, Grid
 from fenwear.case.program import stages_of
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
+from fenwear.interface.pair import ContactPair
 from fenwear.interface.patches import facet_side
 from fenwear.interface.transfer import dual_transfer
 from fenwear.memory import free_memory, memory_size
@@ -33,6 +35,8 @@ from fenwear.parallel import agreed
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
 PER_NODE = 300.0  # bytes that a node takes in each position of the strip (measured, 129 and 257 nodes in 3 and 21)
+UNFELT = 1e-10  # of the forces that a grid puts on meshes at most: less is rounding
+SHIFT, INVERSE = 1e-13, 4  # of these forces, and steps of inverse iteration for those that are felt least
 REACH = 65  # nodes along the longer side of the largest grid, from which the first contact is looked for
 
 Both = tuple[ElasticBody, ElasticBody]  # punch and strip
@@ -92,6 +96,43 @@ def _check_memory(comm: MPI.Comm, grid: RegularGrid, sliding: Sliding) -> None:
     message = f"{counts} nodes in {positions} positions of the strip take about {memory_size(taken)}, but "
     message += f"{memory_size(free)} are free; expected fewer, or fewer motion.positions"
     raise CaseError(InputError("grid.nodes", message))
+
+
+def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> None:
+    """Make sure that condensed bodies feel all pressures of a contact grid.
+
+    Forces go to a condensed body by integrals over its elements. Where the grid is finer than the elements of both there
+    are pressures, of turns from node to node, that neither feels: they add nothing to the gaps and are arbitrary. A body
+    that is fine or a half-space feels all of them.
+
+    Args:
+        pair: The surfaces opposite each other.
+        punch, strip: The bodies, whose operators are chosen.
+
+    Raises:
+        CaseError: they do not; it says where.
+    """
+    grid = pair.punch.grid
+    if grid is None or punch.reading is None or strip.reading is None:
+        return
+    if punch.operator != CONDENSED or strip.operator != CONDENSED:
+        return
+    forces = [csr_array(punch.reading.T @ pair.punch.spread), csr_array(strip.reading.T @ pair.transfer.T)]
+    felt = csc_array(sum(one.T @ one for one in forces))
+    shift = SHIFT * float(felt.diagonal().max())
+    least: Array = np.random.default_rng(0).standard_normal(len(pair.weights))
+    factor = splu(csc_array(felt + diags_array(np.full(len(least), shift))), permc_spec="MMD_AT_PLUS_A")
+    for _ in range(INVERSE):
+        least = factor.solve(least / np.linalg.norm(least))
+    if float(least @ (felt @ least)) > UNFELT * shift / SHIFT * float(least @ least):
+        return
+    place = grid.flat[int(np.abs(least).argmax())]
+    there = " and ".join(f"{'xyz'[axis]} = {at:.3g} mm" for axis, at in zip(grid.axes, place, strict=True))
+    message = f"finer than the elements of both condensed bodies, as at {there}: pressures that turn from node to node are "
+    message += "felt by neither; expected fewer nodes, smaller elements there, a smaller grid.size around finer ones, or "
+    message += "punch.operator or strip.operator = 'fine', for which elements may be as coarse as they like"
+    reasons = [one.taken for one in (punch, strip) if one.taken]
+    raise CaseError(InputError("grid.nodes", message + (f" ({'; '.join(reasons)})" if reasons else "")))
 
 
 def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurface, csr_array]:

@@ -16,6 +16,7 @@ from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.creep import Creep, creep_of
+from fenwear.assembly.grids import check_felt
 from fenwear.assembly.resources import Resources, contact_memory, needs
 from fenwear.assembly.solver_choice import choose_solvers, chosen, free_on_ranks
 from fenwear.bodies.condensation import CondensedBody
@@ -283,6 +284,7 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False, free: float | 
     if placed.passage is not None:
         onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
     punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
+    check_felt(middle, bodies.punch, bodies.strip)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()

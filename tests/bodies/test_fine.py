@@ -368,6 +368,16 @@ def test_what_a_grid_cannot_lie_on(settings: list[str], key: str) -> None:
         assemble(load_case("ball-on-flat", [*BALL, "grid.nodes=9", *settings]))
 
 
+def test_pressures_that_no_mesh_feels() -> None:
+    """A grid finer than the elements of both condensed bodies is refused where it is; one fine body feels them all."""
+    condensed = ["grid.nodes=31", "punch.operator='condensed'", "strip.operator='condensed'"]
+    with pytest.raises(CaseError, match=r"grid.nodes: finer than the elements of both condensed bodies, as at x = -?\d"):
+        assemble(load_case("rounded-punch", condensed))
+    system = assemble(load_case("rounded-punch", [*condensed, "strip.operator='fine'"]))
+    stiffness = np.linalg.eigvalsh(system.interface.dense()[:, 0, :, 1])
+    assert stiffness.min() > 1e-3 * stiffness.max()
+
+
 def test_more_nodes_than_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are refused before they are made, with what they take in all positions of the strip."""
     monkeypatch.setattr(grids, "free_memory", lambda: 1e6)

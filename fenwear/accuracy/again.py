@@ -163,8 +163,12 @@ def in_few_steps(case: Case, system: Tribosystem, until: int) -> Case:
 
 
 def are_dear(last: Block) -> bool:
-    """Return whether the jumps of a run, by its last half-cycles, take more than its set-up, more or less."""
-    return last.system.sticks or len(last) * last.system.motion.positions > DEAR
+    """Return whether the jumps of a run, by its last half-cycles, take more than its set-up, more or less.
+
+    Bodies that answer on any grid are not set up again.
+    """
+    phases = len(last) * last.system.motion.positions
+    return last.system.sticks or phases > DEAR or answers_anywhere(last.system)
 
 
 def in_longer_jumps(case: Case) -> Case:

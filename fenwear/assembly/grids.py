@@ -101,9 +101,9 @@ def _check_memory(comm: MPI.Comm, grid: RegularGrid, sliding: Sliding) -> None:
 def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> None:
     """Make sure that condensed bodies feel all pressures of a contact grid.
 
-    Forces go to a condensed body by integrals over its elements. Where the grid is finer than the elements of both there
-    are pressures, of turns from node to node, that neither feels: they add nothing to the gaps and are arbitrary. A body
-    that is fine or a half-space feels all of them.
+    Forces go to a condensed body by integrals over its elements. Where the grid is finer than the elements of both
+    there are pressures, turning from node to node, that neither feels: they add nothing to the gaps and are arbitrary.
+    A body that is fine or a half-space feels all of them.
 
     Args:
         pair: The surfaces opposite each other.
@@ -128,8 +128,12 @@ def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> Non
         return
     place = grid.flat[int(np.abs(least).argmax())]
     there = " and ".join(f"{'xyz'[axis]} = {at:.3g} mm" for axis, at in zip(grid.axes, place, strict=True))
-    message = f"finer than the elements of both condensed bodies, as at {there}: pressures that turn from node to node are "
-    message += "felt by neither; expected fewer nodes, smaller elements there, a smaller grid.size around finer ones, or "
+    message = (
+        f"finer than the elements of both condensed bodies, as at {there}: pressures that turn from node to node are "
+    )
+    message += (
+        "felt by neither; expected fewer nodes, smaller elements there, a smaller grid.size around finer ones, or "
+    )
     message += "punch.operator or strip.operator = 'fine', for which elements may be as coarse as they like"
     reasons = [one.taken for one in (punch, strip) if one.taken]
     raise CaseError(InputError("grid.nodes", message + (f" ({'; '.join(reasons)})" if reasons else "")))

@@ -91,8 +91,8 @@ def extents(
 def scar_geometry(placed: ContactSetup, surface: ContactSurface) -> ScarGeometry:
     """Return where the nodes of the punch's or the strip's surface lie along and across the sliding."""
     cells = surface_cells(surface)
-    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    edges = np.unique(edges, axis=0)
+    ends, count = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1), len(surface.x)
+    edges = np.stack(np.divmod(np.unique(ends[:, 0].astype(np.int64) * count + ends[:, 1]), count), axis=1)
     all_round = surface is placed.pair.strip and placed.sliding.track is not None
     part = surface.part
     if surface.dim == 2:

@@ -33,6 +33,8 @@ YOUNG, LOAD, RADIUS, FRICTION, PULLED = 210_000.0, 100.0, 10.0, 0.5, 0.7
 SPENCE = 0.2986  # friction by which half of the contact's radius sticks, with a rigid plane and nu = 0
 HALF_AXES, TOP = (0.2080002, 0.1311640), 1750.100  # mm, MPa: crossed cylinders of 10 and 5 mm
 WIDER, WORN = 1.08, 1.75  # grid over the contact, and over that before it has worn
+LAYERS = ((0.3, 1.0), (0.6, 1.1), (0.85, 1.2))  # radii over the thickness, and loads over those of a half-space
+MESHES = ((8, 2), (12, 3), (16, 4))  # of the layer
 AMPLITUDE, DEPTH, VOLUME = 1.58597e-3, 1.83246e-3, 2.55879e-4  # mm, mm³: to and fro, and where its wear ends
 
 
@@ -55,7 +57,7 @@ def told(row: str, nodes: int, begin: float, found: Array, exact: Array, inner: 
     largest, mean = abs(found.max() / top - 1), np.sqrt((wrong**2).sum() / (exact**2).sum())
     seconds = time.process_time() - begin
     print(
-        f"{row:34} {nodes:4} {largest:9.1e} {mean:12.1e} {(wrong / top)[inner].max():9.1e} {seconds:8.1f}", flush=True
+        f"{row:38} {nodes:4} {largest:9.1e} {mean:12.1e} {(wrong / top)[inner].max():9.1e} {seconds:8.1f}", flush=True
     )
 
 
@@ -95,18 +97,19 @@ def spence(nodes: int) -> None:
     )
 
 
-def layer_pressed(nodes: int) -> None:
-    """Print the errors of a sphere on a bonded layer against its exact kernel, row 55: a contact of 0.6 thicknesses."""
-    begin, wide = time.process_time(), 1.9
-    ours, exact, x = on_layer(0.6, 1.1, round(wide / 1.2 * nodes) + 1, wide)
+def layer_pressed(nodes: int, radius: float, larger: float, mesh: tuple[int, int]) -> None:
+    """Print the errors of a sphere on a bonded layer against its exact kernel, row 55, by the mesh of the layer."""
+    begin, wide = time.process_time(), 2.3 * radius
+    ours, exact, x = on_layer(radius, larger, round(wide / (2 * radius) * nodes) + 1, wide, mesh)
     r, a = np.hypot(x[:, 0], x[:, 1]), np.hypot(x[:, 0], x[:, 1])[exact[0] > 0].max()
-    told("55 sphere on a layer: pressure", nodes, begin, ours[0], exact[0], r < a - 2 * wide / nodes)
-    print(f"{'':34} {'':4} approach {ours[1] / exact[1] - 1:.1e}", flush=True)
+    row = f"55 sphere on a layer, {mesh[0]} by {mesh[1]}, a = {a:.2f} H"
+    told(row, nodes, begin, ours[0], exact[0], r < a - 2 * wide / nodes)
+    print(f"{'':38} {'':4} approach {ours[1] / exact[1] - 1:.1e}", flush=True)
 
 
 def main() -> None:
     """Print the table."""
-    print(f"{'':34} {'':4} {'largest':>9} {'mean square':>12} {'at nodes':>9} {'time (s)':>8}")
+    print(f"{'':38} {'':4} {'largest':>9} {'mean square':>12} {'at nodes':>9} {'time (s)':>8}")
     for nodes in [int(text) for text in sys.argv[1:]] or [32, 64, 128]:
         for poisson in (0.3, 0.0):
             body, modulus = Elastic(YOUNG / (2 * (1 + poisson)), poisson), YOUNG / (1 - poisson**2) / 2
@@ -125,6 +128,12 @@ def main() -> None:
             exact = FRICTION * top * (cap(r / a) - c / a * cap(r / c))
             inner = (np.abs(r - a) > 2 * step) & (np.abs(r - c) > 2 * step)
             told("34 sphere, traction, Q = 0.7 mu P", nodes, begin, state.traction[:, 0], exact, inner)
+            wrong, near = (
+                (state.traction[:, 0] - exact) ** 2 / (exact**2).sum(),
+                [np.abs(r - one) < 2 * step for one in (a, c)],
+            )
+            shares = [float(np.sqrt(wrong[one].sum())) for one in (*near, ~near[0] & ~near[1])]
+            print(f"{'':38} {nodes:4} of the mean square at the borders of contact and stick, elsewhere", *shares)
         body, step = Elastic(YOUNG / 2.6, 0.3), 2 * HALF_AXES[0] / nodes
         counts = tuple(2 * round(WIDER * half / step) for half in HALF_AXES)
         begin, bodies = time.process_time(), on_grid(body, body, step, counts, LOAD, RADIUS)
@@ -135,7 +144,9 @@ def main() -> None:
         told("20 crossed cylinders, pressure", nodes, begin, state.pressure, TOP * cap(r), inner)
         worn(nodes)
         spence(nodes)
-        layer_pressed(nodes)
+        for radius, larger in LAYERS:
+            for mesh in MESHES:
+                layer_pressed(nodes, radius, larger, mesh)
 
 
 if __name__ == "__main__":

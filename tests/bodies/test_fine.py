@@ -315,7 +315,9 @@ def as_exact_layer(request: Request) -> HalfSpace:
     return ExactLayer(**{field.name: getattr(half, field.name) for field in fields(half)})
 
 
-def on_layer(radius: float, larger: float, nodes: int, wide: float) -> tuple[Pressed, Pressed, Array]:
+def on_layer(
+    radius: float, larger: float, nodes: int, wide: float, mesh: tuple[int, int] = (12, 3)
+) -> tuple[Pressed, Pressed, Array]:
     """Return a rigid sphere of 20 H on the layer, fine and by the exact kernel: pressures and approach; and the nodes.
 
     Args:
@@ -323,9 +325,10 @@ def on_layer(radius: float, larger: float, nodes: int, wide: float) -> tuple[Pre
         larger: The load over that of a half-space, whose contact is larger.
         nodes: Along the sides of the grid.
         wide: Its sides, H.
+        mesh: Elements of the layer across each way, and through its thickness.
     """
     load, found = larger * 4 / 3 * (1 / (1 - NU**2)) * radius**3 / 20, []
-    case = layer(12, 3, grid={"nodes": nodes, "size": [wide, wide]})
+    case = layer(*mesh, grid={"nodes": nodes, "size": [wide, wide]})
     for make in (fine, as_exact_layer):
         loads = [one.model_copy(update={"force": (0.0, 0.0, -load)}) for one in case.punch.loads]
         case = case.model_copy(update={"punch": case.punch.model_copy(update={"loads": tuple(loads)})})
@@ -371,7 +374,9 @@ def test_what_a_grid_cannot_lie_on(settings: list[str], key: str) -> None:
 def test_pressures_that_no_mesh_feels() -> None:
     """A grid finer than the elements of both condensed bodies is refused where it is; one fine body feels them all."""
     condensed = ["grid.nodes=31", "punch.operator='condensed'", "strip.operator='condensed'"]
-    with pytest.raises(CaseError, match=r"grid.nodes: finer than the elements of both condensed bodies, as at x = -?\d"):
+    with pytest.raises(
+        CaseError, match=r"grid.nodes: finer than the elements of both condensed bodies, as at x = -?\d"
+    ):
         assemble(load_case("rounded-punch", condensed))
     system = assemble(load_case("rounded-punch", [*condensed, "strip.operator='fine'"]))
     stiffness = np.linalg.eigvalsh(system.interface.dense()[:, 0, :, 1])

@@ -92,6 +92,18 @@ def plausibility_warnings(case: Case) -> list[str]:
         *_laws_without_unit(case),
         *_mixed_temperatures(case, values),
         *_tables(case),
+        *_without_effect(case),
+    ]
+
+
+def _without_effect(case: Case) -> list[str]:
+    """Return what is said of keys that others leave nothing to decide."""
+    heat = case.heat
+    if heat is None or heat.conductance != "perfect" or "partition" not in heat.model_fields_set:
+        return []
+    return [
+        'heat.partition: does nothing where heat.conductance = "perfect": equal temperatures share the heat; leave '
+        "heat.conductance away, or 0, for a share that is given"
     ]
 
 

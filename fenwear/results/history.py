@@ -99,7 +99,8 @@ STRIP_VARIABLES = {
     "weight_strip": (
         ("half_cycle", "x_strip"),
         "mm",
-        "length swept by the punch that each node stands for, on the mesh of the half-cycle",
+        "length swept by the punch that each node stands for, on the mesh of the half-cycle; of a closed track that of "
+        "its meshed part",
     ),
 }
 
@@ -159,7 +160,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
             **roughness.columns(system),
         }
     arc = pair.punch.arc is not None
-    text = "arc length along the contact" if arc else "position along the contact, from the centre of the geometry"
+    text = "arc length along the contact" if arc else "position along the contact, x of the geometry"
     columns = {
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
         "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),

@@ -62,7 +62,8 @@ class Chord:
     bent: Array | None
     _spent: int = 0
     _last: Array | None = None
-    _at: Array | None = None  # diagonal at the last step
+    _at: Array | None = None  # diagonal where the next step begins
+    _bends: bool = False  # whether it has changed since the last step
 
     def __post_init__(self) -> None:
         size = len(self.factor.key)
@@ -88,36 +89,46 @@ class Chord:
         changed = free != np.frombuffer(self.factor.key, dtype=bool)
         return bool((bends[changed] > STEEP * bodies[changed]).all())
 
-    def step(self, f: Array, key: bytes, diagonal: Array | None) -> Array:
+    def begin(self, diagonal: Array | None) -> None:
+        """Forget the last step: the next one does not follow it.
+
+        Args:
+            diagonal: Of the derivative where it begins (size,); None where it is not known.
+        """
+        self._last, self._bends = None, False
+        self._at = None if self.bent is None else diagonal
+
+    def bend(self, diagonal: Array | None) -> None:
+        """Take the diagonal where the next step begins (size,), which follows the last one; None where not known."""
+        if self._at is not None and diagonal is not None:
+            self._bends = bool((np.abs(diagonal - self._at) > BENT * self._at).any())
+            self._at = diagonal
+
+    def step(self, rest: Array, key: bytes) -> Array:
         """Return the step (size,) of the free unknowns, nothing for the others.
 
         Args:
-            f: The residual (size,).
+            rest: The residual of the free unknowns, nothing for the others (size,).
             key: Which unknowns are free, as bytes.
-            diagonal: Of the derivative here (size,); None where it is not known.
         """
-        factor, opens = self.factor, np.zeros_like(f)
-        diagonal = None if self.bent is None else diagonal
-        if key == factor.key:
-            opens[factor.free] = -factor.solve(f[factor.free])
-            if self.bent is not None and diagonal is not None:
-                opens *= self.bent
+        factor, at = self.factor, self._at
+        if isinstance(factor.free, slice):
+            opens = factor.solve(rest)
         else:
-            assert self.bent is not None
+            opens = np.zeros_like(rest)
+            opens[factor.free] = factor.solve(rest[factor.free])
+        if at is not None and self.bent is not None:
+            opens *= self.bent
+        if key != factor.key:
             free, before = (np.frombuffer(one, dtype=bool) for one in (key, factor.key))
-            opens[factor.free] = -factor.solve(np.where(free, f, 0.0)[factor.free])
-            opens = np.where(free, np.where(before, opens * self.bent, -f), 0.0)
-        bends = False
-        if diagonal is not None:
-            bends = self._at is not None and bool((np.abs(diagonal - self._at) > BENT * self._at).any())
-            self._at = diagonal
-        opens = self._corrected(opens, bends=bends)
-        return opens if diagonal is None else opens / diagonal
+            opens = np.where(free, np.where(before, opens, rest), 0.0)
+        opens = self._corrected(np.negative(opens, out=opens))
+        return opens if at is None else opens / at
 
-    def _corrected(self, step: Array, *, bends: bool) -> Array:
+    def _corrected(self, step: Array) -> Array:
         """Return a step by Broyden's updates, in what unknowns open by themselves: in it those that bend are alike.
 
-        The last one tells of the derivative where nothing `bends` by itself.
+        The last one tells of the derivative where nothing bends by itself.
         """
         if len(self._by):
             step = step + self._onto.T @ (self._by @ step)
@@ -126,7 +137,7 @@ class Chord:
             return step
         square = float(last @ last)
         share = float(last @ step) / square
-        if bends or not share < MOST_SHARE:
+        if self._bends or not share < MOST_SHARE:
             return step
         self._last = step = np.asarray(step / (1 - share))
         if len(self._by) < MOST_UPDATES:  # (1 + onto by) after those before, as one sum
@@ -135,7 +146,3 @@ class Chord:
                 by = by + (self._onto @ by) @ self._by
             self._by, self._onto = np.vstack([self._by, by]), np.vstack([self._onto, step])
         return step
-
-    def begin(self) -> None:
-        """Forget the last step: the next one does not follow it."""
-        self._last = self._at = None

@@ -24,7 +24,7 @@ from scipy.optimize import linprog
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
-from fenwear.contact.inequality import Inequality
+from fenwear.contact.inequality import TOLERANCE, Inequality
 from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
 from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread import DistributedBlock, OwnRows, SpreadCompliance
@@ -220,7 +220,8 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
-        self.__dict__.pop("_grid", None)
+        for derived in ("_grid", "_own_diagonal"):
+            self.__dict__.pop(derived, None)
         if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self._gridded:
             self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
@@ -410,13 +411,19 @@ class CondensedContact:
         worn, bends = self._wearing.local(pressure), self._wearing.layer(pressure)
         if worn is None:
             return None
-        own, found = np.ones_like(self._offset), np.zeros_like(self._offset)
-        for k, row in enumerate(own):
-            row[:n] = self.blocks[k].diagonal[:n] if self._many else self._dense[k].diagonal()[:n]
+        own, found = self._own_diagonal.copy(), np.zeros_like(self._offset)
         own[:, :n] += scale * worn
         if bends is not None:
             found[:, :n] = scale * bends
         return own.ravel(), found.ravel()
+
+    @cached_property
+    def _own_diagonal(self) -> Array:
+        """The diagonal of the bodies (m, size), one for rigid modes."""
+        found, n = np.ones_like(self._offset), self.shape[1]
+        for k, row in enumerate(found):
+            row[:n] = self.blocks[k].diagonal[:n] if self._many else self._dense[k].diagonal()[:n]
+        return found
 
     def _known(self, slope: Array, layer: Array | None) -> bool:
         """Return whether the last derivative is that of these slopes."""
@@ -468,13 +475,14 @@ class CondensedContact:
         x, f, iterations = self._solve(start)
         if self._gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)
-        x = x.reshape(m, -1)
-        pressure = x[:, :n] * self._pressure_scale
-        pressure[x[:, :n] <= ZERO] = 0.0
+        x, f = x.reshape(m, -1), f.reshape(m, -1)
+        pressure, open_ = x[:, :n] * self._pressure_scale, x[:, :n] <= ZERO
+        if self.inequality.curved:  # where layers are soft without pressure next to none closes some of a gap
+            open_ &= f[:, :n] > TOLERANCE
+        pressure[open_] = 0.0
         if self.most < np.inf:
             pressure[x[:, :n] >= self.most / self._pressure_scale] = self.most
-        gaps = f.reshape(m, -1)[:, :n] * self._gap_scale
-        return ContactState(pressure, gaps, begun + x[:, n:] * self._rigid_scale, iterations)
+        return ContactState(pressure, f[:, :n] * self._gap_scale, begun + x[:, n:] * self._rigid_scale, iterations)
 
     @property
     def size(self) -> int:

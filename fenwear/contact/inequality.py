@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from petsc4py import PETSc
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.contact.chords import Chord, Diagonal, Factor
 from fenwear.contact.operators import Approximate, Indices, Operator, Solve
 from fenwear.contact.pivoting import complementary
@@ -40,6 +40,7 @@ SETS = 30  # that are gone through before SNES starts
 AGAIN = 3  # times that a set may come again, where its derivative is another one
 CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor serves anyway
 SLOWEST = 0.8  # fall by which it may, where few steps are left: beyond it Newton's own are surer
+STAYS = 1e-6  # residual below which the next step changes no derivative by itself
 SERVES = 3  # such steps at least that a factor costs
 STEP_COSTS = 50  # unknowns by which it costs a step more
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
@@ -252,44 +253,51 @@ class Inequality:
     def _by_chords(self, start: Array) -> Array | None:
         """Return the solution from a start that is near, where the derivative changes with it; None if it is not."""
         x, key, seen = start.copy(), self._free(start), set[bytes]()
-        before = np.inf
+        before, free = np.inf, _mask(key)
         try:
-            chord = self._chord
-            if chord is None or chord.factor is not self._kept or chord.worn_out or not self._serves(chord, x, key):
-                chord = self._new_chord(x, key)
-            chord.begin()
+            chord = self._chord_at(x, key)
             for self.iterations in range(CHORDS):
                 f = self._function(x)
-                wanted = self._wanted(x, f, key) if self.iterations else key
+                wanted = self._wanted(x, f, free) if self.iterations else key
                 same = wanted == key
                 if not same:
                     if wanted in seen:
                         return None
                     seen.add(key)
-                    key, before = wanted, np.inf
-                    chord.begin()
+                    key, before, free = wanted, np.inf, _mask(wanted)
                     self._onto_bounds(x, key)
-                    if not self._serves(chord, x, key):
-                        chord = self._new_chord(x, key)
+                    chord = self._chord_at(x, key)
                     f = self._function(x)
-                rest = f if b"\0" not in key else np.where(np.frombuffer(key, dtype=bool), f, 0.0)
+                rest = f if free is None else np.where(free, f, 0.0)
                 size = math.sqrt(rest @ rest)
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
-                if small and same and (wanted if self.iterations else self._wanted(x, f, key)) == key:
+                if small and same and (wanted if self.iterations else self._wanted(x, f, free)) == key:
                     self.residual = f
                     chord.solved(self.iterations)
                     return x
                 if not self._falls(size, before):
                     chord = self._new_chord(x, key)
+                elif before < np.inf and size > STAYS:
+                    chord.bend(self._bent(x))
                 before = size
-                x += chord.step(f, key, self._bent(x))
+                x += chord.step(rest, key)
         except np.linalg.LinAlgError:
             pass
         return None
 
+    def _chord_at(self, x: Array, key: bytes) -> Chord:
+        """Return steps that begin at a place with these free unknowns, by the last factor where that serves."""
+        chord = self._chord
+        if chord is None or chord.factor is not self._kept or chord.worn_out or not self._serves(chord, x, key):
+            return self._new_chord(x, key)
+        chord.begin(self._bent(x))
+        return chord
+
     def _new_chord(self, x: Array, key: bytes) -> Chord:
         """Return steps by the derivative at a place."""
-        self._chord = Chord(self._factor(self._jacobian(x), key), self._cost, self._bent(x))
+        bent = self._bent(x)
+        self._chord = Chord(self._factor(self._jacobian(x), key), self._cost, bent)
+        self._chord.begin(bent)
         return self._chord
 
     def _bent(self, x: Array) -> Array | None:
@@ -310,14 +318,18 @@ class Inequality:
             return True
         return size < SLOWEST * before and math.log(size / TOLERANCE) < self._cost * math.log(before / size)
 
-    def _wanted(self, x: Array, f: Array, key: bytes) -> bytes:
-        """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""
+    def _wanted(self, x: Array, f: Array, free: Mask | None) -> bytes:
+        """Return which unknowns are free next: those within their bounds, and those that their residual lets go.
+
+        Args:
+            x, f: Unknowns and residual (size,).
+            free: Which are free now (size,); None for all.
+        """
         wanted = x > self._lower
-        if b"\0" in key:
-            free = np.frombuffer(key, dtype=bool)
+        if free is not None:
             wanted = np.where(free, wanted, f < -TOLERANCE)
         if self._bounded_above:
-            free = np.frombuffer(key, dtype=bool)
+            free = True if free is None else free
             above = np.where(free, x < self._upper, f > TOLERANCE)
             wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
         return wanted.tobytes()
@@ -418,6 +430,11 @@ class Inequality:
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
         return x
+
+
+def _mask(key: bytes) -> Mask | None:
+    """Return which unknowns are free (size,), from bytes; None for all."""
+    return np.frombuffer(key, dtype=bool) if b"\0" in key else None
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

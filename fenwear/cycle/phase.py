@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from math import comb
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import CondensedContact, ContactSolver, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
+from fenwear.cycle.onwards import Onwards
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
@@ -29,9 +29,6 @@ COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
-# Shares of the last cycles in the next, by polynomials of rising degree.
-ONWARDS = np.array([[-comb(n, k) * (-1) ** k if k <= n else 0 for k in range(1, 7)] for n in range(1, 7)], dtype=float)
-MOST_ONWARDS = 1.0  # change of a pressure's logarithm
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 
 
@@ -76,7 +73,10 @@ class PhaseStep:
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
-        self._known: list[ContactState] = []  # of the last cycles, the last one first
+        self._onwards: Onwards | None = None  # where the iterations of contact depend on their start
+        if self._follows or system.layers.closure is not None:
+            modes = system.rigids[phase].rigid_normal.shape[1]
+            self._onwards = Onwards(len(self._mu), modes, system.layers.closure, system.layers.hardness)
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
     def solve(
@@ -110,7 +110,7 @@ class PhaseStep:
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn, passing=True)
-        start = self._extrapolated(before) or near
+        start = (before if self._onwards is None else self._onwards.start(before)) or near
         if self._constant:
             end = self._solve(temperature, gap, start, self._passing, worn)
             self._remember(before, end[0])
@@ -180,27 +180,9 @@ class PhaseStep:
         return contact
 
     def _remember(self, before: ContactState | None, contact: ContactState) -> None:
-        """Keep the contacts of the last cycles, where the next one is extrapolated from them."""
-        if self._follows or self.system.layers.closure is not None:
-            follows = before is not None and bool(self._known) and before is self._known[0]
-            self._known = [contact, *self._known[: len(ONWARDS) - 1]] if follows else [contact]
-
-    def _extrapolated(self, before: ContactState | None) -> ContactState | None:
-        """Return the contact that goes on as over the last cycles, where its iterations depend on their start.
-
-        The same nodes touch: which others will is for the inequality to find.
-        """
-        known = self._known
-        if before is None or len(known) < 2 or before is not known[0]:
-            return before
-        closure, hardness = self.system.layers.closure, self.system.layers.hardness
-        further = _onwards(np.array([one.pressure[0] for one in known]), None if closure is None else closure.onset)
-        own = before.pressure[0]
-        kept = (own > 0) & (further > 0)
-        if hardness < np.inf:
-            kept &= (own < hardness) & (further < hardness)
-        rigid = ONWARDS[len(known) - 1, : len(known)] @ np.array([one.rigid[0] for one in known])
-        return ContactState(np.where(kept, further, own)[None], before.gap, rigid[None], before.iterations)
+        """Keep the contact, where the next one is extrapolated from those of the last cycles."""
+        if self._onwards is not None:
+            self._onwards.keep(before, contact)
 
     def _update(
         self,
@@ -349,20 +331,3 @@ class PhaseStep:
         adds, lost = self.system.team.lead(left)
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)
-
-
-def _onwards(pressures: Array, onset: float | Array | None) -> Array:
-    """Return what pressures (cycles, n) lead to (n,), of rising age, as far back as their nodes touch.
-
-    Layers give way by the logarithm of pressures beyond their onset, which goes on more evenly.
-    """
-    values = pressures if onset is None else np.log(pressures + onset)
-    further: Array = ONWARDS[len(values) - 1, : len(values)] @ values
-    fresh = np.flatnonzero((pressures[-1] <= 0) & (pressures[0] > 0))
-    if len(fresh):
-        touch = np.logical_and.accumulate(pressures[:, fresh] > 0).sum(axis=0)
-        further[fresh] = (ONWARDS[np.maximum(touch, 1) - 1, : len(values)].T * values[:, fresh]).sum(axis=0)
-    if onset is None:
-        return further
-    change = np.minimum(np.maximum(further - values[0], -MOST_ONWARDS), MOST_ONWARDS)
-    return np.asarray((pressures[0] + onset) * np.exp(change) - onset)

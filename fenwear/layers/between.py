@@ -34,7 +34,7 @@ from fenwear.case.layers import (
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
-from fenwear.layers.closure import Closure, CoatedClosure, ExponentialClosure, PowerClosure, RoughClosure
+from fenwear.layers.closure import Closure, CoatedClosure, ExponentialClosure, Law, PowerClosure, RoughClosure
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
@@ -66,7 +66,7 @@ class Layers:
     """
 
     nodes: int
-    closure: Closure | None = None
+    closure: Law | None = None
     winkler: Array | None = None
     debris: Debris | None = None
     hardness: float = np.inf
@@ -357,7 +357,7 @@ def layers_of(
         CaseError: a value is not positive somewhere, or E* is missing.
     """
     n, winkler, debris = len(pair.weights), None, None
-    closure: Closure | None = None
+    closure: Law | None = None
     x = in_space(pair.punch.x)
     place = {name: np.asarray(x[:, axis]) for axis, name in enumerate("xyz")}
     match contact.layer:
@@ -410,7 +410,7 @@ def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[st
     ]
 
 
-def _rough(law: RoughLayer, modulus: float | Array | None, values: list[Array]) -> Closure:
+def _rough(law: RoughLayer, modulus: float | Array | None, values: list[Array]) -> Law:
     young = modulus if law.modulus is None else law.modulus
     if young is None:
         message = "missing, but required where bodies are made without a case"

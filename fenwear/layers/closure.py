@@ -32,15 +32,25 @@ STEPS = 4  # of Newton's method that find the distances at even places
 class Closure(Protocol):
     """A law of closure at n nodes, whose parameters are numbers or (n,)."""
 
-    @property
-    def onset(self) -> float | Array:
-        """Pressure up to which it is about linear, beyond which about logarithmic (n,), MPa."""
-
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm, at pressures (...), MPa; zero without pressure."""
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
+
+
+class Law(Closure, Protocol):
+    """One that can be turned round.
+
+    Surfaces are near each other by what is closed, or less than not at all by what is open, in a measure in which they
+    come nearer evenly, whether they touch or not.
+    """
+
+    def nearness(self, pressure: Array, gap: Array) -> Array:
+        """Return how near surfaces are (n,) that press on each other or are apart by a gap, mm; of no unit."""
+
+    def pressure_of(self, nearness: Array) -> Array:
+        """Return the pressure by it (n,), MPa."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +60,6 @@ class PowerClosure:
     reference: float | Array
     pressure: float | Array
     exponent: float
-
-    @property
-    def onset(self) -> float | Array:
-        """That from which the slope is that of the law, MPa."""
-        return LEAST * self.pressure
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -67,6 +72,14 @@ class PowerClosure:
         ratio = np.maximum(pressure, floor) / self.pressure
         return np.asarray(self.reference * self.exponent / self.pressure * ratio ** (self.exponent - 1))
 
+    def nearness(self, pressure: Array, gap: Array) -> Array:
+        """Return the closure less the gap, over the reference (n,)."""
+        return np.asarray((pressure / self.pressure) ** self.exponent - gap / self.reference)
+
+    def pressure_of(self, nearness: Array) -> Array:
+        """Return the pressure by it (n,), MPa."""
+        return np.asarray(self.pressure * np.maximum(nearness, 0.0) ** (1 / self.exponent))
+
 
 @dataclass(frozen=True)
 class ExponentialClosure:
@@ -75,11 +88,6 @@ class ExponentialClosure:
     length: float | Array
     pressure: float | Array
 
-    @property
-    def onset(self) -> float | Array:
-        """The law's own, MPa."""
-        return self.pressure
-
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
         return np.asarray(self.length * np.log1p(np.maximum(pressure, 0.0) / self.pressure))
@@ -87,6 +95,14 @@ class ExponentialClosure:
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
         return np.asarray(self.length / (self.pressure + np.maximum(pressure, 0.0)))
+
+    def nearness(self, pressure: Array, gap: Array) -> Array:
+        """Return the closure less the gap, over the length (n,)."""
+        return np.asarray(np.log1p(pressure / self.pressure) - gap / self.length)
+
+    def pressure_of(self, nearness: Array) -> Array:
+        """Return the pressure by it (n,), MPa."""
+        return np.asarray(self.pressure * np.expm1(np.maximum(nearness, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -101,25 +117,36 @@ class RoughClosure:
     height: float | Array
     stiffness: float | Array
 
-    @property
-    def onset(self) -> float | Array:
-        """That at `FIRST` heights, MPa."""
-        return self.stiffness * _inverse().first
-
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        inverse = _inverse()
-        return np.asarray(self.height * (FIRST - inverse.distance(np.log(self._integral(pressure, inverse)))))
+        found = _asperities().distance.value(np.log(self._integral(pressure)))
+        np.subtract(FIRST, found, out=found)
+        found *= self.height
+        return found
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
-        inverse = _inverse()
-        integral = self._integral(pressure, inverse)
-        return np.asarray(-self.height * inverse.slope(np.log(integral)) / (integral * self.stiffness))
+        integral = self._integral(pressure)
+        return np.asarray(-self.height * _asperities().distance.slope(np.log(integral)) / (integral * self.stiffness))
 
-    def _integral(self, pressure: Array, inverse: _Inverse) -> Array:
+    def nearness(self, pressure: Array, gap: Array) -> Array:
+        """Return the closure less the gap, over the standard deviation of the heights (n,)."""
+        return np.asarray((self.closure(pressure) - gap) / self.height)
+
+    def pressure_of(self, nearness: Array) -> Array:
+        """Return the pressure by it (n,), MPa."""
+        known = _asperities()
+        found = np.exp(known.logarithm.value(np.maximum(nearness, 0.0) - FIRST))
+        found -= known.first
+        found *= self.stiffness
+        return np.maximum(found, 0.0)
+
+    def _integral(self, pressure: Array) -> Array:
         """Return F (...)."""
-        return np.asarray(np.maximum(pressure, 0.0) / self.stiffness + inverse.first)
+        found = np.maximum(pressure, 0.0)
+        found /= self.stiffness
+        found += _asperities().first
+        return found
 
 
 @dataclass(frozen=True)
@@ -133,11 +160,6 @@ class CoatedClosure:
 
     law: Closure | None
     coatings: tuple[tuple[Array, float], ...]
-
-    @property
-    def onset(self) -> float | Array:
-        """Of the law, or the stiffest modulus, MPa."""
-        return max(modulus for _, modulus in self.coatings) if self.law is None else self.law.onset
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -164,46 +186,63 @@ def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
     return np.asarray(gamma(power + 1) / np.sqrt(2 * np.pi) * np.exp(-(h**2) / 4) * pbdv(-power - 1, h)[0])
 
 
-class _Inverse:
-    """The distance h as a function of ln F(h): Hermite's cubics between values and slopes at even places, of no search.
-
-    A third of a half-cycle would go into places that are searched for.
-    """
+class _Asperities:
+    """F at even distances h, and h at even places of ln F."""
 
     def __init__(self) -> None:
-        from scipy.interpolate import CubicHermiteSpline
-
         h = np.linspace(FIRST, LAST, POINTS)
-        known = np.log(asperity_integral(h))
+        values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
+        known = np.log(values)
+        self.first = float(values[0])
+        self.logarithm = _Cubics(-FIRST, -LAST, known, -slopes / values)  # by -h, which rises
         places = np.linspace(known[0], known[-1], POINTS)
         h = np.interp(places, known, h)
         for _ in range(STEPS):
             values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
             h = h - (np.log(values) - places) * values / slopes
         h[0] = FIRST
-        values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
-        self.first = float(values[0])
-        self._begin, self._width = places[0], places[1] - places[0]
-        powers = self._width ** np.arange(3.0, -1.0, -1.0)[:, None]
-        self._cubics = CubicHermiteSpline(places, h, values / slopes).c * powers
+        self.distance = _Cubics(places[0], places[-1], h, asperity_integral(h) / (-1.5 * asperity_integral(h, 0.5)))
 
-    def distance(self, logarithm: Array) -> Array:
-        """Return h (...)."""
-        (a, b, c, d), t = self._cubic(logarithm)
-        return np.asarray(((a * t + b) * t + c) * t + d)
 
-    def slope(self, logarithm: Array) -> Array:
+class _Cubics:
+    """A function by Hermite's cubics between values and slopes at even places, of no search.
+
+    A third of a half-cycle would go into places that are searched for.
+    """
+
+    def __init__(self, begin: float, end: float, values: Array, slopes: Array) -> None:
+        from scipy.interpolate import CubicHermiteSpline
+
+        self._begin, self._last = begin, len(values) - 2.0
+        self._width = (end - begin) / (len(values) - 1)
+        places = np.linspace(begin, end, len(values))
+        self._cubics = CubicHermiteSpline(places, values, slopes).c * self._width ** np.arange(3.0, -1.0, -1.0)[:, None]
+
+    def value(self, places: Array) -> Array:
+        """Return it (...) at places (...)."""
+        (found, b, c, d), t = self._at(places)
+        found *= t
+        found += b
+        found *= t
+        found += c
+        found *= t
+        found += d
+        return found
+
+    def slope(self, places: Array) -> Array:
         """Return its derivative (...)."""
-        (a, b, c, _), t = self._cubic(logarithm)
+        (a, b, c, _), t = self._at(places)
         return np.asarray(((3 * a * t + 2 * b) * t + c) / self._width)
 
-    def _cubic(self, logarithm: Array) -> tuple[Array, Array]:
+    def _at(self, places: Array) -> tuple[Array, Array]:
         """Return the coefficients of the cubics at places (4, ...), and where these are in them (...)."""
-        t = (logarithm - self._begin) / self._width
-        number = np.fmin(np.fmax(t, 0.0), POINTS - 2.0).astype(np.intp)  # the first for what is no number
-        return self._cubics[:, number], t - number
+        t = places - self._begin
+        t /= self._width
+        number = np.fmin(np.fmax(t, 0.0), self._last).astype(np.intp)  # the first for what is no number
+        t -= number
+        return self._cubics.take(number, axis=1), t
 
 
 @lru_cache(maxsize=1)
-def _inverse() -> _Inverse:
-    return _Inverse()
+def _asperities() -> _Asperities:
+    return _Asperities()

@@ -111,7 +111,8 @@ def _constant(value: float, text: str) -> Function:
         number = np.float64(np.inf)
     if not np.isfinite(number):
         raise ValueError(f"expected finite numbers in {text!r}")
-    return lambda _: number
+    constant = np.array(number)  # numpy takes twice as long for numbers that are no arrays
+    return lambda _: constant
 
 
 def evaluate(function: Function, state: State, shape: tuple[int, ...]) -> Array:

@@ -70,6 +70,10 @@ class Chord:
         self._by: Array = np.zeros((0, size))  # updates: what they add to a step is onto^T (by step)
         self._onto: Array = np.zeros((0, size))
 
+    def of(self, factor: Factor) -> Chord:
+        """Return steps by another factor of the same derivative."""
+        return Chord(factor, self.cost, self.bent, self._spent)
+
     def solved(self, steps: int) -> None:
         """Take note of a solve of so many steps."""
         self._spent += max(steps - NEWTONS, 0)

@@ -12,6 +12,7 @@ open, such as the wear of the step they belong to, and to those of each phase wh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -51,6 +52,7 @@ WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: wha
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 NUDGE = 1e-6  # of the largest pressure, for differences
+NONE = np.zeros(())
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
 PIVOTED = 1000  # unknowns up to which pivots may be tried: their cost is the number's third power
@@ -171,6 +173,8 @@ class CondensedContact:
         self.shape = (m, n)
         self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
+        # Arrays of one number: numpy takes twice as long for numbers of Python.
+        self._scales = np.array(self._pressure_scale), np.array(1 / self._gap_scale)
         lengths = np.abs(rigid.rigid_normal).max(axis=0, initial=0.0)
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
@@ -305,14 +309,16 @@ class CondensedContact:
 
     def _residual(self, x: Array) -> Array:
         f = self._linear.multiply(x)
-        f += self._offset.ravel()
+        f += self._offset.reshape(-1)
         if self._mu is not None:
             own = x[: self.shape[1]]
-            f += self._by_mu @ (self._mu(np.maximum(own, 0.0) * self._pressure_scale) * own)
+            pressure = np.maximum(own, NONE)
+            pressure *= self._scales[0]
+            f += self._by_mu @ (self._mu(pressure) * own)
         if self._wearing is not None:
             m, n = self.shape
-            pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
-            f.reshape(m, -1)[:, :n] += self._wearing.opening(pressure) / self._gap_scale
+            opened = self._wearing.opening(x.reshape(m, -1)[:, :n] * self._scales[0])
+            f.reshape(m, -1)[:, :n] += opened * self._scales[1]
         return f
 
     def _rounding(self) -> float:
@@ -462,7 +468,7 @@ class CondensedContact:
         begun = np.zeros((m, self._offset.shape[1] - n)) if start is None else start.rigid
         rigid = np.matmul(begun[:, None, :], self._rigid_normals)[:, 0]
         self._offset[:, :n] = (gap + self._loads + rigid) / self._gap_scale
-        if not np.isfinite(self._offset.sum()):  # nor is a sum with one that is not
+        if not math.isfinite(self._offset.sum()):  # nor is a sum with one that is not
             raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None

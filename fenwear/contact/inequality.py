@@ -10,9 +10,8 @@ kept. Where the result fulfils all conditions it is the solution; where it does 
 many the sets themselves are gone through first: that of the next step holds what has come out below its bound, and lets
 go what is held with a residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). It
 takes fewer of them than steps that are cut off at the bounds, but need not end. Where the derivative changes with the
-solution they are gone through in the same way, a step of each: by the factor of an earlier solve, which Broyden's
-updates correct (C. T. Kelley, Iterative Methods for Linear and Nonlinear Equations, SIAM 1995, 7.3) until they take
-so many steps that a new one pays. An operator whose solutions cost by their digits goes through sets itself, to some
+solution they are gone through in the same way, a step of each, by the factor of an earlier solve: see
+`fenwear.contact.chords`. An operator whose solutions cost by their digits goes through sets itself, to some
 of them, and what it finds is taken on as it is.
 """
 
@@ -28,7 +27,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.chords import Chord, Diagonal, Factor
-from fenwear.contact.operators import Approximate, Indices, Operator, Solve
+from fenwear.contact.operators import LARGE, Approximate, Indices, Operator, Shifted, Solve
 from fenwear.contact.pivoting import complementary
 from fenwear.errors import ConvergenceError
 
@@ -288,8 +287,13 @@ class Inequality:
     def _chord_at(self, x: Array, key: bytes) -> Chord:
         """Return steps that begin at a place with these free unknowns, by the last factor where that serves."""
         chord = self._chord
-        if chord is None or chord.factor is not self._kept or chord.worn_out or not self._serves(chord, x, key):
+        if chord is None or chord.factor is not self._kept or chord.worn_out:
             return self._new_chord(x, key)
+        if not self._serves(chord, x, key):
+            if len(key) <= LARGE or isinstance(chord.factor.operator, Shifted):
+                return self._new_chord(x, key)
+            # Of a large set that differs by a few the factor of the same derivative costs little.
+            chord = self._chord = chord.of(self._factor(chord.factor.operator, key))
         chord.begin(self._bent(x))
         return chord
 
@@ -326,12 +330,14 @@ class Inequality:
             free: Which are free now (size,); None for all.
         """
         wanted = x > self._lower
+        if free is None and not self._bounded_above:
+            return wanted.tobytes()
         if free is not None:
             wanted = np.where(free, wanted, f < -TOLERANCE)
         if self._bounded_above:
-            free = True if free is None else free
-            above = np.where(free, x < self._upper, f > TOLERANCE)
-            wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
+            within = np.ones(len(x), dtype=bool) if free is None else free
+            above = np.where(within, x < self._upper, f > TOLERANCE)
+            wanted = np.where(within, wanted & above, np.where(x >= self._upper, above, wanted))
         return wanted.tobytes()
 
     def _onto_bounds(self, x: Array, key: bytes) -> None:

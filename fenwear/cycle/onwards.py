@@ -17,7 +17,7 @@ from fenwear.layers.closure import Law
 
 # Shares of the last cycles in the next, by polynomials of rising degree.
 ONWARDS = np.array([[-comb(n, k) * (-1) ** k if k <= n else 0 for k in range(1, 7)] for n in range(1, 7)], dtype=float)
-MOST = 1.0  # change of nearness
+MOST = np.array(1.0)  # change of nearness
 
 
 class Onwards:
@@ -61,7 +61,7 @@ class Onwards:
         if self._law is None:
             if self._alike < count:
                 self._as_long_as_they_touch(further)
-            further = np.where(own > 0, np.where(further > 0, further, own), 0.0)
+            further = np.where((own > 0) & (further > 0), further, own)
         else:
             last = self._values[0]
             further = self._law.pressure_of(np.minimum(np.maximum(further, last - MOST), last + MOST))

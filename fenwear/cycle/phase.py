@@ -19,9 +19,10 @@ from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution, LayerStep
+from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
 from fenwear.sliding.cross_shear import CycleShear
-from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.friction import ContactConditions, FollowingFriction
 from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -66,10 +67,16 @@ class PhaseStep:
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
+        # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
+        coated = any(own is not None for own in system.coatings)
+        more = coated or exchange is not None or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+        self._staying = None if more else conditions
         self._mu = system.friction.values(conditions)
         self._friction_ratio = system.phase_friction(phase, self._mu)
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
+        self._debris, self._slid = self._passing.debris, system.path[[phase]]
+        self._edge: Array | None = None  # distances from it, for which debris is lost as it is there
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
@@ -127,14 +134,17 @@ class PhaseStep:
             return self._end(contact, after, heat, before, passing, worn)
 
         if self._follows:
-            conditions = self.system.conditions(self.phase, near_pressure, None, worn, half_cycles, cycle, touching)
+            mu = self._friction_that_stays
+            if mu is None:
+                conditions = self._conditions(near_pressure, None, worn, half_cycles, cycle, touching)
+                mu = FollowingFriction(self.system.friction, conditions)
             try:
-                contact = self._following(conditions, gap, start, worn)
+                contact = self._following(mu, gap, start, worn)
             except ConvergenceError:  # in turn they may come together yet
                 pass
             else:
                 if self.system.edges is None:
-                    passing = self._taken(conditions.pressed(contact.pressure[0]), worn, ended=True)
+                    passing = self._taken(mu.at(contact.pressure[0]), worn, ended=True)
                 else:
                     passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
                 self._remember(before, contact)
@@ -163,15 +173,14 @@ class PhaseStep:
         return self._end(contact, after, heat, before, passing, worn)
 
     def _following(
-        self, conditions: ContactConditions, gap: Array, start: ContactState | None, worn: WornDepths
+        self, mu: FollowingFriction, gap: Array, start: ContactState | None, worn: WornDepths
     ) -> ContactState:
-        """Return the contact whose friction follows its pressure, at conditions of all else.
+        """Return the contact whose friction follows its pressure.
 
         Raises:
             ConvergenceError: Newton's method does not find both together.
         """
         assert isinstance(self._contact, CondensedContact)
-        mu = self.system.friction.by_pressure(conditions)
         self._contact.follow(mu, self._bare, self._along)
         if self.system.layers.hardness == np.inf:
             return self._contact.solve(gap, start, self._passing.step(worn, implicit=self.implicit))
@@ -203,8 +212,29 @@ class PhaseStep:
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
-        conditions = self.system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
+        conditions = self._conditions(pressure, surfaces, worn, half_cycles, cycle, touching)
         return self._taken(conditions, worn, ended=ended)
+
+    def _conditions(
+        self,
+        pressure: Array | None,
+        surfaces: tuple[Array, Array] | None,
+        worn: WornDepths,
+        half_cycles: float,
+        cycle: CycleShear | None,
+        touching: Mask | None,
+    ) -> ContactConditions:
+        """Return what coefficients depend on, as `Tribosystem.conditions`."""
+        if self._staying is None or pressure is None:
+            return self.system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
+        return self._staying.pressed(pressure, self.system.layers.facing(self.system.pairs[self.phase], worn))
+
+    @cached_property
+    def _friction_that_stays(self) -> FollowingFriction | None:
+        """Friction that follows the pressure and nothing else that changes; None where something else does."""
+        if self._staying is None or self.system.layers.debris is not None:
+            return None
+        return FollowingFriction(self.system.friction, self._staying)
 
     def _taken(self, conditions: ContactConditions, worn: WornDepths, *, ended: bool) -> LayerEvolution:
         """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""
@@ -224,10 +254,16 @@ class PhaseStep:
                     self._thermal.slide(heating_friction(system, mu, self.phase))
         wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
         ends = end if ended else None
-        if not system.layers.varies:
-            return LayerEvolution(system.layers, wear, self._passing.debris, evolution, ends)
-        passing = system.passing(wear, [self.phase], evolution, [conditions])
-        return replace(passing, ended=ends) if ended else passing
+        return LayerEvolution(system.layers, wear, self._lost(conditions), evolution, ends)
+
+    def _lost(self, conditions: ContactConditions) -> DebrisCycle | None:
+        """Return what the phase does to debris at conditions: as before where no more than the same edges matter."""
+        layers, edge = self.system.layers, conditions.edge
+        if layers.debris is None or not layers.varies or (layers.debris.life is not None and edge is self._edge):
+            return self._debris
+        onto = [self.system.pairs[self.phase].wear_projection] if layers.strip_carries else None
+        self._debris, self._edge = layers.debris.over(self._slid, [conditions], onto), edge
+        return self._debris
 
     @cached_property
     def _uncapped(self) -> ContactSolver:

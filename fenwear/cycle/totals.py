@@ -39,9 +39,6 @@ SUMS = (
     "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
     "mass_strip",
 )  # fmt: skip
-DISTANCE, LOAD_DISTANCE, DRAG_DISTANCE = (SUMS.index(name) for name in ("distance", "load_distance", "drag_distance"))
-LOAD_PATH, WORK = (SUMS.index(name) for name in ("load_path", "work"))
-VOLUMES = tuple(SUMS.index(f"volume_{body}") for body in ("punch", "strip"))  # each with its mass behind it
 AROUND = 0.1  # mean normal of a part of the contact below which it looks all ways
 MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
@@ -110,56 +107,46 @@ class PhaseMeter:
             for density in opposite_densities(system, phase)
         ]
         normal, none = pair.normal, np.zeros(len(slid))
-        self._bare = system.friction_in_space(phase, none)
-        self._along = system.friction_in_space(phase, none + 1) - self._bare  # of a unit of mu
-        bare, along = (in_model(one, normal.shape[1]) for one in (self._bare, self._along))
-        self._carried = self._areas * np.einsum("id,id->i", normal + bare, self._approach)
-        self._dragged = self._areas * np.einsum("id,id->i", along, self._approach)
-        areas = self._areas[:, None]
-        self._drag_bare, self._drag_along = areas * self._bare, areas * self._along
-        self._rows = np.zeros((len(SUMS), len(none)))
-        self._rows[LOAD_PATH] = self._areas * self._path
-        self._take(mu)
-        self._wear(wear)
+        bare = system.friction_in_space(phase, none)
+        along = system.friction_in_space(phase, none + 1) - bare  # of a unit of mu
+        pressing, dragging = normal + in_model(bare, normal.shape[1]), in_model(along, normal.shape[1])
+        carried, dragged = (np.einsum("id,id->i", one, self._approach) for one in (pressing, dragging))
+        path, areas = self._areas * self._path, self._areas
+        # What is linear in the pressure, and in mu times it: each with what friction drags along the three axes.
+        self._by_pressure = np.array([self._weights, self._moved, path, areas * carried, *(areas * bare.T)])
+        self._by_friction = np.array([path, areas * dragged, *(areas * along.T)])
+        self._mu, self._wear = mu, wear
+        # At coefficients that stay all is linear, but for wear by a law that is not.
+        bodies = list(zip((wear.punch, wear.strip), self._weigh, strict=True))
+        linear = all(own is None or own.linear for own, _ in bodies)
+        worn = [weigh * (0.0 if own is None else own.rate[0]) for own, weigh in bodies]
+        self._energy = mu * self._path
+        self._rows = np.concatenate([self._by_pressure, self._by_friction * mu, *worn]) if linear else None
 
     def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
         """Return the same at other coefficients."""
         found = object.__new__(PhaseMeter)
-        found.__dict__.update(self.__dict__)
-        found._rows = self._rows.copy()
-        if mu is not self._mu:
-            found._take(mu)
-        found._wear(wear)
+        found.__dict__.update(self.__dict__, _mu=mu, _wear=wear, _rows=None)
         return found
-
-    def _take(self, mu: Array) -> None:
-        self._mu, self._energy = mu, mu * self._path
-        np.multiply(self._areas, self._energy, out=self._rows[WORK])
-        self._load = self._carried + mu * self._dragged
-        self._drag = self._drag_bare + mu[:, None] * self._drag_along
-
-    def _wear(self, wear: PhasesWear) -> None:
-        self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
-        for first, own, weigh in zip(VOLUMES, (wear.punch, wear.strip), self._weigh, strict=True):
-            if own is None:
-                self._rows[first + 1] = 0.0 * weigh[1]
-            elif own.linear:
-                np.multiply(weigh, own.rate[0], out=self._rows[first : first + 2])
-            else:
-                self._curved.append((slice(first, first + 2), weigh, own))
 
     def __call__(self, pressure: Array) -> Totals:
         """Return what the phase adds at a pressure (n,)."""
-        sums = self._rows @ pressure
-        force = float(self._weights @ pressure)
-        distance = float(self._moved @ pressure) / force if force else self._mean_distance
-        drag = pressure @ self._drag
-        sums[DISTANCE] = distance
-        sums[LOAD_DISTANCE] = float(self._load @ pressure) * distance
-        sums[DRAG_DISTANCE] = math.sqrt(drag @ drag) * distance
-        for rows, weigh, body in self._curved:
-            sums[rows] = weigh @ body.depth(pressure[None])[0]
-        return Totals(sums, self._energy * pressure, self._share * pressure)
+        if self._rows is None:
+            rubbed = self._mu * pressure
+            of_pressure: list[float] = (self._by_pressure @ pressure).tolist()
+            of_friction: list[float] = (self._by_friction @ rubbed).tolist()
+            parts = of_pressure + of_friction
+            for own, weigh in zip((self._wear.punch, self._wear.strip), self._weigh, strict=True):
+                # A mass that is not known is none of nothing worn, either.
+                parts += (0.0, 0.0 * weigh[1, 0]) if own is None else (weigh @ own.depth(pressure[None])[0]).tolist()
+            energy = self._path * rubbed
+        else:
+            parts, energy = (self._rows @ pressure).tolist(), self._energy * pressure
+        force, moved, path, carried, x, y, z, work, dragged, by_x, by_y, by_z, *worn = parts
+        distance = moved / force if force else self._mean_distance
+        drag = math.hypot(x + by_x, y + by_y, z + by_z)
+        sums = np.array([distance, path, (carried + dragged) * distance, drag * distance, work, *worn])
+        return Totals(sums, energy, self._share * pressure)
 
 
 def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Totals:

@@ -15,7 +15,7 @@ sigma apart, beyond which less than 1e-9 of the asperities touch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -26,6 +26,7 @@ from fenwear.arrays import Array
 
 LEAST = 1e-12  # of the largest pressure: where a power below 1 has a slope that is not infinite
 FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F is inverted; how often it is tabulated
+NONE = np.zeros(())
 STEPS = 4  # of Newton's method that find the distances at even places
 
 
@@ -63,7 +64,7 @@ class PowerClosure:
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        return np.asarray(self.reference * (np.maximum(pressure, 0.0) / self.pressure) ** self.exponent)
+        return np.asarray(self.reference * (np.maximum(pressure, NONE) / self.pressure) ** self.exponent)
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa; finite without pressure, too."""
@@ -78,7 +79,7 @@ class PowerClosure:
 
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
-        return np.asarray(self.pressure * np.maximum(nearness, 0.0) ** (1 / self.exponent))
+        return np.asarray(self.pressure * np.maximum(nearness, NONE) ** (1 / self.exponent))
 
 
 @dataclass(frozen=True)
@@ -90,11 +91,11 @@ class ExponentialClosure:
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        return np.asarray(self.length * np.log1p(np.maximum(pressure, 0.0) / self.pressure))
+        return np.asarray(self.length * np.log1p(np.maximum(pressure, NONE) / self.pressure))
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
-        return np.asarray(self.length / (self.pressure + np.maximum(pressure, 0.0)))
+        return np.asarray(self.length / (self.pressure + np.maximum(pressure, NONE)))
 
     def nearness(self, pressure: Array, gap: Array) -> Array:
         """Return the closure less the gap, over the length (n,)."""
@@ -102,7 +103,7 @@ class ExponentialClosure:
 
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
-        return np.asarray(self.pressure * np.expm1(np.maximum(nearness, 0.0)))
+        return np.asarray(self.pressure * np.expm1(np.maximum(nearness, NONE)))
 
 
 @dataclass(frozen=True)
@@ -116,34 +117,38 @@ class RoughClosure:
 
     height: float | Array
     stiffness: float | Array
+    _asked: list[Array] = field(default_factory=list, init=False, repr=False, compare=False)  # the last, and its answer
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        found = _asperities().distance.value(np.log(self._integral(pressure)))
-        np.subtract(FIRST, found, out=found)
+        found = _asperities().closure.value(np.log(self._integral(pressure)))
         found *= self.height
+        self._asked[:] = pressure, found.copy()
         return found
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
         integral = self._integral(pressure)
-        return np.asarray(-self.height * _asperities().distance.slope(np.log(integral)) / (integral * self.stiffness))
+        return np.asarray(self.height * _asperities().closure.slope(np.log(integral)) / (integral * self.stiffness))
 
     def nearness(self, pressure: Array, gap: Array) -> Array:
         """Return the closure less the gap, over the standard deviation of the heights (n,)."""
-        return np.asarray((self.closure(pressure) - gap) / self.height)
+        if not self._asked or self._asked[0].tobytes() != pressure.tobytes():  # else a solution was just found with it
+            self.closure(pressure)
+        closed = self._asked[1]
+        return np.asarray((closed.reshape(gap.shape) - gap) / self.height)
 
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
         known = _asperities()
-        found = np.exp(known.logarithm.value(np.maximum(nearness, 0.0) - FIRST))
+        found = np.exp(known.logarithm.value(np.maximum(nearness, NONE)))
         found -= known.first
         found *= self.stiffness
-        return np.maximum(found, 0.0)
+        return np.maximum(found, NONE)
 
     def _integral(self, pressure: Array) -> Array:
         """Return F (...)."""
-        found = np.maximum(pressure, 0.0)
+        found = np.maximum(pressure, NONE)
         found /= self.stiffness
         found += _asperities().first
         return found
@@ -175,7 +180,7 @@ class CoatedClosure:
 
 def compressed(pressure: Array, modulus: float) -> Array:
     """Return the share of its thickness by which a coating is compressed (...)."""
-    return np.asarray(-np.expm1(-np.maximum(pressure, 0.0) / modulus))
+    return np.asarray(-np.expm1(-np.maximum(pressure, NONE) / modulus))
 
 
 def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
@@ -187,21 +192,22 @@ def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
 
 
 class _Asperities:
-    """F at even distances h, and h at even places of ln F."""
+    """ln F at even closures FIRST - h, and these at even places of ln F."""
 
     def __init__(self) -> None:
         h = np.linspace(FIRST, LAST, POINTS)
         values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
         known = np.log(values)
-        self.first = float(values[0])
-        self.logarithm = _Cubics(-FIRST, -LAST, known, -slopes / values)  # by -h, which rises
+        self.first = np.array(values[0])
+        self.logarithm = _Cubics(0.0, FIRST - LAST, known, -slopes / values)
         places = np.linspace(known[0], known[-1], POINTS)
         h = np.interp(places, known, h)
         for _ in range(STEPS):
             values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
             h = h - (np.log(values) - places) * values / slopes
         h[0] = FIRST
-        self.distance = _Cubics(places[0], places[-1], h, asperity_integral(h) / (-1.5 * asperity_integral(h, 0.5)))
+        slopes = asperity_integral(h) / (1.5 * asperity_integral(h, 0.5))
+        self.closure = _Cubics(places[0], places[-1], FIRST - h, slopes)
 
 
 class _Cubics:
@@ -213,34 +219,34 @@ class _Cubics:
     def __init__(self, begin: float, end: float, values: Array, slopes: Array) -> None:
         from scipy.interpolate import CubicHermiteSpline
 
-        self._begin, self._last = begin, len(values) - 2.0
-        self._width = (end - begin) / (len(values) - 1)
-        places = np.linspace(begin, end, len(values))
-        self._cubics = CubicHermiteSpline(places, values, slopes).c * self._width ** np.arange(3.0, -1.0, -1.0)[:, None]
+        places, width = np.linspace(begin, end, len(values)), (end - begin) / (len(values) - 1)
+        self._cubics = list(CubicHermiteSpline(places, values, slopes).c * width ** np.arange(3.0, -1.0, -1.0)[:, None])
+        # Arrays of one number: numpy takes twice as long for numbers of Python.
+        self._begin, self._density, self._last = map(np.array, (begin, 1 / width, len(values) - 2.0))
 
     def value(self, places: Array) -> Array:
         """Return it (...) at places (...)."""
-        (found, b, c, d), t = self._at(places)
-        found *= t
-        found += b
-        found *= t
-        found += c
-        found *= t
-        found += d
+        number, t = self._at(places)
+        a, b, c, d = self._cubics
+        found = a[number]
+        for other in (b, c, d):
+            found *= t
+            found += other[number]
         return found
 
     def slope(self, places: Array) -> Array:
         """Return its derivative (...)."""
-        (a, b, c, _), t = self._at(places)
-        return np.asarray(((3 * a * t + 2 * b) * t + c) / self._width)
+        number, t = self._at(places)
+        a, b, c = (one[number] for one in self._cubics[:3])
+        return np.asarray(((3 * a * t + 2 * b) * t + c) * self._density)
 
-    def _at(self, places: Array) -> tuple[Array, Array]:
-        """Return the coefficients of the cubics at places (4, ...), and where these are in them (...)."""
+    def _at(self, places: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return the numbers of the cubics at places (...), and where these are in them (...)."""
         t = places - self._begin
-        t /= self._width
-        number = np.fmin(np.fmax(t, 0.0), self._last).astype(np.intp)  # the first for what is no number
-        t -= number
-        return self._cubics.take(number, axis=1), t
+        t *= self._density
+        whole = np.floor(np.fmin(np.fmax(t, NONE), self._last))  # the first for what is no number
+        t -= whole
+        return whole.astype(np.intp), t
 
 
 @lru_cache(maxsize=1)

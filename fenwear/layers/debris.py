@@ -67,7 +67,7 @@ class Debris:
         else:
             assert law is not None
             assert isinstance(law.life, Dependence)
-            found = 1 / law.life.values(conditions.of("punch"), shape, law.life.scale("mm"), LIFE, LEAST)
+            found = np.reciprocal(law.life.values(conditions.of("punch"), shape, law.life.scale("mm"), LIFE, LEAST))
         if (
             law is not None
             and law.edge_life is not None
@@ -102,11 +102,13 @@ class Debris:
         if onto is not None:
             x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept
-        kept = -np.expm1(-x) / x
+        gone = -np.expm1(-x)
+        kept = gone / x
         if len(x) == 1:
-            return DebrisCycle(self.share, kept, x[0])
+            return DebrisCycle(self.share, kept, x[0], gone[0])
         after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
-        return DebrisCycle(self.share, kept * np.exp(-after), x.sum(axis=0))
+        loss = x.sum(axis=0)
+        return DebrisCycle(self.share, kept * np.exp(-after), loss, -np.expm1(-loss))
 
 
 @dataclass(frozen=True)
@@ -117,11 +119,13 @@ class DebrisCycle:
         share: Of what is worn, that stays.
         kept: Of what stays in each phase, what is left at the end of the cycle (m, n).
         loss: X, the sum of x over the phases (n,).
+        lost: 1 - E, of what was there at the start of the cycle (n,).
     """
 
     share: float
     kept: Array
     loss: Array
+    lost: Array
 
     def change(self, thickness: Array, worn: Array) -> tuple[Array, Array]:
         """Return what one cycle adds to the thickness and what it ejects (n,) each, mm.
@@ -130,7 +134,7 @@ class DebrisCycle:
             thickness: At its start (n,), mm.
             worn: Depth worn off both bodies in each phase (m, n), mm.
         """
-        lost = self._lost * thickness
+        lost = self.lost * thickness
         if len(worn) == 1:
             return self._stays[0] * worn[0] - lost, self._leaves[0] * worn[0] + lost
         return (self._stays * worn).sum(axis=0) - lost, (self._leaves * worn).sum(axis=0) + lost
@@ -151,11 +155,6 @@ class DebrisCycle:
         return np.asarray(self.share * worn[0] * (left - self.kept[0]) / self.loss - left * thickness)
 
     @cached_property
-    def _lost(self) -> Array:
-        """1 - E (n,)."""
-        return -np.expm1(-self.loss)
-
-    @cached_property
     def _stays(self) -> Array:
         """What is left at the end of a unit worn in each phase (m, n)."""
         return self.share * self.kept
@@ -168,5 +167,5 @@ class DebrisCycle:
     @cached_property
     def fed(self) -> Array:
         """X G / (1 - E) of a unit worn in each phase (m, n)."""
-        lost = self._lost
+        lost = self.lost
         return self._stays * np.divide(self.loss, lost, out=np.ones_like(lost), where=lost > 0)

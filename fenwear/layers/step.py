@@ -64,12 +64,12 @@ class LayerEvolution:
         worn = self.wear.begun(before, cycles).worn(pressure)
         if not len(before.between) and not len(before.carried):
             return worn
-        changes, carried = np.zeros_like(before.between), np.zeros_like(before.carried)
+        changes, carried = np.zeros(before.between.shape), np.zeros(before.carried.shape)
         if self.layers.strip_carries:
             carried[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
         elif self.debris is not None:
-            rows = [self.layers.row(name) for name in DEBRIS]
-            changes[rows] = self.debris_changes(pressure, before, cycles)
+            first = self.layers.row(DEBRIS[0])
+            changes[first], changes[first + 1] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
         found = WornDepths(worn.punch, worn.strip, changes, carried=carried)

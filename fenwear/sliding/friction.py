@@ -8,7 +8,7 @@ the contact sees the part in the plane only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Self
@@ -70,32 +70,34 @@ class ContactConditions:
         """Shape of nodal values."""
         return self.pressure.shape
 
-    def pressed(self, pressure: Array) -> Self:
-        """Return the same under another pressure (n,), MPa, and all else as it is."""
+    def pressed(self, pressure: Array, debris: Array | None = None) -> Self:
+        """Return the same under another pressure (n,), MPa, with debris (n,), mm, by default as it is, and all else."""
         changes = {"p": pressure, "pm": pressure} if self.cycle is None else {"p": pressure}
-        found = self._but(pressure=pressure)
-        found._known.update({body: {**own, **changes} for body, own in self._known.items()})
-        return found
+        if debris is None:
+            return self._but((changes, changes), pressure=pressure)
+        changes["debris"] = debris
+        return self._but((changes, changes), pressure=pressure, debris=debris)
 
     def remembering(self, states: tuple[Mapping[str, Array], Mapping[str, Array]]) -> Self:
         """Return the same where laws remember these states, as those of punch and strip know them."""
-        found = self._but(states=states)
-        for body, own in self._known.items():
-            found._known[body] = {**own, **states[1 if body == "strip" else 0]}
-        return found
+        return self._but(states, states=states)
 
-    def _but(self, **changes: object) -> Self:
-        """Return the same with some attributes changed; nothing is known of it yet."""
+    def _but(self, variables: tuple[Mapping[str, Array], Mapping[str, Array]], **changes: object) -> Self:
+        """Return the same with some attributes changed, and with them these variables, as punch and strip have them."""
         found = object.__new__(type(self))
         found.__dict__.update(self.__dict__)
         found.__dict__.pop("derived", None)
-        found.__dict__.update(changes, _known={})
+        found.__dict__.update(changes, _known={}, _changed=(self, *variables))
         return found
 
     def of(self, body: Literal["punch", "strip", "mean"]) -> Mapping[str, Array]:
         """Return the variables of laws, of a body; or of the punch, with the mean temperature of both."""
         if (known := self._known.get(body)) is not None:
             return known
+        if self._changed is not None:
+            before, of_punch, of_strip = self._changed
+            found = self._known[body] = {**before.of(body), **(of_strip if body == "strip" else of_punch)}
+            return found
         punch, strip = self.temperatures
         own = 1 if body == "strip" else 0
         x, y, z = self.places[own].T
@@ -117,6 +119,11 @@ class ContactConditions:
             **self.states[own],
         }
         return found
+
+    @cached_property
+    def _changed(self) -> tuple[ContactConditions, Mapping[str, Array], Mapping[str, Array]] | None:
+        """What it was made of, and the variables of punch and strip that changed."""
+        return None
 
     @cached_property
     def _known(self) -> dict[str, dict[str, Array]]:
@@ -159,24 +166,6 @@ class Friction:
         """Whether mu is a law that has states of its own."""
         return isinstance(self.contact.friction, Dependence) and bool(self.contact.friction.states)
 
-    def by_pressure(self, conditions: ContactConditions) -> Callable[[Array], Array]:
-        """Return mu (n,) by the pressure (n,), as `values`, where all else is as in these conditions."""
-        state, with_cycle, lubrication = dict(conditions.of("mean")), conditions.cycle is None, self.contact.lubrication
-        shape, fluid = conditions.shape, 0.0 if lubrication is None else lubrication.fluid_friction
-        alike = not self.contact.friction_asks("p", "pm", of_share=False)
-        more = self._of_asperities(state, conditions) - fluid if alike else None  # than the fluid, of asperities
-
-        def values(pressure: Array) -> Array:
-            state["p"] = pressure
-            if with_cycle:
-                state["pm"] = pressure
-            share = 1.0 if lubrication is None else asperity_share(lubrication, state, shape, checked=False)
-            if more is None:
-                return self._values(state, conditions, share, checked=False)
-            return fluid + share * more
-
-        return values
-
     def share(self, conditions: ContactConditions) -> Array | float:
         """Return the share of the pressure that asperities carry (n,); 1 without lubrication.
 
@@ -205,6 +194,8 @@ class Friction:
         Raises:
             CaseError: it is negative or not finite.
         """
+        if "mu" in conditions.derived:
+            return conditions.derived["mu"]
         return self._values(conditions.of("mean"), conditions, self.share(conditions))
 
     def of_asperities(self, conditions: ContactConditions) -> Array:
@@ -246,3 +237,51 @@ class Friction:
             return mu[:, None] * sliding
         across = direction * np.cross(in_space(pair.normal), sliding)
         return mu[:, None] * sliding - self.contact.transverse_friction * across
+
+
+class FollowingFriction:
+    """mu by the pressure, where all else is as in some conditions: on the way to a solution its values are not checked.
+
+    Args:
+        friction: Its law.
+        conditions: Of all else.
+    """
+
+    def __init__(self, friction: Friction, conditions: ContactConditions) -> None:
+        self._friction, self._conditions = friction, conditions
+        self._state, self._with_cycle = dict(conditions.of("mean")), conditions.cycle is None
+        self._lubrication = lubrication = friction.contact.lubrication
+        self._fluid = 0.0 if lubrication is None else lubrication.fluid_friction
+        alike = not friction.contact.friction_asks("p", "pm", of_share=False)
+        # Than the fluid, of asperities.
+        self._more = friction._of_asperities(self._state, conditions) - self._fluid if alike else None
+        self._last: tuple[Array, Array | float, Array] | None = None  # pressure, share and mu
+
+    def __call__(self, pressure: Array) -> Array:
+        """Return mu (n,) at pressures (n,), MPa, as `Friction.values`."""
+        state, lubrication, shape = self._state, self._lubrication, self._conditions.shape
+        state["p"] = pressure
+        if self._with_cycle:
+            state["pm"] = pressure
+        share = 1.0 if lubrication is None else asperity_share(lubrication, state, shape, checked=False)
+        if self._more is None:
+            mu = self._friction._values(state, self._conditions, share, checked=False)
+        else:
+            mu = share * self._more
+            mu += self._fluid
+        self._last = pressure, share, mu
+        return mu
+
+    def at(self, pressure: Array) -> ContactConditions:
+        """Return the conditions under a pressure (n,), MPa; what has come out there last is not asked for again."""
+        found, last = self._conditions.pressed(pressure), self._last
+        if last is None or last[0].tobytes() != pressure.tobytes():
+            return found
+        _, share, mu = last
+        if not isinstance(share, float):
+            if not (np.minimum.reduce(share) >= 0 and np.maximum.reduce(share) <= 1):
+                return found  # it is asked for once more, which tells
+            found.derived["share"] = share
+        if self._more is not None or (np.minimum.reduce(mu) >= 0 and np.maximum.reduce(mu) < np.inf):
+            found.derived["mu"] = mu
+        return found

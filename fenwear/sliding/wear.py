@@ -225,6 +225,8 @@ class PhasesWear:
         """Return the depths worn off both bodies together at the contact nodes in each phase (m, n), mm."""
         bodies = zip((self.punch, self.strip), self._at_contact(pressure), strict=True)
         depths = [body.depth(pressure, worn) for body, worn in bodies if body is not None]
+        if len(depths) == 1:
+            return depths[0]
         return np.asarray(sum(depths, np.zeros_like(pressure)))
 
     def taken_slope(self, pressure: Array) -> Array:
@@ -446,22 +448,23 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
         CaseError: it is negative or not finite; `key` is the law's key.
     """
     found = _of_asperities(law, friction, conditions, key)
-    if friction.contact.lubrication is None:
-        return found
-    return np.asarray(found * friction.share(conditions) ** law.pressure_exponent)
+    if friction.contact.lubrication is not None:
+        share = friction.share(conditions)
+        found = found * (share if law.pressure_exponent == 1 else share**law.pressure_exponent)
+    return found if isinstance(found, np.ndarray) else np.full(conditions.shape, found)
 
 
-def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:
-    """Return beta~ where asperities carry all the pressure (n,), as `coefficient`."""
+def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array | float:
+    """Return beta~ where asperities carry all the pressure (n,), or everywhere, as `coefficient`."""
     n, given = conditions.shape, law.given_coefficient
     scale = law.scale if law.per_area is None else 1 / law.touching_from
     if isinstance(given, Dependence):
         body = conditions.of("punch" if key.endswith("punch") else "strip")
         return given.values(body, n, scale, f"{key}.{law.coefficient_key}")
     if given is not None:
-        return np.full(n, scale * given)
+        return scale * given
     if law.archard is not None and law.hardness is not None:
-        return np.full(n, law.archard / law.hardness)
+        return law.archard / law.hardness
     mu = friction.of_asperities(conditions)
     if law.energy is not None:
         return law.energy * mu

@@ -133,9 +133,7 @@ class PhaseMeter:
         """Return what the phase adds at a pressure (n,)."""
         if self._rows is None:
             rubbed = self._mu * pressure
-            of_pressure: list[float] = (self._by_pressure @ pressure).tolist()
-            of_friction: list[float] = (self._by_friction @ rubbed).tolist()
-            parts = of_pressure + of_friction
+            parts = [*map(float, self._by_pressure @ pressure), *map(float, self._by_friction @ rubbed)]
             for own, weigh in zip((self._wear.punch, self._wear.strip), self._weigh, strict=True):
                 # A mass that is not known is none of nothing worn, either.
                 parts += (0.0, 0.0 * weigh[1, 0]) if own is None else (weigh @ own.depth(pressure[None])[0]).tolist()

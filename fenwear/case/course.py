@@ -120,7 +120,8 @@ class Output(Part):
     """What a run keeps."""
 
     every: Annotated[int, Field(ge=1, strict=True)] = Field(
-        default=1, description="keep every k-th cycle in history.nc, and always the last one"
+        default=1,
+        description="keep every k-th cycle in history.nc, and always the last one; with jumps each one computed",
     )
     fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
         default=None, description="half-cycles whose fields are written; by default the last one, [] for none"

@@ -152,11 +152,12 @@ def _out_of_range(case: Case, values: Mapping[str, object]) -> Iterator[tuple[st
                 if not low * usual.size * (1 - 1e-9) <= value <= usual.high * usual.size * (1 + 1e-9):
                     unit = f" {usual.unit}" if usual.unit else ""
                     as_read = " as it is read without a unit" if key in case.written.bare else ""
+                    article = "an" if usual.kind[0] in "aeiou" else "a"
                     yield (
                         key,
                         (
-                            f"{key}: {value / usual.size:.4g}{unit}{as_read} is far outside the usual range of a "
-                            f"{usual.kind}, {low:g} to {usual.high:g}{unit} ({usual.reason})"
+                            f"{key}: {value / usual.size:.4g}{unit}{as_read} is far outside the usual range of "
+                            f"{article} {usual.kind}, {low:g} to {usual.high:g}{unit} ({usual.reason})"
                         ),
                     )
 

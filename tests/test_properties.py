@@ -18,7 +18,7 @@ from mpi4py import MPI
 from fenwear import Tribosystem, assemble, load_case, march, steady, vary
 from fenwear.arrays import Array
 from fenwear.cycle import Block, stability_number
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.exchange import CROSSING, TERMS
 
 HALF_WIDTH = 30.0  # mm
 FRICTION = 0.5  # at most: with more of it Newton's iteration for contact may stagnate, see the last test
@@ -236,7 +236,7 @@ def test_balances_with_heat(parameters: Parameters) -> None:
     assert block.heat is not None
     assert parameters.heat is not None
     assert (block.heat.balance_error < 1e-8).all()
-    terms = dict(zip(TERMS, block.heat.terms.T, strict=True))
+    terms = dict(zip((*TERMS, *CROSSING), block.heat.terms.T, strict=True))
     done = parameters.friction * parameters.force * 2 * parameters.amplitude
     np.testing.assert_allclose(terms["friction"], done, rtol=1e-9)
     np.testing.assert_allclose(terms["debris"], parameters.heat.debris * done, rtol=1e-9)

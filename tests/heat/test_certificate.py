@@ -10,7 +10,7 @@ import pytest
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.assembly import expansions, with_exchange, with_reduced_heat
 from fenwear.heat.certificate import rigid_gaps
-from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.heat.prepare import opened_gap
 from fenwear.plausibility import fineness_text, fineness_warnings
 from fenwear.stick.heat import free_expansion
@@ -45,7 +45,7 @@ def _over(exchange: HeatExchange, pressures: np.ndarray, rigid: np.ndarray) -> l
     for number, pressure in enumerate(pressures):
         phase = number % len(exchange.plans)
         state, terms = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
-        assert abs(terms[0] - terms[1:].sum()) < 1e-8 * terms[0]
+        assert abs(terms[0] - terms[1 : len(TERMS)].sum()) < 1e-8 * terms[0]
         gap = exchange.gap(state, phase)
         found.append(np.array([*exchange.contact_temperatures(state, phase), gap - q @ (q.T @ gap)]))
     return found

@@ -12,6 +12,7 @@ from fenwear import Case, ConvergenceError, Tribosystem, assemble, load_case, ma
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 from fenwear.heat import passing_strip, prepare
+from fenwear.heat.exchange import TERMS
 from fenwear.heat.reduction import _Growing
 
 # Faces that convect and no debris: all losses, and a strong feedback.
@@ -39,7 +40,7 @@ def heated(system: Tribosystem, pressures: Array) -> Array:
     state, found = exchange.initial(), []
     for number, pressure in enumerate(pressures):
         state, terms = exchange.half_cycle(state, number % 2, pressure, exchange.conductance(pressure))
-        assert abs(terms[0] - terms[1:].sum()) < 1e-9 * np.abs(terms).max()
+        assert abs(terms[0] - terms[1 : len(TERMS)].sum()) < 1e-9 * np.abs(terms).max()
         found.append(exchange.contact_temperatures(state, number % 2))
     return np.array(found).transpose(1, 0, 2)
 

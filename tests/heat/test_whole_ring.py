@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fenwear import load_case
 from fenwear.assembly import place_case
+from fenwear.heat.exchange import TERMS
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.sliding.motion import make_motion
 
@@ -51,7 +52,7 @@ def around_the_pad(height: float, speed: float) -> tuple[Floats, Floats, float]:
         for exchange, time in ((slides, SLIDES), (rests, RESTS)):
             for _ in range(round(time / STEP)):
                 state, terms = exchange.half_cycle(exchange.own(state), 0, pressure, exchange.conductance(pressure))
-                made, *gone = terms
+                made, *gone = terms[: len(TERMS)]
                 apart = max(apart, abs(made - sum(gone)) / (FLUX * PAD * STEP))
             found.append(exchange.contact_temperatures(state)[1])
     return pair.x, np.array(found), apart

@@ -8,6 +8,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 PARAMETER = re.compile(r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE)
+GROUP = re.compile(r"^[ \t]*Physical \w+\(\"(\w+)\"", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,13 @@ class ReadyGeometry:
         name: Of its file.
         about: What it is.
         parameters: Name, default (lengths in mm, angles in degrees) and meaning of each.
+        groups: Names of its regions and surfaces, for any parameters: some of these may leave some of them out.
     """
 
     name: str
     about: str
     parameters: tuple[tuple[str, str, str], ...]
+    groups: tuple[str, ...]
 
     @property
     def title(self) -> str:
@@ -32,7 +35,8 @@ class ReadyGeometry:
     def text(self) -> str:
         """Return it in words, a line for each parameter."""
         lines = (f"    {name} = {value}   {meaning}".rstrip() for name, value, meaning in self.parameters)
-        return "\n".join((f"{self.name}: {self.about}", "geometry.parameters, in mm and degrees:", *lines))
+        names = f"regions and surfaces: {', '.join(self.groups)}"
+        return "\n".join((f"{self.name}: {self.about}", names, "geometry.parameters, in mm and degrees:", *lines))
 
 
 def meshes_folder() -> Path:
@@ -50,4 +54,5 @@ def _read(path: Path) -> ReadyGeometry:
     text = path.read_text("utf-8")
     about = " ".join(line.lstrip("/ ") for line in text.partition("\n//\n")[0].splitlines())
     block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
-    return ReadyGeometry(path.name, about, tuple(PARAMETER.findall(block[1])) if block else ())
+    parameters = tuple(PARAMETER.findall(block[1])) if block else ()
+    return ReadyGeometry(path.name, about, parameters, tuple(dict.fromkeys(GROUP.findall(text))))

@@ -128,6 +128,7 @@ def test_commands(fenwear: Callable[..., Any]) -> None:
     ready = fenwear("info", "geometry.file").stdout
     assert "\n  bushing.geo            A shaft in a bushing, a conformal contact\n" in ready
     assert "    radius = 10   of the shaft\n" in fenwear("info", "bushing.geo").stdout
+    assert "\nregions and surfaces: punch_body, punch_contact, punch_far, " in fenwear("info", "blocks.geo").stdout
     wrong = fenwear("info", "motion.amplitud")
     assert (wrong.returncode, "did you mean motion.amplitude" in wrong.stderr) == (2, True)
     assert json.loads(fenwear("schema").stdout) == json_schema()

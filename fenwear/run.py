@@ -223,7 +223,7 @@ class _Run:
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
         self.warnings += [*law_warnings(system), *stroke_warnings(system)]
-        if getattr(self.case.motion, "positions", 0) is None and system.motion.positions > DEFAULT_POSITIONS:
+        if self.case.leaves_positions and system.motion.positions > DEFAULT_POSITIONS:
             log(f"motion.positions: {system.motion.positions} are taken, about as near to each other as contact nodes")
         for warning in self.warnings:
             log(f"warning: {warning}")

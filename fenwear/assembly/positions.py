@@ -41,8 +41,7 @@ def _wanted(case: Case, placed: ContactSetup) -> int:
     Of a program the longest stroke counts. None are added on contact grids, which cover what positions need, nor with
     heat, whose response is another in each.
     """
-    given = getattr(case.motion, "positions", 0) is not None
-    if given or not placed.track_changes or case.grid is not None or case.heat is not None:
+    if not case.leaves_positions or not placed.track_changes or case.grid is not None or case.heat is not None:
         return 0
     longest = max([_step(make_sliding(stage.case).motion) for stage in stages_of(case)], default=0.0)
     own = _step(placed.motion)

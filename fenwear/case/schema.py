@@ -452,6 +452,11 @@ class Case(Part):
         return self.contact.law == "coulomb" or (self.contact.law == "auto" and self.stick != Stick())
 
     @property
+    def leaves_positions(self) -> bool:
+        """Whether it leaves open in how many positions of a half-cycle the strip passes under the punch."""
+        return getattr(self.motion, "positions", 0) is None
+
+    @property
     def against_stick(self) -> list[str]:
         """What does not go with contact with stick: a key and what it expects, each."""
         table = isinstance(self.motion, Cycle)

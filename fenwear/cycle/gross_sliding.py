@@ -171,7 +171,7 @@ class GrossSliding:
 
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
-        placed = self._placed(system.case, bodies)
+        placed = self._placed(system.case, bodies, _sliding_as(system, system.case))
         condensed = system.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
         return _with_heat_as(system, joined(placed, condensed), keep=bodies.warmed is None)
 
@@ -183,8 +183,7 @@ class GrossSliding:
         """
         before, bodies, condensed, sliding = system.case, system.bodies, system.condensed, system.sliding
         if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
-            least = 0 if system.motion.steps else system.motion.positions
-            sliding = make_sliding(case, positions=max(DEFAULT_POSITIONS, least))
+            sliding = _sliding_as(system, case)
         if before.loading != case.loading:
             bodies = bodies.under(case)
         conducts_alike = same_conduction(before, case)
@@ -258,6 +257,12 @@ class GrossSliding:
     def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
         """Return the step of many cycles."""
         return Jumps(Stepper(system, tolerance, watch, loading), tolerance)
+
+
+def _sliding_as(system: Tribosystem, case: Case) -> Sliding:
+    """Return the sliding of a case in as many positions as a system has, where the case leaves them open."""
+    least = 0 if system.motion.steps else system.motion.positions
+    return make_sliding(case, positions=max(DEFAULT_POSITIONS, least))
 
 
 def _with_heat_as(system: Tribosystem, new: Tribosystem, *, keep: bool = False) -> Tribosystem:

@@ -105,6 +105,8 @@ def _until_unworn(depth: Array, coordinates: Array, edges: NDArray[np.int64], le
     outwards = depth[:, first] > level
     near, far = np.where(outwards, first, second), np.where(outwards, second, first)
     row, edge = np.nonzero(crossed & (np.take_along_axis(depth, far, axis=1) == 0))
+    if not len(row):  # nothing unworn beside it, as where surfaces conform
+        return found
     near, far = near[row, edge], far[row, edge]
     beside = _neighbours(edges, len(coordinates))[near]  # (e, most), the node itself where there are fewer
     ways, rises = (

@@ -161,12 +161,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "whose sums": (MODEL, "`setup.reproducible` with ways that add up over the ranks"),
         "whose steps every rank makes alike": (MODEL, "the same with all temperatures, which the ranks share"),
     },
-    "cycle/monotonic.py": {
-        "no steady temperatures of one-way sliding": (
-            OPEN,
-            "`optimum` with properties of T, one way: `steady` finds both",
-        )
-    },
     "cycle/steady.py": {
         "no one rigid motion wears all": (PHYSICS, "an end where loads press to either side in turn"),
         "its track deepens": (PHYSICS, "an end where the strip wears to and fro"),

@@ -1,14 +1,20 @@
-"""One-way sliding with heat: steady temperatures at the optimal pressure, and their mean for periodic motion."""
+"""One-way sliding with heat: steady temperatures at the optimal pressure, and their mean for periodic motion.
+
+Each direction has the temperatures of sliding that way alone, and the properties of materials at them.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, steady_exchange, warming_key
-from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.assembly import Tribosystem, steady_exchange
+from fenwear.cycle.own_properties import with_own_properties
+from fenwear.errors import CaseError, InputError
+from fenwear.heat.field import HeatState
 
 DIRECTIONS = (-1, 1)
 
@@ -33,27 +39,40 @@ class Monotonic:
         return self.punch.mean(axis=0)
 
 
-def monotonic(system: Tribosystem) -> Monotonic:
+@dataclass(frozen=True)
+class _Sliding:
+    """Of one direction: pressure (n,), MPa, temperatures of both surfaces (n,), K, and of the whole bodies."""
+
+    pressure: Array
+    surfaces: tuple[Array, Array]
+    end: HeatState
+
+
+def monotonic(system: Tribosystem, *, properties_within: float | None = None) -> Monotonic:
     """Return the steady temperatures at the optimal pressures; collective.
 
+    Args:
+        system: The assembled problem.
+        properties_within: As of `steady`.
+
     Raises:
-        CaseError: the case has no heat, or a body loses heat nowhere.
-        ConvergenceError: properties of materials depend on the temperature.
+        CaseError: the case has no heat, or a body loses heat nowhere; a property that is not positive.
+        ConvergenceError: there is no optimum, or properties and temperatures do not come together.
     """
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    if key := warming_key(system):
-        raise ConvergenceError(
-            f"no steady temperatures of one-way sliding are solved for where {key} depends on the temperature; "
-            'expected `steady`, or a motion.kind = "one-way"'
-        )
-    speed = system.motion.mean_speed
-    exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
-    pressures = system.team.lead(lambda: [system.optimum(d).pressure for d in DIRECTIONS])
-    punch, strip = [], []
-    for phase, pressure in enumerate(pressures):
-        state, _ = exchange.half_cycle(exchange.initial(), phase, pressure, exchange.conductance(pressure))
-        temperatures = exchange.contact_temperatures(state)
-        punch.append(temperatures[0])
-        strip.append(temperatures[1])
-    return Monotonic(np.array(pressures), np.array(punch), np.array(strip))
+    unheated = replace(system, exchange=None)  # the heat of its motion is not asked for
+    found = [
+        with_own_properties(unheated, partial(_one_way, d), lambda one: one.end, properties_within)[0]
+        for d in DIRECTIONS
+    ]
+    punch, strip = (np.array(both) for both in zip(*(one.surfaces for one in found), strict=True))
+    return Monotonic(np.array([one.pressure for one in found]), punch, strip)
+
+
+def _one_way(direction: int, system: Tribosystem) -> _Sliding:
+    """Return the state of sliding in one direction, with the properties as they are; collective."""
+    exchange = steady_exchange(system, [direction * system.motion.mean_speed])
+    pressure = system.team.lead(lambda: system.optimum(direction).pressure)
+    state, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
+    return _Sliding(pressure, exchange.contact_temperatures(state), state)

@@ -13,9 +13,8 @@ Wear of the strip joins where it keeps the strip's shape: sliding out of the pla
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
 position touches it: there is no state that repeats.
 
-Where properties of materials depend on the temperature, state and bodies follow each other: the state of the
-bodies as they are, the bodies with the properties of its temperatures at the end of a cycle, and so on, until no
-property changes any more.
+Where properties of materials depend on the temperature, state and bodies follow each other; see
+`fenwear.cycle.own_properties`.
 """
 
 from __future__ import annotations
@@ -32,10 +31,6 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import (
     Tribosystem,
     friction_power,
-    property_change,
-    taken_at,
-    warmed_system,
-    warming_key,
     with_reduced_heat,
 )
 from fenwear.case.names import told_by_name
@@ -44,6 +39,7 @@ from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.block import Block
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
+from fenwear.cycle.own_properties import with_own_properties
 from fenwear.cycle.program import at_step
 from fenwear.cycle.state import RunState, pressure_scale
 from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_memory
@@ -55,9 +51,6 @@ from fenwear.layers.memory import Held
 
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
 ZERO = 1e-12  # of the largest: a velocity that is rounding
-LEFT = 0.1  # of heat.property_tolerance: what properties may still change by in the state that is found
-FALLING = 0.7  # of the change of the properties in the pass before
-PASSES = 30
 JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
 NOTHING_WEARS = (
@@ -178,11 +171,13 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
 def steady_state(system: Tribosystem, properties_within: float | None = None) -> SteadyState:
     """Return the cyclic steady state of gross sliding, see `steady`; collective."""
     begin = time.perf_counter()
-    state = _of_these_bodies(system)
-    if warming_key(system) and system.heat is not None:
-        share = LEFT if properties_within is None else properties_within / system.heat.property_tolerance
-        state = _warmed(state, share)
-    return replace(state, seconds=time.perf_counter() - begin)
+    state, passes = with_own_properties(system, _of_these_bodies, _temperatures, properties_within)
+    return replace(state, passes=passes, seconds=time.perf_counter() - begin)
+
+
+def _temperatures(state: SteadyState) -> HeatState | None:
+    """Return the temperatures of the whole bodies at the end of a cycle; None without heat."""
+    return None if state.heat is None else state.heat.end
 
 
 def _of_these_bodies(system: Tribosystem) -> SteadyState:
@@ -217,38 +212,6 @@ def _check_sinks(system: Tribosystem) -> None:
         if not side.cooled:
             power = share * (1 - heat.debris) * friction_power(system)
             raise CaseError(no_heat_sink(body.body.name, body.enough_convection(power)))
-
-
-def _warmed(state: SteadyState, share: float) -> SteadyState:
-    """Return the state whose bodies have the properties of its own temperatures; collective.
-
-    Where the change does not fall from pass to pass, half of it is followed, then a quarter, and so on.
-
-    Args:
-        state: Of bodies with other properties.
-        share: Of heat.property_tolerance, that properties may still change by.
-    """
-    followed, before = 1.0, np.inf
-    for done in range(PASSES):
-        system, found = state.system, state.heat
-        if found is None:
-            break
-        change = property_change(system, found.end)
-        if change <= share:
-            return replace(state, passes=done)
-        followed, before = followed / 2 if change > FALLING * before else followed, change
-        heat = system.bodies.heat
-        if followed < 1 and heat is not None:
-            pairs = zip(found.end.temperatures(), taken_at(system), strict=True)
-            mixed = [followed * new + (1 - followed) * old for new, old in pairs]
-            system = warmed_system(system, HeatState.nodal(heat, mixed, found.end.track))
-        else:
-            system = warmed_system(system, found.end)
-        state = _of_these_bodies(system)
-    raise ConvergenceError(
-        f"the temperatures of the steady state and the properties that depend on them, {warming_key(system)}, did not "
-        f"come together in {PASSES} passes: follow them by `run`"
-    )
 
 
 def _check_exists(system: Tribosystem) -> None:

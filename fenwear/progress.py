@@ -17,6 +17,19 @@ How = Literal["bar", "lines", "none"]
 Log = Callable[[str], None]
 
 
+def now_and_then(log: Log) -> Log:
+    """Return what logs a line unless it has logged one in the last seconds."""
+    told = [-LINE_SECONDS]
+
+    def tell(line: str) -> None:
+        now = time.monotonic()
+        if now > told[0] + LINE_SECONDS:
+            told[0] = now
+            log(line)
+
+    return tell
+
+
 class Progress:
     """The progress of a run over half-cycles or cycles.
 

@@ -209,7 +209,7 @@ def calibrate(
         ConvergenceError: a run or the fit did not converge.
     """
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
-    problem = LeastSquares(case, data, asked, baseline, comm)
+    problem = LeastSquares(case, data, asked, baseline, comm, progress)
     return problem.team.lead(partial(_calibrated, problem, progress))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import time
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,7 +28,7 @@ from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
 from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
-from fenwear.progress import LINE_SECONDS
+from fenwear.progress import now_and_then
 from fenwear.results.disk import write_text
 from fenwear.results.history import CASE, free_directory, make_directory, write_case
 
@@ -67,15 +66,8 @@ def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
 
 def _counter(log: Log, what: str) -> Callable[[int, int], None]:
     """Return what tells of progress: first, last, and now and then."""
-    told = [-LINE_SECONDS]
-
-    def tell(done: int, total: int) -> None:
-        now = time.monotonic()
-        if done == total or now > told[0] + LINE_SECONDS:
-            told[0] = now
-            log(f"{what} {done:,} of {total:,}")
-
-    return tell
+    seldom = now_and_then(log)
+    return lambda done, total: (log if done == total else seldom)(f"{what} {done:,} of {total:,}")
 
 
 def run_sensitivity(

@@ -21,6 +21,7 @@ from fenwear.life.predictor import Predictor
 from fenwear.life.ranks import share
 from fenwear.life.unknowns import Unknown, scaled
 from fenwear.parallel import Team
+from fenwear.progress import Log, now_and_then
 
 if TYPE_CHECKING:
     import lmfit
@@ -46,14 +47,16 @@ class LeastSquares:
         unknowns: Sequence[Unknown],
         baseline: Sequence[str] = (),
         comm: MPI.Comm = MPI.COMM_WORLD,
+        progress: Log = lambda message: None,
     ) -> None:
-        """Check what is asked for; computes nothing.
+        """Check what is asked for; computes nothing. `progress` is told now and then of the runs that are done.
 
         Raises:
             CaseError: a key, bound or combination of data that makes no sense.
         """
         self.case, self.comm, self.team = case, comm, Team.of(comm)
         self.team.serve(self)
+        self._tell = now_and_then(progress)
         self.model = Model(case)
         self.data = list(data)
         self.series = [series for one in data for series in one.series]
@@ -145,7 +148,9 @@ class LeastSquares:
 
     def predicted(self, z: Vector, *, strict: bool = False) -> Array:
         """Return the predictions without baselines (n,); `strict` as of `Predictor`."""
-        return np.concatenate(self.predict(self.values(z), strict=strict))
+        found = np.concatenate(self.predict(self.values(z), strict=strict))
+        self._tell(f"{self.model.evaluations:,} runs done")
+        return found
 
     def _tried(self, z: Array) -> Array:
         """Return the predictions of a trial; far too large where the model refuses it, so that it is not kept."""

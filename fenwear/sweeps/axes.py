@@ -164,7 +164,7 @@ def read_table(path: Path) -> list[Axis]:
     """Return the keys and values of a table: a heading of keys, then a variant in each row.
 
     Args:
-        path: A CSV file; values as in a case file.
+        path: A CSV file; values as in a case file, or numbers of the unit that stands in brackets behind the key.
 
     Raises:
         CaseError: it cannot be read, or rows have another length than the heading.
@@ -177,12 +177,18 @@ def read_table(path: Path) -> list[Axis]:
         raise CaseError(InputError(str(path), "not a table with commas between its values, in UTF-8")) from None
     if len(rows) < 2:
         raise CaseError(InputError(str(path), "expected a heading of keys and a row for each variant"))
-    heading = [name.strip() for name in rows[0]]
+    heading, units = zip(*map(_key_and_unit, rows[0]), strict=True)
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(heading):
             expected = f"expected {len(heading)} values as in the heading, got {len(row)}"
             raise CaseError(InputError(str(path), f"row {number}: {expected}"))
-    return [Axis(key, tuple(row[k].strip() for row in rows[1:])) for k, key in enumerate(heading)]
+    values = [[f"{text.strip()} {unit}".strip() for text, unit in zip(row, units, strict=True)] for row in rows[1:]]
+    return [Axis(key, column) for key, column in zip(heading, zip(*values, strict=True), strict=True)]
+
+
+def _key_and_unit(name: str) -> tuple[str, str]:
+    key, bracket, unit = name.strip().removesuffix(")").partition(" (")
+    return (key, unit) if bracket else (name.strip(), "")
 
 
 def settings(case: Case, given: Mapping[str, tuple[Axis, Value]]) -> list[str]:

@@ -18,7 +18,7 @@ from fenwear.parallel import on_root
 from fenwear.results.history import free_directory
 from fenwear.sweeps.axes import parse_axis, read_table
 from fenwear.sweeps.picture import draw
-from fenwear.sweeps.store import table
+from fenwear.sweeps.store import records
 from fenwear.sweeps.sweep import sweep
 
 Log = Callable[[str], None]
@@ -102,8 +102,7 @@ def _text(value: xarray.DataArray) -> str:
 
 def text(dataset: xarray.Dataset) -> str:
     """Return the table of the variants' numbers for people."""
-    numbers = table(dataset).drop_vars(["trouble", "seconds (s)"])
-    frame = numbers.to_dataframe().reset_index()
+    frame = records(dataset).drop(columns=["trouble", "seconds (s)"])
     if "variant" in frame and "variant" not in dataset.coords:
         frame["variant"] += 1
     shown = frame.head(ROWS).to_string(index=False, float_format=lambda value: f"{value:.5g}")
@@ -115,7 +114,7 @@ def text(dataset: xarray.Dataset) -> str:
 
 def as_json(dataset: xarray.Dataset) -> dict[str, Any]:
     """Return what --json prints: a row of numbers for each variant, null where it failed."""
-    frame = table(dataset).to_dataframe().reset_index()
+    frame = records(dataset)
     rows = [
         {str(k): None if isinstance(v, float) and not np.isfinite(v) else v for k, v in row.items()}
         for row in frame.to_dict("records")

@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -18,6 +18,9 @@ from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import writing
 from fenwear.sweeps.evaluate import MEANINGS, Values, meaning
 from fenwear.sweeps.plan import Plan
+
+if TYPE_CHECKING:
+    import pandas
 
 VARIANTS, DATASET, TABLE = "variants", "sweep.nc", "sweep.csv"
 SECONDS = "seconds"
@@ -138,8 +141,15 @@ def write(folder: Path, dataset: xarray.Dataset) -> None:
         part.replace(path)
     path, part = folder / TABLE, folder / f"{TABLE}.part"
     with writing(path):
-        table(dataset).to_dataframe().reset_index().to_csv(part, index=False)
+        records(dataset).to_csv(part, index=False)
         part.replace(path)
+
+
+def records(dataset: xarray.Dataset) -> pandas.DataFrame:
+    """Return a row for each variant: its keys and single numbers, the unit behind the name."""
+    units = {key: unit for key, axis in dataset.coords.items() if (unit := axis.attrs.get("units"))}
+    frame = table(dataset).to_dataframe().reset_index()
+    return frame.rename(columns={key: f"{key} ({unit})" for key, unit in units.items()})
 
 
 def table(dataset: xarray.Dataset) -> xarray.Dataset:

@@ -38,6 +38,7 @@ SMALL = GIB  # below which no estimate refuses anything
 STEPS = 0.1, 1.0  # wear by the mean pressure over the elastic gap, of steps from afar
 LONGER = 10.0, 1e2, 1e3, 1e4, 1e5  # and of those before the last one, which has no end
 UNBALANCED = 0.3  # of the mean pressure times the surface: from there on a start is far
+APART = 1e-9  # of gaps by rigid motions: what is rounding
 AT_ONCE = 30  # Newton iterations, before the wear is followed and in its steps
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
@@ -268,7 +269,8 @@ class SteadyInequality:
 
     def _unknowns(self, contact: ContactState, omega: Array, worn: Array) -> Array:
         """Return the unknowns of contacts on a shape omega (n,) that wears by `worn` (n,) a cycle, both scaled."""
-        rigid, touched = contact.rigid * (self.lengths / self.gap_scale), worn > 0
+        touched = worn > 0
+        rigid = np.einsum("kij,kj->ki", rigid_of_phases(self.system), contact.rigid) * (self.lengths / self.gap_scale)
         velocity = np.linalg.lstsq(self.equations.modes[touched], worn[touched], rcond=None)[0]
         shape = np.minimum(omega + self.equations.modes @ rigid[0], OPEN)
         pressure = contact.pressure / self.p_scale
@@ -342,6 +344,30 @@ class SteadyInequality:
 
 def _same(one: csr_array, other: csr_array) -> bool:
     return all(np.array_equal(getattr(one, n), getattr(other, n)) for n in ("indptr", "indices", "data"))
+
+
+def rigid_of_phases(system: Tribosystem) -> Array:
+    """Return what turns the rigid motions of each phase to those of the middle position (m, modes, modes).
+
+    A strip that is free to move and passes as a whole opens in each place the same gaps by other motions, as where it
+    tilts about a point that moves with it: H_k = H T_k. So wear that a motion follows in one place one follows in all.
+
+    Raises:
+        ConvergenceError: they open other gaps: to follow the wear takes H_k lambda_k of one shape in all phases.
+    """
+    middle, found = system.rigid.rigid_normal, []
+    for own in system.rigids:
+        here = own.rigid_normal
+        turned = np.linalg.lstsq(middle, here, rcond=None)[0]
+        back = here @ np.linalg.lstsq(here, middle, rcond=None)[0]
+        if max(np.abs(middle @ turned - here).max(), np.abs(back - middle).max()) > APART * np.abs(middle).max():
+            raise ConvergenceError(
+                "no cyclic steady state exists: the rigid motions that follow the wear in one position of the strip "
+                "open the contact in another, as where a strip on a hinge is all that moves, so that no shape stays: "
+                "follow the wear by `run`"
+            )
+        found.append(turned)
+    return np.array(found)
 
 
 def check_memory(system: Tribosystem) -> None:

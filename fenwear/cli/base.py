@@ -81,6 +81,23 @@ def load(case: str, settings: list[str]) -> Case:
     return loaded[0].at(loaded[1])
 
 
+def show_results(found: str | dict[str, Any], where: str) -> None:
+    """Print what was asked for, a text or a JSON object, and say to standard error where the rest is.
+
+    On several ranks that comes first: mpirun takes the begin of a long line, of which it has not had the end when
+    something else is said, for that one's, and puts it there.
+    """
+    first = MPI.COMM_WORLD.size > 1
+    if first:
+        log(where)
+    if isinstance(found, str):
+        show(found)
+    else:
+        print_json(found)
+    if not first:
+        log(where)
+
+
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object in a line."""
     _write(sys.stdout, json.dumps(data))

@@ -24,6 +24,7 @@ from fenwear.cli.base import (
     print_case,
     print_json,
     show,
+    show_results,
 )
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
@@ -73,10 +74,9 @@ def run(
     )
     if as_json:
         print_json(summary)
-    else:
-        if not quiet:
-            show("\n\n".join(text for text in (sheet_text(summary), contact_text(summary)) if text))
-        say(f"results in {directory}")
+    elif not quiet:
+        text = "\n\n".join(text for text in (sheet_text(summary), contact_text(summary)) if text)
+        show_results(text, f"results in {directory}")
 
 
 @app.command("check")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from mpi4py import MPI
 
-from fenwear.cli.base import JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.cli.base import JsonOption, SetOption, app, load, log, show, show_results
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
@@ -85,11 +85,7 @@ def compare_command(
 
     comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
     on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))
-    if as_json:
-        print_json(comparison.as_json())
-    else:
-        show(comparison.text())
-    log(f"figure in {output}")
+    show_results(comparison.as_json() if as_json else comparison.text(), f"figure in {output}")
 
 
 def _march_and_jump(name: str, settings: list[str], output: Path) -> list[Path]:

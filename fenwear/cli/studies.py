@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json, show, show_results
 from fenwear.errors import CaseError, InputError, StackError
 
 QuantitiesOption = Annotated[
@@ -82,11 +82,8 @@ def sensitivity_command(
     found, folder = commands.run_sensitivity(
         loaded, Path(case).stem, quantities, keys, spread, output, log, differences=differences
     )
-    if as_json:
-        print_json(commands.as_json(found))
-    else:
-        show("\n\n".join(one.text() for one in found))
-    log(f"results in {folder}")
+    text = "\n\n".join(one.text() for one in found)
+    show_results(commands.as_json(found) if as_json else text, f"results in {folder}")
 
 
 @app.command("serve")
@@ -136,20 +133,14 @@ def calibrate_command(
         tests, between, folder = commands.run_calibrate_each(
             loaded, Path(case).stem, data, unknowns, baseline, output, log
         )
-        if as_json:
-            print_json(commands.each_as_json(tests, between))
-        else:
-            show("\n".join([*(one.text() for one in tests), *between.text]))
-        log(f"results in {folder}")
+        text = "\n".join([*(one.text() for one in tests), *between.text])
+        show_results(commands.each_as_json(tests, between) if as_json else text, f"results in {folder}")
         return
     found, sample, folder = commands.run_calibrate(
         loaded, Path(case).stem, data, unknowns, baseline, posterior, output, log
     )
-    if as_json:
-        print_json(found.as_json())
-    else:
-        show(found.text() if sample is None else f"{found.text()}\n{sample.text()}")
-    log(f"results in {folder}")
+    text = found.text() if sample is None else f"{found.text()}\n{sample.text()}"
+    show_results(found.as_json() if as_json else text, f"results in {folder}")
 
 
 @app.command("life")
@@ -194,11 +185,7 @@ def life_command(
         loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log,
         indices=indices, resume=resume,
     )  # fmt: skip
-    if as_json:
-        print_json(found.as_json())
-    else:
-        show(found.text())
-    log(f"results in {folder}")
+    show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 
 
 @app.command("sweep")
@@ -225,10 +212,6 @@ def sweep_command(
         load(case, settings), Path(case).stem, over, table, of, output, log,
         zipped=zipped, resume=resume, processes=processes, quiet=quiet,
     )  # fmt: skip
-    if as_json:
-        print_json(command.as_json(dataset))
-    else:
-        show(command.text(dataset))
-    log(f"results in {folder}")
+    show_results(command.as_json(dataset) if as_json else command.text(dataset), f"results in {folder}")
     if (dataset["trouble"].values != "").any():
         raise typer.Exit(3)

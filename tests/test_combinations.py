@@ -216,7 +216,8 @@ OPEN = [cell for cell in CELLS if not closed(*cell)]
 # A calibration is several runs and a run with heat many small steps: they are walked at length.
 LONG = {"calibrate", "sensitivity", "life"}
 # A fit asks for the runs that sensitivities ask for, which every row walks, on jumps that it keeps, and a life for
-# those of its samples. Rows with a state of their own that jumps keep are fitted, too.
+# those of its samples. Rows with a state of their own that jumps keep are fitted, too; with stick, whose states are
+# those of rows that slide, the plain one and that of laws with memory.
 OWN_STATE = ("in the plane", "heat, to and fro", "heat on a closed track", "laws with memory", "in rings", "in solids")
 
 
@@ -226,7 +227,8 @@ def repeats(feature: str, law: str, way: str) -> bool:
         return not closed(feature, law, "jump")  # which marches, too, farther, and checks the same
     if way == "life" and LAWS[law] == "gross-sliding":
         return False
-    return way in ("calibrate", "life") and feature not in OWN_STATE
+    fitted = OWN_STATE if LAWS[law] == "gross-sliding" else ("in the plane", "laws with memory")
+    return way in ("calibrate", "life") and feature not in fitted
 
 
 # Set-ups and states of heat are spread over ranks; what lies between and the laws rank 0 asks, with stick more often.

@@ -249,7 +249,7 @@ def test_block_on_ring_depths_are_those_published() -> None:
 @pytest.mark.slow
 def test_three_measured_scars() -> None:
     """K of each scar is that of its area, which needs no model; the three scatter by more than their errors."""
-    case = load_case(RING / "block_on_ring.toml", ["geometry.parameters.elements_along_contact=20"])
+    case = load_case(RING / "block_on_ring.toml", ["geometry.parameters.elements_along_contact=12"])
     found = []
     for number in (1, 2, 3):
         data = read_data(RING / f"block_on_ring_{number}.csv", case)

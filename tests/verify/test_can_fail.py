@@ -27,11 +27,10 @@ from fenwear_verify import wear as wear_cases
 from fenwear_verify.bodies import builtin, rigid_punch
 from fenwear_verify.conduction import conducting_square
 from fenwear_verify.contact import half_planes
-from fenwear_verify.solid_instability import sliding_blocks
 from fenwear_verify.thermal import conductor
 
 Patch = pytest.MonkeyPatch
-CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor, sliding_blocks)
+CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor)
 
 
 @pytest.fixture(autouse=True)
@@ -235,7 +234,6 @@ def forgotten_heat(patch: Patch) -> None:
         ("open-strip", material_the_other_way),
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
-        ("solid-burton", other_share),
         ("square-source", material_the_other_way),
         ("energy", half_speed),
         ("energy", forgotten_heat),

@@ -138,7 +138,7 @@ def bimetal() -> Result:
             "punch.regions={punch_lower='lower', punch_upper='upper'}",
             "strip.regions={strip_body='still'}",
             f"punch.supports=[{pins}]",
-            "heat={operator='full'}",
+            "heat={operator='full', steps=1}",
             "strip.temperatures=[]",
         )
         assert system.bodies.heat is not None

@@ -139,7 +139,7 @@ def sliding_blocks(
         materials=(CONDUCTOR, INSULATOR if conductance is None else OTHER),
         contact={"friction": SMALL_FRICTION},
         motion=motion,
-        heat={"partition": 1.0, "conductance": conductance or 0.0, "steps": 1, "reduction_tolerance": 1e-7},
+        heat={"partition": 1.0, "conductance": conductance or 0.0, "steps": 1, "reduction_tolerance": 1e-5},
     )  # fmt: skip
 
 

@@ -152,14 +152,16 @@ class GridStep(Step):
         return np.append(forces, (self.position.pull @ found.f - self.imposed.force) / self.area)
 
     def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
-        """Return what tractions (d n,) move: of the strip what the punch's displacement and the jump leave."""
+        """Return what tractions (d n,) move at once: of the strip what the punch's displacement and the jump leave."""
         if jump is None or self.interface.moves:
             return super()._moved(f, jump)
         position, bodies = self.position, jump.copy()
         if position.interface.layer is not None:
             bodies[: self.n] -= position.interface.layer * f[: self.n]
-        on_punch = position.interface.punch.apply(position.in_space(f * position.weights))
-        return SurfaceDisplacement(np.zeros(0), on_punch, on_punch - position.in_space(bodies))
+        on_punch = self.interface.punch.apply(position.in_space(f * position.weights))
+        punch, strip, _ = (1.0, 1.0, 1.0) if self.creep is None else self.creep.factors(self.imposed.duration)
+        on_strip = (punch * on_punch - position.in_space(bodies)) / strip  # the jump is that of bodies that creep
+        return SurfaceDisplacement(np.zeros(0), on_punch, on_strip)
 
 
 @dataclass(frozen=True)

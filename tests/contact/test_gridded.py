@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from half_space_ball import WEAR, ball
 
-from fenwear import assemble
+from fenwear import Case, assemble, evolve
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.gridded import GriddedPhases
+from fenwear.cycle.block import Block
+from fenwear.interface import compliance
 from fenwear.interface.convolution import Box, OnBox
 
 FORCE = 600.0  # N
@@ -111,3 +113,34 @@ def test_pressures_are_those_of_tamaas() -> None:
     other = np.asarray(model.traction).ravel()
     assert np.array_equal(pressure > 0, other > 0)
     assert np.abs(pressure - other).max() < 1e-6 * pressure.max()
+
+
+@pytest.mark.parametrize("who", ["punch", "strip"])
+def test_creep_with_stick_by_products_is_as_by_matrices(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a body is displaced by at once, which is what creeps, is told from what it has crept in a step."""
+    creep = {"terms": [{"compliance": 0.5, "time": "3 s"}]}
+    more = {
+        "grid": {"nodes": 21, "size": [0.7, 0.7]},
+        "contact": {"friction": 0.8, "law": "coulomb"},
+        "motion": {"kind": "reciprocating", "amplitude": 0.02, "period": 1.0, "positions": 1},
+        "stick": {"steps": 4, "step_tolerance": 1},
+        "run": {"half_cycles": 3},
+    }
+    case = ball(60.0, **more).resolved()
+    case[who]["creep"] = creep
+
+    def last() -> Block:
+        block = list(evolve(assemble(Case.model_validate(case))))[-1]
+        assert max(one.records.balance_error(block.system.pair.weights) for one in block.steps) < 1e-8
+        return block
+
+    by_products = last()
+    monkeypatch.setattr(compliance, "GRIDDED", np.inf)
+    by_matrices = last()
+    for of in (
+        lambda block: block.pressure[-1],
+        lambda block: block.end.worn.punch,
+        lambda block: block.end.worn.crept,
+    ):
+        wanted = of(by_matrices)
+        assert of(by_products) == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())

@@ -31,7 +31,8 @@ class Onwards:
 
     def __init__(self, nodes: int, modes: int, law: Law | None, hardness: float) -> None:
         self._law, self._hardness = law, hardness
-        self._values, self._rigid = np.zeros((len(ONWARDS), nodes)), np.zeros((len(ONWARDS), modes))
+        self._nodes, self._known = nodes, np.zeros((len(ONWARDS), nodes + modes))  # each with its rigid motions
+        self._values = self._known[:, :nodes]
         self._last: ContactState | None = None
         self._count = 0  # of cycles that are known
         self._alike = 0  # of them, in which the same nodes touch as in the last one
@@ -42,10 +43,9 @@ class Onwards:
         pressure = contact.pressure[0]
         follows = before is not None and before is self._last
         self._count = min(self._count + 1, len(ONWARDS)) if follows else 1
-        for kept in (self._values, self._rigid):
-            kept[1:] = kept[:-1]
+        self._known[1:] = self._known[:-1]
         self._values[0] = pressure if self._law is None else self._law.nearness(pressure, contact.gap[0])
-        self._rigid[0], self._last = contact.rigid[0], contact
+        self._known[0, self._nodes :], self._last = contact.rigid[0], contact
         if self._law is None:
             touching = (pressure > 0).tobytes()
             self._alike = min(self._alike + 1, self._count) if touching == self._touching else 1
@@ -56,8 +56,8 @@ class Onwards:
         count = self._count
         if before is None or count < 2 or before is not self._last:
             return before
-        shares, own = ONWARDS[count - 1, :count], before.pressure[0]
-        further = shares @ self._values[:count]
+        own, every = before.pressure[0], ONWARDS[count - 1, :count] @ self._known[:count]
+        further, rigid = every[: self._nodes], every[None, self._nodes :]
         if self._law is None:
             if self._alike < count:
                 self._as_long_as_they_touch(further)
@@ -67,7 +67,7 @@ class Onwards:
             further = self._law.pressure_of(np.minimum(np.maximum(further, last - MOST), last + MOST))
         if self._hardness < np.inf:
             further = np.where((own < self._hardness) & (further < self._hardness), further, own)
-        return ContactState(further[None], before.gap, (shares @ self._rigid[:count])[None], before.iterations)
+        return ContactState(further[None], before.gap, rigid, before.iterations)
 
     def _as_long_as_they_touch(self, further: Array) -> None:
         """Put pressures in place that go on as far back as their nodes touch."""

@@ -232,7 +232,8 @@ class Layers:
         first = len(self.rows) - len(held.contact)
         lies = len(self.carried_rows)
         carried = np.concatenate([worn.carried[:lies], held.strip]) if lies else held.strip
-        return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=carried)
+        between = np.concatenate([worn.between[:first], held.contact]) if first else held.contact
+        return WornDepths(worn.punch, worn.strip, between, worn.crept, carried)
 
     def flown(self, worn: WornDepths, flowed: Array | None) -> WornDepths:
         """Return depths where surfaces have flown (n,) more, mm; None for nothing."""
@@ -254,7 +255,7 @@ class Layers:
         if not len(state):
             return 0.0
         found = np.zeros(self.nodes) if self.debris_here is None else -state[self.row(DEBRIS[0])]
-        if self.memory is not None:
+        if self.memory is not None and self.memory.filling:
             found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 

@@ -99,6 +99,35 @@ class Memory:
         """All states, those of the contact first."""
         return (*self.contact.values(), *self.strip.values())
 
+    @cached_property
+    def named(self) -> tuple[tuple[str, State], ...]:
+        """All states with their names, those of the contact first."""
+        return tuple(zip(self.names, self.states, strict=True))
+
+    @cached_property
+    def bodies(self) -> tuple[Side, ...]:
+        """Whose conditions the rate of each state is at."""
+        of_contact: list[Side] = ["punch" if name in self.of_punch else "mean" for name in self.contact]
+        return (*of_contact, *(cast(Side, "strip") for _ in self.strip))
+
+    @cached_property
+    def rows(self) -> tuple[Mapping[str, int], ...]:
+        """The rows of all states at the contact's nodes by name, as the rate of each knows them."""
+        contact = {name: row for row, name in enumerate(self.contact)}
+        strip = {name: row for row, name in enumerate(self.strip, len(contact))}
+        punch_knows, strip_knows = {**strip, **contact}, {**contact, **strip}
+        return tuple(strip_knows if body == "strip" else punch_knows for body in self.bodies)
+
+    @cached_property
+    def of_wear(self) -> bool:
+        """Whether a rate asks for what is worn."""
+        return any(WEAR in state.of for state in self.states)
+
+    @cached_property
+    def filling(self) -> bool:
+        """Whether a state fills a part of the gap."""
+        return bool(self.fills.any())
+
     def known(self, values: Array) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return the states (Q, n) at the contact's nodes by name, as laws of punch and strip know them."""
         q = len(self.contact)
@@ -115,9 +144,16 @@ class Memory:
 
     def bounded(self, held: Held) -> Held:
         """Return states within their bounds."""
+        if not self._bounded:
+            return held
         least, most = self._bounds
         contact = np.minimum(np.maximum(held.contact, least.contact), most.contact)
         return Held(contact, np.minimum(np.maximum(held.strip, least.strip), most.strip))
+
+    @cached_property
+    def _bounded(self) -> bool:
+        """Whether a state has bounds."""
+        return any(state.least > -np.inf or state.most < np.inf for state in self.states)
 
     @cached_property
     def _bounds(self) -> tuple[Held, Held]:
@@ -354,19 +390,13 @@ class Evolution:
 
     def _under(self, k: int) -> _Rates:
         """Return the rates at the contact's nodes in a phase."""
-        memory, wears = self.memory, any(WEAR in state.of for state in self.memory.states)
-        conditions = self.conditions[k]
-        of_contact: list[Side] = ["punch" if name in memory.of_punch else "mean" for name in memory.contact]
-        bodies = [*of_contact, *(cast(Side, "strip") for _ in memory.strip)]
-        without = {body: conditions.of(body) for body in set(bodies)}
+        memory, conditions = self.memory, self.conditions[k]
 
-        def known(values: Array) -> list[Mapping[str, Array]]:
-            punch, strip = states = memory.known(values)
-            worn = {WEAR: self.worn(k, replace(conditions, states=states))} if wears else {}
-            views = {body: {**own, **(strip if body == "strip" else punch), **worn} for body, own in without.items()}
-            return [views[body] for body in bodies]
+        def worn(values: Array) -> Array:
+            return self.worn(k, replace(conditions, states=memory.known(values)))
 
-        return _Rates(list(zip(memory.names, memory.states, strict=True)), known)
+        without = [conditions.of(body) for body in memory.bodies]
+        return _Rates.of(memory.named, memory.rows, without, conditions.shape, worn if memory.of_wear else None)
 
     def _beside(self, k: int) -> _Rates:
         """Return the rates of the strip's states where nothing presses in a phase."""
@@ -387,12 +417,9 @@ class Evolution:
             **{axis: np.asarray(own) for axis, own in zip("xyz", x.T, strict=True)},
             **dict.fromkeys(memory.contact, none),
         }
-
-        def known(values: Array) -> list[Mapping[str, Array]]:
-            own = {name: np.asarray(row) for name, row in zip(memory.strip, values, strict=True)}
-            return [{**now, **own}] * len(memory.strip)
-
-        return _Rates(list(memory.strip.items()), known)
+        rows = {name: row for row, name in enumerate(memory.strip)}
+        many = len(memory.strip)
+        return _Rates.of(tuple(memory.strip.items()), [rows] * many, [now] * many, (n,), None)
 
     def _over(self, start: Array, tau: float, rates: _Rates) -> tuple[Array, Array, Array]:
         """Return states (Q, n) in the middle and at the end of a time, and the integral of J over it (n, Q, Q)."""
@@ -415,14 +442,15 @@ class Evolution:
                 if 2 * (part + 1) == parts:
                     middle = now
             missing, end = now - end, now
-            if (_most(missing) <= AGREE * (_most(end) + _most(end - start))).all():
+            apart, whole, gone = _most(np.array([missing, end, end - start]))
+            if (apart <= AGREE * (whole + gone)).all():
                 return middle, end + missing / 3, z
         raise ConvergenceError(f"{self._told()} change too fast within a half-cycle: expected rates that are smoother")
 
 
 def _most(values: Array) -> Array:
-    """Return the largest of each row without its sign (Q,)."""
-    return np.asarray(np.maximum.reduce(np.abs(values), axis=1, initial=0.0))
+    """Return the largest of each row without its sign (...,)."""
+    return np.asarray(np.maximum.reduce(np.abs(values), axis=-1, initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -431,23 +459,53 @@ class _Rates:
 
     Attributes:
         states: By their names, Q of them.
-        known: Returns what each rate may depend on, at states (Q, n).
+        given: What each rate asks for of variables that stay (n,), by name.
+        rows: What each rate asks for of the states, by name: their rows.
+        asked: What each rate asks for.
+        worn: What both bodies lose at states (n,), mm/s; None where no rate asks for it.
     """
 
     states: Sequence[tuple[str, State]]
-    known: Callable[[Array], Sequence[Mapping[str, Array]]]
+    given: Sequence[Mapping[str, Array]]
+    rows: Sequence[Mapping[str, int]]
+    asked: Sequence[frozenset[str]]
+    worn: Callable[[Array], Array] | None
 
-    @cached_property
-    def _asked(self) -> list[frozenset[str]]:
-        """What each rate may ask for."""
-        return [frozenset((*one.of, name)) for name, one in self.states]
+    @classmethod
+    def of(
+        cls,
+        states: Sequence[tuple[str, State]],
+        rows: Sequence[Mapping[str, int]],
+        variables: Sequence[Mapping[str, Array]],
+        shape: tuple[int, ...],
+        worn: Callable[[Array], Array] | None,
+    ) -> _Rates:
+        """Return rates whose states have these rows and whose variables, of each, are these at nodes."""
+        asked = [frozenset((*one.of, name)) for name, one in states]
+        moving = () if worn is None else (WEAR,)
+        given = [
+            {
+                name: now[name] if now[name].shape == shape else np.full(shape, now[name])
+                for name in own
+                if name not in at and name not in moving
+            }
+            for own, at, now in zip(asked, rows, variables, strict=True)
+        ]
+        own_rows = [{name: row for name, row in at.items() if name in own} for own, at in zip(asked, rows, strict=True)]
+        return cls(states, given, own_rows, asked, worn)
+
+    def known(self, values: Array) -> list[Mapping[str, Array]]:
+        """Return what each rate may depend on, at states (Q, n)."""
+        worn = {} if self.worn is None else {WEAR: self.worn(values)}
+        pairs = zip(self.given, self.rows, strict=True)
+        return [{**own, **{name: values[row] for name, row in at.items()}, **worn} for own, at in pairs]
 
     def __call__(self, values: Array) -> Array:
         """Return the rates (Q, n) at states (Q, n)."""
-        known, shape = self.known(values), values.shape[1:]
+        shape = values.shape[1:]
         rows = [
             evaluate_of_state(name, one.rate, asked, now, shape)
-            for (name, one), asked, now in zip(self.states, self._asked, known, strict=True)
+            for (name, one), asked, now in zip(self.states, self.asked, self.known(values), strict=True)
         ]
         return rows[0][None] if len(rows) == 1 else np.array(rows).reshape(values.shape)
 
@@ -457,10 +515,12 @@ class _Rates:
         found = np.zeros((n, q, q))
         for j, (other, state) in enumerate(self.states):
             asked = [i for i, (name, one) in enumerate(self.states) if _feels(name, one, other)]
-            size = NUDGE * (np.abs(values[j]) + tau * np.abs(rate[j]))
-            if not asked or not size.any():
+            if not asked:
                 continue
+            size = NUDGE * (np.abs(values[j]) + tau * np.abs(rate[j]))
             if not size.all():
+                if not size.any():
+                    continue
                 size = np.where(size > 0, size, size.max())
             if state.most < np.inf:
                 size = np.where(values[j] + size > state.most, -size, size)

@@ -91,7 +91,7 @@ class LayerEvolution:
     def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array | None:
         """Return the gap that the states of laws fill more (n,), mm, as `worn`; None where they fill none."""
         memory = self.layers.memory
-        if self.evolution is None or memory is None or not memory.fills.any():
+        if self.evolution is None or memory is None or not memory.filling:
             return None
         return memory.fills @ self._evolved(pressure, before, cycles).contact
 
@@ -325,4 +325,4 @@ class LayerStep:
     def _fills(self) -> bool:
         """Whether states of laws fill a part of the gap."""
         memory = self.passing.layers.memory
-        return memory is not None and bool(memory.fills.any())
+        return memory is not None and memory.filling

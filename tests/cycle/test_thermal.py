@@ -110,8 +110,10 @@ def test_order_in_time_steps(assembled: Assemble) -> None:
     assert errors[0] < 0.01 * np.abs(ends[3]).max()
 
 
-@pytest.mark.parametrize("half_cycles", [400, 2000])
-@pytest.mark.parametrize("settings", [("heat.partition=0.1",), ("heat.partition=0.2", "heat.conducting=nominal")])
+@pytest.mark.parametrize(
+    ("settings", "half_cycles"),
+    [(("heat.partition=0.1",), 2000), (("heat.partition=0.2", "heat.conducting=nominal"), 400)],
+)
 def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_cycles: int) -> None:
     """Where the feedback is stable, jumps end where the march ends, and nearer with a smaller tolerance.
 
@@ -181,18 +183,17 @@ def test_open_nodes_conduct_in_no_jump(assembled: Assemble, monkeypatch: pytest.
     assert max(ends) < 1e-5
 
 
-@pytest.mark.parametrize("coefficient", [4e-7, 4e-6])
-def test_march_tends_to_the_steady_state(assembled: Assemble, coefficient: float) -> None:
+def test_march_tends_to_the_steady_state(assembled: Assemble) -> None:
     """Where the feedback is stable a march and the direct solve agree, up to the wear between two half-cycles.
 
     Then the run repeats: even and odd half-cycles each keep their pressures and temperatures (Fig. 8d), and
     the mean flux is the same in both directions (31).
     """
-    system = assembled("example1-heat", *COARSE, "heat.partition=0.2", f"wear.punch.coefficient={coefficient}")
+    system = assembled("example1-heat", *COARSE, "heat.partition=0.2", "wear.punch.coefficient=4e-7")
     state = steady(system)
     assert growth_rate(system, state.phase_pressure) < 0
     *_, last = march(system, 3000, implicit=True)
-    step = 0.01 * coefficient / 4e-7  # what the wear of a half-cycle does to the pressure
+    step = 0.01  # what the wear of a half-cycle does to the pressure
     np.testing.assert_allclose(last.pressure[-2:], state.pressure, rtol=0, atol=step * MEAN)
     assert state.heat is not None
     assert last.heat is not None

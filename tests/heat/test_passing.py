@@ -29,7 +29,7 @@ def _repeating(system: Tribosystem) -> np.ndarray:
     return heat.exchange.contact_temperatures(heat.exchange.at(end.state(pressure)))[1]
 
 
-@pytest.mark.parametrize("strokes", [0.1, 1.0, 3.0])
+@pytest.mark.parametrize("strokes", [0.1, 3.0])
 def test_source_to_and_fro(strokes: float) -> None:
     """At any stroke, in widths of the contact, every node of it but the outermost is right to 1 % by default."""
     amplitude = strokes * WIDTH / 2

@@ -359,7 +359,8 @@ class Coupled:
     ) -> None:
         """Take the coefficients at these pressures and, where there are any, temperatures, depths and debris."""
         system = self.system
-        done, shear = None if passing is None else passing.half_cycles, system.ways.shear(np.asarray(pressure))
+        pressure = np.maximum(pressure, 0.0)  # a combination of some may lie below
+        done, shear = None if passing is None else passing.half_cycles, system.ways.shear(pressure)
         conditions = [
             system.conditions(
                 k,

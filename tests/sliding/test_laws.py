@@ -242,6 +242,25 @@ def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:
         Model(system.case).steady({})
 
 
+def test_laws_are_asked_at_pressures_alone() -> None:
+    """In jumps of a contact that grows combinations of pressures had lain below zero, where a law may mean nothing."""
+    asked: list[float] = []
+
+    def law(now: dict[str, Any]) -> Any:
+        asked.append(float(now["p"].min()))
+        return 2e-8 * (1 + np.exp(-now["p"] / 30))
+
+    fenwear.register_law("mine", law, of=["p"])
+    try:
+        system = assemble(load_case("fretting", ["wear.punch.coefficient={law='mine', unit='1/MPa'}"]))
+        (*_, jumped), (*_, marched) = jump(system, 200, tolerance=0.02), march(system, 200)
+    finally:
+        own_laws.forget_laws()
+    assert min(asked) == 0
+    depth = marched.end.worn.punch
+    np.testing.assert_allclose(jumped.end.worn.punch, depth, rtol=0, atol=0.01 * depth.max())
+
+
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [

@@ -85,10 +85,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
             PHYSICS,
             "`grid.across` with topography: a coarser grid has no place for its heights",
         ),
-        "a body that creeps remembers": (
-            OPEN,
-            "`grid.across` with bodies that creep: tractions of the past would have to be kept, too",
-        ),
         ".fix.{}: expected": (PHYSICS, "supports along axes that a model does not have"),
         "components ({})": (PHYSICS, "vectors along axes that a model does not have"),
         "[0, 1, 0], out of the plane": (PHYSICS, "turning about another axis than a plane model's"),

@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.contact_setup import ContactSetup
-from fenwear.assembly.creeping import BODIES, LAYER, CreepingBody, CreepingLayer, Member, both
+from fenwear.assembly.creeping import BODIES, LAYER, CreepingBody, CreepingForces, CreepingLayer, Member, both
 from fenwear.bodies.creep import Retardation, RetardedCycle
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
@@ -37,14 +38,14 @@ class Creep:
         members: The bodies and the layer that creep.
         durations: Of the phases of the motion (m,), s.
         interfaces: What the surfaces answer at once in each phase.
-        moved: Displacement of punch and strip by moved supports alone (q, d), mm.
+        moved: Displacement of punch and strip by moved supports alone in each phase (q, d), mm.
         middle: A phase in the middle of a half-cycle.
     """
 
     members: tuple[Member, ...]
     durations: Array
     interfaces: tuple[Interface, ...]
-    moved: tuple[Array, Array]
+    moved: tuple[tuple[Array, Array], ...]
     middle: int = 0
 
     @cached_property
@@ -88,6 +89,11 @@ class Creep:
     def _each(self, crept: Array) -> list[tuple[Member, Array]]:
         return list(zip(self.members, self.parted(crept), strict=True))
 
+    def from_other(self, other: Creep, crept: Array, nodes: NDArray[np.int64]) -> Array:
+        """Return a state of those on another contact grid, whose `nodes` (n,) those here were, or none."""
+        of_each = zip(self.members, other.members, other.parted(crept), strict=True)
+        return np.concatenate([member.from_other(before, y, nodes).ravel() for member, before, y in of_each])
+
     @property
     def _nodes(self) -> int:
         return len(self.interfaces[0].pair.weights)
@@ -103,7 +109,7 @@ class Creep:
             times = self._factors(phase)
             alike = (id(own), *times)
             if alike not in known:
-                known[alike] = self._scaled(own, times)
+                known[alike] = self._scaled(own, times, self.moved[phase])
             found.append(known[alike])
         return tuple(found)
 
@@ -117,8 +123,8 @@ class Creep:
         factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
         return tuple(float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER))
 
-    def _scaled(self, own: Interface, times: Sequence[float]) -> Interface:
-        bodies = zip(both(own), times[:2], self.moved, strict=True)
+    def _scaled(self, own: Interface, times: Sequence[float], by_supports: tuple[Array, Array]) -> Interface:
+        bodies = zip(both(own), times[:2], by_supports, strict=True)
         punch, strip = (scaled(body, factor, moved) for body, factor, moved in bodies)
         layer = None if own.layer is None else times[2] * own.layer
         return replace(own, punch=punch, strip=strip, layer=layer, like=None)
@@ -225,9 +231,8 @@ class Creep:
         found = np.zeros((m, n, m, n))
         for member, own in zip(self.members, shares, strict=True):
             for i in range(m):
-                answer = member.matrix(i, ratios[i])
                 for phase in range(m):
-                    found[phase, :, i] += own[phase, i] * member.opened(phase, answer)
+                    found[phase, :, i] += own[phase, i] * member.coupled(phase, i, ratios[i])
         self._couplings.append((list(shares), list(ratios), found))
         del self._couplings[:-KEPT]
         return found
@@ -294,15 +299,24 @@ def creep_of(
     laws = [None if body.creep is None else Retardation.of(body.creep) for body in bodies]
     if given is None and laws == [None, None]:
         return None
-    moved = [
-        operator.under(body.with_loads(())).by_load if law is not None and body.moved else 0.0 * operator.by_load
-        for operator, body, law in zip(operators, bodies, laws, strict=True)
-    ]
+
+    def by_supports(which: int, operator: SurfaceOperator) -> Array:
+        body = bodies[which]
+        creeps = laws[which] is not None and body.moved
+        return operator.under(body.with_loads(())).by_load if creeps else 0.0 * operator.by_load
+
+    moved = by_supports(0, operators[0]), by_supports(1, operators[1])
     faces = tuple(on_material(phase) for phase in range(len(interfaces)))
     members: list[Member] = [
-        CreepingBody(which, law, faces, moved[which]) for which, law in enumerate(laws) if law is not None
+        (CreepingBody if bodies[which].reach is None else CreepingForces)(which, law, faces, moved[which])
+        for which, law in enumerate(laws)
+        if law is not None
     ]
     if given is not None and placed.layers.winkler is not None:
         members.append(CreepingLayer(Retardation.of(given), placed.layers.winkler))
     durations = np.array([phase.duration for phase in placed.motion.phases])
-    return Creep(tuple(members), durations, interfaces, (moved[0], moved[1]), placed.motion.positions // 2)
+    found = [  # on a grid the strip answers opposite the punch in each of its places
+        moved if face is own else (moved[0], by_supports(1, own.strip))
+        for face, own in zip(faces, interfaces, strict=True)
+    ]
+    return Creep(tuple(members), durations, interfaces, tuple(found), placed.motion.positions // 2)

@@ -7,9 +7,11 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.creep import Retardation
+from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.interface import Interface
 
@@ -50,6 +52,18 @@ class Member(Protocol):
 
     def opened(self, phase: int, values: Array) -> Array:
         """Return the gap (n, ...) that displacements (size, ...) open in a phase."""
+
+    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
+        """Return the gap of a phase (n, n) that unit pressures of another one, with their friction, displace open."""
+
+    def from_other(self, other: Member, states: Array, nodes: NDArray[np.int64]) -> Array:
+        """Return states (terms, size) here of those of the same on another contact grid.
+
+        Args:
+            other: The same there.
+            states: Its own (terms, size of other).
+            nodes: The contact node there of each one here (n,), -1 for none.
+        """
 
 
 @dataclass(frozen=True)
@@ -112,8 +126,8 @@ class CreepingBody:
             found = self.matrix(phase, ratio) @ pressure
         else:
             traction = (face.pair.normal + ratio) * (face.pair.weights * pressure)[:, None]
-            found = face.displaced(traction)[self.which].ravel()
-        return np.asarray(found + load * self._loaded[phase])
+            found = self._answer(face, traction)
+        return np.asarray(found + load * self._by_load(phase))
 
     def matrix(self, phase: int, ratio: Array) -> Array:
         """Return v by unit pressures with their friction (size, n), mm/MPa."""
@@ -122,8 +136,16 @@ class CreepingBody:
             face = self.faces[phase]
             forces = (face.pair.normal + ratio) * face.pair.weights[:, None]
             each = np.einsum("id,ij->idj", forces, np.eye(len(forces)))
-            known = self._known[phase] = (ratio, face.displaced(each)[self.which].reshape(self.size, -1))
+            known = self._known[phase] = (ratio, self._answer(face, each))
         return known[1]
+
+    def _answer(self, face: Interface, forces: Array) -> Array:
+        """Return v (size, ...) by forces on the punch (n, d, ...)."""
+        return face.displaced(forces)[self.which].reshape(self.size, *forces.shape[2:])
+
+    def _by_load(self, phase: int) -> Array:
+        """Return v (size,) by the loads of a phase."""
+        return self._loaded[phase]
 
     def opened(self, phase: int, values: Array) -> Array:
         """Return the gap (n, ...) that displacements open in a phase."""
@@ -132,6 +154,78 @@ class CreepingBody:
         parts = [np.zeros((*body.directions.shape[::2], *values.shape[1:])) for body in both(face)]
         parts[self.which] = own
         return face.opened(*parts)[:, 0]
+
+    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
+        """Return the gap of a phase (n, n) by unit pressures of another one."""
+        return self.opened(phase, self.matrix(other, ratio))
+
+    def from_other(self, _other: Member, states: Array, _nodes: NDArray[np.int64]) -> Array:
+        """Return states (terms, size) as they are: its grid stays."""
+        return states
+
+
+@dataclass(frozen=True)
+class CreepingForces(CreepingBody):
+    """A body that creeps below a grid that grows: its state are the forces f behind it, and what loads displace.
+
+    Displacements of places that the grid comes to later were not followed. But v = G f + u, and G does not change: as v
+    is retarded, f and u are, and y is G f + u of theirs. On another grid forces keep their sum and moment.
+    """
+
+    @property
+    def _forces(self) -> tuple[int, int]:
+        q, d, _ = self._operator(0).directions.shape
+        return q, d
+
+    @property
+    def size(self) -> int:
+        """Of forces, and of what loads displace."""
+        return int(np.prod(self._forces)) + super().size
+
+    def _by_load(self, phase: int) -> Array:
+        return np.concatenate([np.zeros(int(np.prod(self._forces))), self._loaded[phase]])
+
+    def _answer(self, face: Interface, forces: Array) -> Array:
+        rest = forces.shape[2:]
+        pushed = face.pushed(forces)[self.which].reshape(-1, *rest)
+        return np.concatenate([pushed, np.zeros((super().size, *rest))])
+
+    def opened(self, phase: int, values: Array) -> Array:
+        """Return the gap (n, ...) that forces and loads open in a phase."""
+        forces, by_loads = np.split(values, [-super().size])
+        displaced = self._operator(phase).apply(forces.reshape(*self._forces, *values.shape[1:]))
+        return super().opened(phase, displaced.reshape(by_loads.shape) + by_loads)
+
+    @cached_property
+    def _displaced(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
+        """Return the gap of a phase (n, n) by unit pressures of another one, whose displacements are kept."""
+        known = self._displaced.get(other)
+        if known is None or known[0] is not ratio:
+            matrix = self.matrix(other, ratio)
+            forces = matrix[: -super().size].reshape(*self._forces, -1)
+            moved = self._operator(other).apply(forces).reshape(-1, matrix.shape[1])
+            known = self._displaced[other] = (ratio, moved)
+        return super().opened(phase, known[1])
+
+    @property
+    def _grid(self) -> RegularGrid:
+        face = self.faces[0]
+        grid = (face.pair.strip if self.which and face.strip_moves else face.pair.punch).grid
+        assert grid is not None
+        return grid
+
+    def from_other(self, other: Member, states: Array, _nodes: NDArray[np.int64]) -> Array:
+        """Return states (terms, size) of those on another grid; what loads displaced, as the loads of phases do."""
+        assert isinstance(other, CreepingForces)
+        forces, by_loads = np.split(states, [-len(other._loaded[0])], axis=1)
+        shares, (q, d) = self._grid.sharing(other._grid), other._forces
+        here = [(shares @ one.reshape(q, d)).ravel() for one in forces]
+        there, loads = (np.stack(own._loaded, axis=1) for own in (other, self))
+        factors = np.linalg.lstsq(there, by_loads.T, rcond=None)[0]
+        return np.concatenate([np.array(here), (loads @ factors).T], axis=1)
 
 
 @dataclass(frozen=True)
@@ -164,6 +258,14 @@ class CreepingLayer:
     def opened(self, _phase: int, values: Array) -> Array:
         """Return the gap that closures open: as much."""
         return values
+
+    def coupled(self, _phase: int, other: int, ratio: Array) -> Array:
+        """Return the gap of a phase (n, n) by unit pressures of another one."""
+        return self.matrix(other, ratio)
+
+    def from_other(self, _other: Member, states: Array, nodes: NDArray[np.int64]) -> Array:
+        """Return closures (terms, n) where they were, elsewhere none."""
+        return np.where(nodes >= 0, states[:, np.maximum(nodes, 0)], 0.0)
 
 
 def both(face: Interface) -> tuple[SurfaceOperator, SurfaceOperator]:

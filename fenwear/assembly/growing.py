@@ -137,12 +137,11 @@ def at_rim(system: ContactSetup, touched: Mask) -> bool:
     return bool((((low == 0) & (first < 0)) | ((high == np.array(grid.counts) - 1) & (last >= grid.counts))).any())
 
 
-def carried(worn: WornDepths, before: ContactSetup, after: ContactSetup) -> WornDepths:
+def carried(worn: WornDepths, before: Tribosystem, after: Tribosystem) -> WornDepths:
     """Return depths and states on another grid: where it has the same nodes theirs, elsewhere those of the start."""
     (on_punch, on_strip), start = node_maps(before, after), after.unworn()
-    if worn.crept.size:  # of what lies between: bodies that creep have grids that stay
-        of_layer = worn.crept.reshape(-1, len(before.pair.weights))
-        start = replace(start, crept=on_nodes(of_layer, on_punch, np.zeros((len(of_layer), len(on_punch)))).ravel())
+    if after.creep is not None and before.creep is not None:
+        start = replace(start, crept=after.creep.from_other(before.creep, worn.crept, on_punch))
     return replace(
         start,
         punch=kept_volume(worn.punch, on_punch, before.pair.weights, after.pair.weights),

@@ -134,6 +134,19 @@ class RegularGrid:
         corners = (number[:-1, :-1], number[1:, :-1], number[:-1, 1:], number[1:, 1:])
         return np.stack(corners, axis=-1).reshape(-1, 4)
 
+    def sharing(self, other: RegularGrid) -> csr_array:
+        """Return what puts forces at another grid's nodes on those here (n, n_other), their sum and moment kept.
+
+        What lies beyond this grid comes to its rim, without its moment.
+        """
+        points = [
+            np.clip((low + step * np.arange(count) - first) / own, 0, last - 1)
+            for low, step, count, first, own, last in zip(
+                other.corner, other.spacing, other.counts, self.corner, self.spacing, self.counts, strict=True
+            )
+        ]
+        return csr_array(self._linear(points).T)
+
     def reading(self, to: RegularGrid, shift: Array) -> csr_array | None:
         """Return what takes values here to the nodes of another grid (n_to, n), linear between nodes.
 
@@ -144,17 +157,25 @@ class RegularGrid:
         Returns:
             None where the other one reaches beyond this one.
         """
+        points = [
+            (to.corner[k] - self.corner[k] - shift[k] + to.spacing[k] * np.arange(to.counts[k])) / step
+            for k, step in enumerate(self.spacing)
+        ]
+        reach = zip(points, self.counts, strict=True)
+        if any(at.min() < -SNAP * count or at.max() > count - 1 + SNAP * count for at, count in reach):
+            return None
+        return self._linear(points)
+
+    def _linear(self, points: list[Array]) -> csr_array:
+        """Return what reads values at the crossings of points on each axis, in spacings, linear between nodes."""
         whole = identity(1, format="csr")
-        for k, step in enumerate(self.spacing):
-            at = (to.corner[k] - self.corner[k] - shift[k] + to.spacing[k] * np.arange(to.counts[k])) / step
+        for at, count in zip(points, self.counts, strict=True):
             near = np.rint(at)
-            at = np.where(np.abs(at - near) < SNAP * self.counts[k], near, at)
-            if at.min() < 0 or at.max() > self.counts[k] - 1:
-                return None
-            low = np.minimum(np.floor(at).astype(np.int64), max(self.counts[k] - 2, 0))
-            share, rows = at - low, np.arange(to.counts[k])
+            snapped = np.where(np.abs(at - near) < SNAP * count, near, at)
+            low = np.minimum(np.floor(snapped).astype(np.int64), max(count - 2, 0))
+            share, rows = snapped - low, np.arange(len(at))
             entries = (np.concatenate([1 - share, share]), (np.tile(rows, 2), np.concatenate([low, low + 1])))
-            one = csr_array(entries, shape=(to.counts[k], self.counts[k]))
+            one = csr_array(entries, shape=(len(at), count))
             one.eliminate_zeros()
             whole = kron(whole, one, format="csr")
         return csr_array(whole)

@@ -147,11 +147,6 @@ class Case(Part):
                 rough
             ),
         }
-        creeps = [f"{name}.creep" for name, body in self.bodies.items() if body.creep is not None]
-        against[
-            f"with {' and '.join(creeps)}: a body that creeps remembers how far each place of its surface has been "
-            "displaced, and places that a grid comes to later were not followed"
-        ] = bool(creeps)
         return [f"grid.across: expected grid.nodes, of a grid that stays, {why}" for why, so in against.items() if so]
 
     def _kind_problems(self) -> list[str]:

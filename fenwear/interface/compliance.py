@@ -119,12 +119,17 @@ class Interface:
 
         Displacements of punch and strip (q, a, ...), mm, along the directions of their operators.
         """
+        on_punch, on_strip = self.pushed(forces)
+        return self.punch.apply(on_punch), self.strip.apply(on_strip)
+
+    def pushed(self, forces: Array) -> tuple[Array, Array]:
+        """Return forces on the punch (n, d, ...) and their reactions at the patterns of each operator (q, d, ...)."""
         n, d, *rest = forces.shape
         back = self.pair.placement.back(np.moveaxis(forces, 1, -1).reshape(-1, d)).reshape(n, *rest, d)
         back = np.moveaxis(back, -1, 1)
         if self.strip_moves:
             back = (self.pair.transfer.T @ back.reshape(n, -1)).reshape(-1, *back.shape[1:])
-        return self.punch.apply(forces), -self.strip.apply(back)
+        return forces, -back
 
     def opened(self, on_punch: Array, on_strip: Array) -> Array:
         """Return the relative displacements (n, a, ...) where the bodies' patterns are displaced as by `displaced`."""

@@ -16,11 +16,12 @@ import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.bodies.creep import Retardation, RetardedCycle
+from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
 from fenwear.stick.position import Position
 from fenwear.stick.state import StickState
 
-PARTS = ("punch", "strip", "layer")
+PARTS, BODIES = ("punch", "strip", "layer"), 2
 ACCURATE, ROBUST = 1 - np.sqrt(0.5), 1 + np.sqrt(0.5)  # g of the two methods that are stable to infinity
 Displaced = tuple[Array, Array, Array]  # the punch (n, d), the strip at its operator's nodes (q, d), the layer (n,), mm
 
@@ -32,6 +33,8 @@ class StickCreep:
     Attributes:
         laws: Of each part; None where it does not creep.
         shapes: Of the displacement of each.
+        behind: Operators of punch and strip below a grid that grows, whose states are forces and what loads displace,
+            as those of `fenwear.assembly.creeping.CreepingForces`; None where they are displacements.
         moved: Displacement of punch and strip by moved supports alone, mm.
         closure: Of the layer by unit pressures at once (n,), mm/MPa.
     """
@@ -40,6 +43,7 @@ class StickCreep:
     shapes: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
     moved: tuple[Array, Array]
     closure: Array
+    behind: tuple[SurfaceOperator, SurfaceOperator] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_kept", {})
@@ -54,31 +58,57 @@ class StickCreep:
         """Return the state at the start: nothing has crept."""
         return np.zeros(sum(self._sizes()))
 
+    @property
+    def _numbers(self) -> list[int]:
+        """Of each y."""
+        punch, strip, layer = (int(np.prod(shape)) for shape in self.shapes)
+        return [punch, strip, layer] if self.behind is None else [2 * punch, 2 * strip, layer]
+
     def _sizes(self) -> list[int]:
         return [
-            0 if law is None else len(law.times) * int(np.prod(shape))
-            for law, shape in zip(self.laws, self.shapes, strict=True)
+            0 if law is None else len(law.times) * count for law, count in zip(self.laws, self._numbers, strict=True)
         ]
 
     def parted(self, state: Array) -> list[Array]:
         """Return the y of each part (terms, size); without terms where it does not creep."""
         parts = np.split(state, np.cumsum(self._sizes())[:-1])
-        return [part.reshape(-1, int(np.prod(shape))) for part, shape in zip(parts, self.shapes, strict=True)]
+        return [part.reshape(-1, count) for part, count in zip(parts, self._numbers, strict=True)]
+
+    def displacement(self, part: int, y: Array) -> Array:
+        """Return the displacement of a part in a state y (size,), mm."""
+        shape = self.shapes[part]
+        if self.behind is None or part == BODIES:
+            return y.reshape(shape)
+        forces, by_loads = y.reshape(2, *shape)
+        return np.asarray(self.behind[part].apply(forces) + by_loads)
+
+    def elastic(self, forces: Array, moved: Array, by_loads: Array | float) -> Array:
+        """Return v of a body (size,), as its states are.
+
+        Args:
+            forces: That press it (q, d), N/mm in the plane, N.
+            moved: Their displacement (q, d), mm.
+            by_loads: That of the loads, mm.
+        """
+        if self.behind is None:
+            return np.asarray(moved + by_loads).ravel()
+        return np.concatenate([forces.ravel(), np.broadcast_to(by_loads, forces.shape).ravel()])
 
     def displaced(self, state: Array, duration: float = 0.0) -> Displaced:
         """Return what a state moves, at the end of a step of this duration that it is the beginning of."""
         found = []
-        for law, y, shape in zip(self.laws, self.parted(state), self.shapes, strict=True):
+        for part, (law, y) in enumerate(zip(self.laws, self.parted(state), strict=True)):
             left = np.zeros(0) if law is None else law.compliances * np.exp(-duration / law.times)
-            found.append(np.asarray((left @ y).reshape(shape), dtype=np.float64))
+            moved = np.zeros(self.shapes[part]) if law is None else self.displacement(part, left @ y)
+            found.append(np.asarray(moved, dtype=np.float64))
         return found[0], found[1], found[2]
 
-    def after(self, state: Array, elastic: Displaced, duration: float) -> Array:
-        """Return the state after a step, in which forces displace elastically by v."""
+    def after(self, state: Array, elastic: Sequence[Array], duration: float) -> Array:
+        """Return the state after a step, in which each part has v (size,)."""
         found = []
         for law, y, v in zip(self.laws, self.parted(state), elastic, strict=True):
             taken = np.zeros(0) if law is None else -np.expm1(-duration / law.times)
-            found.append((y + taken[:, None] * (v.ravel() - y)).ravel())
+            found.append((y + taken[:, None] * (v - y)).ravel())
         return np.concatenate(found)
 
     def factors(self, duration: float) -> list[float]:
@@ -118,8 +148,8 @@ class StickCreep:
     def rate(self, begin: Array, end: Array, period: float) -> Array:
         """Return the rate by which the state changes with the cycles, from what one cycle did to it."""
         paces = [
-            np.repeat(period / law.times, int(np.prod(shape)))
-            for law, shape in zip(self.laws, self.shapes, strict=True)
+            np.repeat(period / law.times, count)
+            for law, count in zip(self.laws, self._numbers, strict=True)
             if law is not None
         ]
         return np.concatenate(paces) * (self.lasting(begin, end, period) - begin)
@@ -185,18 +215,20 @@ class CreepStep:
         ]
 
     def _displaced(self, part: int, pressure: Array) -> Array:
-        """Return what pressures (n,) displace of a part."""
-        if part == 2:
+        """Return v (size,) of a part by pressures (n,)."""
+        if part == BODIES:
             return self._creep.closure * pressure
         position, interface = self._position, self._position.interface
-        force = position.pair.normal * (position.pair.weights * pressure)[:, None]
-        if part == 0:
-            return interface.punch.apply(force)
-        return -interface.strip.apply(position.reading.T @ position.pair.placement.back(force))
+        force, operator = position.pair.normal * (position.pair.weights * pressure)[:, None], interface.punch
+        if part == 1:
+            force, operator = -(position.reading.T @ position.pair.placement.back(force)), interface.strip
+        moved = force if self._creep.behind is not None else operator.apply(force)
+        return self._creep.elastic(force, moved, 0.0)
 
-    def _opened(self, part: int, displacement: Array) -> Array:
-        """Return the gap (n,) that a displacement of a part opens."""
-        if part == 2:
+    def _opened(self, part: int, y: Array) -> Array:
+        """Return the gap (n,) that a state y (size,) of a part opens."""
+        displacement = self._creep.displacement(part, y)
+        if part == BODIES:
             return displacement
         if part == 1:
             displacement = -self._position.pair.placement.vectors(self._position.reading @ displacement)
@@ -209,22 +241,22 @@ class CreepStep:
             if law is None:
                 first.append(r)
                 continue
-            along = r if part == 2 else self._along(part, r)
+            along = r if part == BODIES else self._along(part, r)
             grown = 1 + law.compliances.sum()
             y = along / (1 + ACCURATE * pace)[:, None] + (r - along) / (1 + ROBUST * grown * pace)[:, None]
             first.append(y)
-            q += self._opened(part, (law.compliances @ y).reshape(creep.shapes[part]))
+            q += self._opened(part, law.compliances @ y)
         if self._answer is None:
             return np.concatenate([y.ravel() for y in first])
         taken = self._answer @ scipy.linalg.lu_solve(self._factor, q)
         for part, (law, pace) in enumerate(zip(creep.laws, self._paces, strict=True)):
             if law is not None:
                 share = ACCURATE * pace / (1 + ACCURATE * pace)
-                first[part] = first[part] - share[:, None] * self._displaced(part, taken).ravel()
+                first[part] = first[part] - share[:, None] * self._displaced(part, taken)
         return np.concatenate([y.ravel() for y in first])
 
     def _along(self, part: int, values: Array) -> Array:
-        """Return what of displacements (terms, size) of a body is along the normals."""
+        """Return what of states (terms, size) of a body is along the normals."""
         shape, normals = self._creep.shapes[part], self._normals[part]
         vectors = values.reshape(-1, *shape)
         return np.einsum("knd,nd,ne->kne", vectors, normals, normals).reshape(values.shape)

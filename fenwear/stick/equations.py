@@ -271,8 +271,12 @@ class Step:
         moved = found.moved or self._moved(f, found.jump)
         crept = self.before.crept
         if self.creep is not None and self.imposed.loaded.by_force is not None:
-            forced = self.imposed.loaded.by_force
-            elastic = forced[0] + moved.on_punch, forced[1] + moved.on_strip, self.creep.closure * pressure
+            (punch, strip), (push, back) = self.imposed.loaded.by_force, self._forces(f)
+            elastic = (
+                self.creep.elastic(push, moved.on_punch, punch),
+                self.creep.elastic(-back, moved.on_strip, strip),
+                self.creep.closure * pressure,
+            )
             crept = self.creep.after(crept, elastic, self.imposed.duration)
         return StickState(
             pressure,
@@ -301,10 +305,14 @@ class Step:
             jump: What they move the surfaces by (d n,); None where it is not known.
         """
         del jump
-        position, interface = self.position, self.interface
-        force = position.in_space(f * position.weights)
-        back = position.reading.T @ position.pair.placement.back(force)
+        (force, back), interface = self._forces(f), self.interface
         return SurfaceDisplacement(np.zeros(0), interface.punch.apply(force), -interface.strip.apply(back))
+
+    def _forces(self, f: Array) -> tuple[Array, Array]:
+        """Return the forces of tractions (d n,) on the punch (n, d), and against those on the strip (q, d)."""
+        position = self.position
+        force = position.in_space(f * position.weights)
+        return force, position.reading.T @ position.pair.placement.back(force)
 
 
 def _solved(A: Array, b: Array) -> tuple[Array, int]:

@@ -177,7 +177,8 @@ class StickInterface(OppositeBodies):
         ]
         closure = np.zeros(len(operators[0].by_load)) if self.layers.winkler is None else self.layers.winkler
         shapes = moved[0].shape, moved[1].shape, closure.shape
-        return StickCreep((laws[0], laws[1], laws[2]), shapes, (moved[0], moved[1]), closure)
+        behind = None if bodies[0].reach is None else operators
+        return StickCreep((laws[0], laws[1], laws[2]), shapes, (moved[0], moved[1]), closure, behind)
 
     @cached_property
     def bulk(self) -> Array:

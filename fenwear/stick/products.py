@@ -161,7 +161,7 @@ class GridStep(Step):
         on_punch = self.interface.punch.apply(position.in_space(f * position.weights))
         punch, strip, _ = (1.0, 1.0, 1.0) if self.creep is None else self.creep.factors(self.imposed.duration)
         on_strip = (punch * on_punch - position.in_space(bodies)) / strip  # the jump is that of bodies that creep
-        return SurfaceDisplacement(np.zeros(0), on_punch, on_strip)
+        return SurfaceDisplacement(np.zeros(0), on_punch, np.asarray(on_strip))
 
 
 @dataclass(frozen=True)

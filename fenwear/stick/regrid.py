@@ -53,6 +53,7 @@ def on_other_grid(
         on_punch=loaded.on_punch + interface.punch.apply(force),
         on_strip=loaded.on_strip + at.imposed.strain * interface.bulk - interface.strip.apply(back),
         trial=_along(contact.trial, nodes),
+        crept=worn.crept,
         beside=beside,
         flowed=None if contact.flowed is None else _at(contact.flowed, nodes),
     )

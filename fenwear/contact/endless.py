@@ -33,7 +33,7 @@ from fenwear.arrays import Array
 from fenwear.interface.convolution import Box, Convolution, back, forward, in_cache, over_period
 
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
-SAME = 1e-12  # of symbols
+SAME = 1e-12  # of symbols, and of modes
 MARGIN = 1.0  # of a box: the period of what is solved, which does not end
 
 Waves = NDArray[np.complexfloating[Any, Any]]
@@ -177,17 +177,20 @@ class Patch:
     Args:
         endless: The grid, with what wears on it.
         modes: H (m, r, ...) in the box, zero where no node is in contact and where a motion is not asked for.
-        balance: E (m, r, ...), likewise.
+        balance: E (m, r, ...), likewise; a number that it is times H.
 
     Raises:
         LinAlgError: the loads are not balanced by the nodes in contact.
     """
 
-    def __init__(self, endless: EndlessGrid, modes: Array, balance: Array) -> None:
+    def __init__(self, endless: EndlessGrid, modes: Array, balance: Array | float) -> None:
         self.endless = endless
         self._m, self._r = m, r = modes.shape[:2]
         self._moved = [endless.forward(modes[:, s]) for s in range(r)]
-        self._held = [endless.measure(endless.forward(balance[:, s])) for s in range(r)]
+        if isinstance(balance, float):
+            self._held = [endless.measure(balance * moved) for moved in self._moved]
+        else:
+            self._held = [endless.measure(endless.forward(balance[:, s])) for s in range(r)]
         schur = np.zeros((m, r, m, r))
         for s in range(r):
             for t in range(r):

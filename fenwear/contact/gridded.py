@@ -21,7 +21,7 @@ from scipy.sparse import csr_array, hstack, vstack
 
 from fenwear.arrays import Array
 from fenwear.contact.blocks import PhaseBlock
-from fenwear.contact.endless import EndlessGrid, Passing, Patch
+from fenwear.contact.endless import SAME, EndlessGrid, Passing, Patch
 from fenwear.contact.krylov import flexible
 from fenwear.contact.operators import Indices, Solve
 from fenwear.interface import ContactPair
@@ -126,6 +126,10 @@ class PhasesBox:
         self.products = OnBox(grid.of, box)
         self.modes = self._boxed(np.array([block.modes.T for block in grid.blocks]))  # (m, r, ...)
         self.balance = self._boxed(np.array([block.balance for block in grid.blocks]))
+        # Where weights are even, a balance is its motion times a number.
+        size = np.abs(self.balance).sum() / max(np.abs(self.modes).sum(), 1e-300)
+        apart = np.abs(self.balance - size * self.modes).max(initial=0.0)
+        self.even = size if apart <= SAME * np.abs(self.balance).max(initial=0.0) else None
 
     def multiply(self, p: Array, a: Array, by: Opened | None) -> tuple[Array, Array]:
         """Return the gaps (m, ...) of pressures and of rigid motions (m, r), and the forces (m, r) of pressures."""
@@ -147,23 +151,22 @@ class PhasesBox:
 
     @cached_property
     def _strip(self) -> tuple[csr_array, csr_array]:
-        """What all phases put on the strip, and what all read there, over the nodes of the box."""
-        nodes, pairs = self.box.nodes, self.grid.pairs
-        to = hstack([csr_array(pair.wear_projection)[:, nodes] for pair in pairs], format="csr")
-        back = vstack([csr_array(pair.wear_interpolation)[nodes] for pair in pairs], format="csr")
+        """What all phases put on the strip, and what all read there, over the places of the box."""
+        box, pairs = self.box, self.grid.pairs
+        nodes, size = len(box.nodes), int(np.prod(box.counts))
+        there = csr_array((np.ones(nodes), (np.arange(nodes), box.at)), shape=(nodes, size))
+        to = hstack([csr_array(pair.wear_projection)[:, box.nodes] @ there for pair in pairs], format="csr")
+        back = vstack([there.T @ csr_array(pair.wear_interpolation)[box.nodes] for pair in pairs], format="csr")
         return csr_array(to), csr_array(back)
 
     def opened(self, by: Opened, p: Array) -> Array:
         """Return what pressures in the box (m, ...) open besides the bodies, by slopes there."""
-        found: Array = np.zeros_like(p)
+        found: Array = np.zeros_like(p) if by.own is None else by.own * p
         if by.common is not None:
-            found += (by.common * p).sum(axis=0)
+            found += np.einsum("m...,m...->...", by.common, p)
         if by.strip is not None:
             to, back = self._strip
-            seen = back @ (to @ self.box.values(by.strip * p).ravel())
-            found.reshape(len(p), -1)[:, self.box.at] += seen.reshape(len(p), -1)
-        if by.own is not None:
-            found += by.own * p
+            found += (back @ (to @ (by.strip * p).ravel())).reshape(p.shape)
         return found
 
     def slopes(self, by: Opened) -> Opened:
@@ -335,7 +338,7 @@ class _Closed:
         if before is None:
             self._mean(slopes or Opened())
         free = rigid.reshape(*rigid.shape, *(1,) * len(on.box.counts)) * self.closed[:, None]
-        self.patch = Patch(on.endless, on.modes * free, on.balance * free)
+        self.patch = Patch(on.endless, on.modes * free, on.balance * free if on.even is None else on.even)
 
     def _mean(self, slopes: Opened) -> None:
         """Take what unit pressures open on average, on the endless grid."""

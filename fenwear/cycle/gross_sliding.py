@@ -126,7 +126,7 @@ class Jumps:
         while True:
             tried = min(length, left)
             try:
-                end, estimate = stepper.attempt(state, tried)
+                end, estimate, recorded = stepper.attempt(state, tried)
             except ConvergenceError:
                 if tried == 1:
                     raise
@@ -149,7 +149,6 @@ class Jumps:
                 length = max(length, tried + 1)
         number = state.half_cycle + tried * strokes
         after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
-        recorded = stepper.last_cycle(state, after, tried)
         if state.finer is not None:
             after = replace(after, finer=stepper.finer(state, state.finer, after, tried))
         return after, recorded

@@ -47,7 +47,6 @@ from fenwear.cycle.jump_error import ORDER, Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
-from fenwear.interface.pair import lagrange
 from fenwear.layers import Evolution
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
@@ -56,7 +55,7 @@ from fenwear.sliding.wear import NOTHING, WornDepths
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 PARTS = 8  # of a cycle that does not converge as a whole
-ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which a jump is solved whole, and in halves
+ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which the stages of a jump are solved, and its end
 LOOSEST = 5e-3  # tolerance that these are of: contact of a rough run, too, is told to fulfil its conditions
 
 # What is worn from depths on in so many cycles, and what they add to the totals, from what they add without coatings.
@@ -98,32 +97,43 @@ class _Moment:
 
 
 class _Trend:
-    """How contacts change over a jump that was made whole: where its halves look for theirs."""
+    """How contacts change over a jump, by what is solved of it so far: where the next ones are looked for.
+
+    Lines through two of them, as those near borders that move come and go: parabolas begin farther away.
+    """
 
     def __init__(self) -> None:
-        self._times: list[float] = []
-        self._contacts: list[ContactState] = []
+        self._contacts: dict[float, ContactState] = {}  # by their time, cycles since the begin of the jump
+
+    def copy(self) -> _Trend:
+        """Return one that goes its own way from here."""
+        found = _Trend()
+        found._contacts = dict(self._contacts)
+        return found
 
     def add(self, time: float, contact: ContactState | None) -> None:
-        """Take a contact at a time, cycles since the begin of the jump."""
+        """Take a contact at a time, cycles since the begin of the jump, if none is known there."""
         if contact is not None:
-            self._times.append(time)
-            self._contacts.append(contact)
+            self._contacts.setdefault(time, contact)
 
     def from_one(self, contact: ContactState | None, since: float, to: float) -> ContactState | None:
         """Return what a contact at one time will be near at another one."""
-        if contact is None or len(self._times) < 2:
+        if contact is None or len(self._contacts) < 2:
             return contact
-        shares = self._shares(to) - self._shares(since)
         pressure, rigid = contact.pressure.copy(), contact.rigid.copy()
-        for share, known in zip(shares, self._contacts, strict=True):
-            pressure += share * known.pressure
-            rigid += share * known.rigid
+        for time, sign in ((to, 1.0), (since, -1.0)):
+            for share, known in self._line(time):
+                pressure += sign * share * known.pressure
+                rigid += sign * share * known.rigid
         return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
 
-    def _shares(self, time: float) -> Array:
-        """Return the polynomials through the times, of Lagrange, at another one."""
-        return lagrange(np.array(self._times), np.array(time))
+    def _line(self, time: float) -> list[tuple[float, ContactState]]:
+        """Return the shares at a time of the two contacts next to it, and them; of one alone that is of that time."""
+        if time in self._contacts:
+            return [(1.0, self._contacts[time])]
+        one, other = sorted(self._contacts, key=lambda known: abs(known - time))[:2]
+        share = (time - one) / (other - one)
+        return [(1 - share, self._contacts[one]), (share, self._contacts[other])]
 
 
 class Stepper:
@@ -148,7 +158,6 @@ class Stepper:
         self._conductances: Array | None = None  # in it
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
-        self._trend = _Trend()  # of what was made last
         self._whole: tuple[RunState, _Trend, WornDepths | None] | None = (
             None  # the last attempt as one step: see `finer`
         )
@@ -160,32 +169,35 @@ class Stepper:
         """Return the unworn bodies at their initial temperature."""
         return beginning(self.system, None if self.coupled.heat is None else self.coupled.heat.exchange.initial())
 
-    def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate]:
-        """Return the state `cycles` cycles later, by two steps, and an estimate of its error.
+    def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate, list[HalfCycle]]:
+        """Return the state `cycles` cycles later, by two steps, an estimate of its error, and the last cycle.
 
         Raises:
             ConvergenceError: it did not converge; a single cycle not in smaller steps either.
         """
         try:
             known, self._half, self._whole = self._half, None, None
-            if known and known[0] is state and known[1] == cycles:
-                whole, trend = known[2:]
-            else:
-                self._solve_to(ROUGH)
-                whole, trend = self.step(state, cycles), self._trend
-            self._solve_to(FINE)
+            if known is None or known[0] is not state:
+                known = None
+            trend = _Trend() if known is None else known[3].copy()
             half = self.step(state, cycles / 2, near=trend)
-            self._half = (state, cycles / 2, half, self._trend)
-            comes = _comes(
-                state, half, whole
-            )  # then the last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2
+            self._half = (state, cycles / 2, half, trend.copy())
+            whole = None if known is None or known[1] != cycles else known[2]
+            comes = _comes(state, half, half)
+            if whole is None and not comes:  # else begun near the halves, whose steps are not as long
+                whole = self.step(state, cycles, near=trend.copy())
+            comes = comes or (whole is not None and _comes(state, half, whole))
             last = LAST * cycles if comes else 0.0
-            halves = self.step(half, cycles / 2 - last, cycles / 2, trend)
+            halves = self.step(half, cycles / 2 - last, cycles / 2, trend, ROUGH if comes else FINE)
             if comes:
-                halves = self._last_step(halves, last, cycles - last)
+                halves = self._last_step(halves, last, cycles - last, trend)
+            recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
+            if whole is None:
+                whole = self.step(state, cycles, near=trend.copy())
             estimate, bent = estimated(self.system, state, whole, halves), None
             if comes:
                 first, second = half.worn - state.worn, whole.worn - half.worn
+                # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
                 bent = (second - first).times(2 * LAST**2)
                 share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
                 estimate = replace(estimate, depth=max(estimate.depth, share))
@@ -193,7 +205,7 @@ class Stepper:
             if self._follows:
                 missed = self._missed(state, half, halves, cycles)
                 estimate = replace(estimate, depth=max(estimate.depth, missed))
-            return halves, estimate
+            return halves, estimate, recorded
         except ConvergenceError as error:
             if cycles > 1:
                 raise
@@ -202,7 +214,7 @@ class Stepper:
             except ConvergenceError:
                 raise error from None
             self.system.remedies.note(SMALLER_STEPS.format(PARTS))
-            return parts, Estimate(np.inf, np.inf, np.inf)
+            return parts, Estimate(np.inf, np.inf, np.inf), self._last_cycle(state, parts, cycles)
 
     def finer(self, state: RunState, fine: RunState, end: RunState, cycles: int) -> RunState:
         """Return where jumps of next to no length lead, from where they had led before the last attempt.
@@ -222,9 +234,8 @@ class Stepper:
         whole, trend, bent = self._whole
         moved = whole
         if fine is not state:
-            self._solve_to(ROUGH)
             try:
-                moved = self.step(replace(fine, half_cycle=state.half_cycle), cycles, near=trend)
+                moved = self.step(replace(fine, half_cycle=state.half_cycle), cycles, near=trend.copy())
             except ConvergenceError:  # it may lie where no contact is: then what was off stays
                 moved = self._apart(whole, fine, state, 1.0)
         halves = end if bent is None else replace(end, worn=end.worn - bent)
@@ -286,7 +297,7 @@ class Stepper:
     def steps(self, state: RunState, cycles: float, count: int) -> RunState:
         """Return the state `cycles` cycles later, by that many equal steps."""
         for number in range(count):
-            state = self.step(state, cycles / count, number * cycles / count)
+            state = self.step(state, cycles / count, number * cycles / count, digits=FINE)
         return state
 
     def _solve_to(self, share: float) -> None:
@@ -294,34 +305,41 @@ class Stepper:
         if isinstance(self.contact, CondensedContact):
             self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
 
-    def step(self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None) -> RunState:
+    def step(
+        self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None, digits: float = ROUGH
+    ) -> RunState:
         """Return the state `cycles` cycles later, by the two stages of one step.
 
         Args:
             state: Where it begins; its number of half-cycles is that of the jump's begin.
             cycles: Its length.
             since: Cycles from there to the begin of the step.
-            near: How contacts change, more or less; by default they are looked for where they were.
+            near: How contacts change, which takes those of the step, too; by default it begins with the step.
+            digits: Share of the tolerance that its last contact is solved to, where they cost.
         """
         share, near = GAMMA * cycles, near or _Trend()
-        self._trend = trend = _Trend()
+        self._solve_to(ROUGH)  # of a first stage its wear is all that stays
         begin, contact = self._moment(state), joined(state.contacts)
-        trend.add(since, contact)
+        near.add(since, contact)
         self._press(state.half_cycle, since + share)
         first = self._stage(begin, near.from_one(contact, since, since + share), share, cycles - share)
-        trend.add(since + share, first.contact)
+        near.add(since + share, first.contact)
         between = begin.after(first, cycles - share)
         self._press(state.half_cycle, since + cycles)
         start = near.from_one(first.contact, since + share, since + cycles)
+        self._solve_to(digits)
         last = self._stage(between, start, share)
-        trend.add(since + cycles, last.contact)
+        near.add(since + cycles, last.contact)
         return self._end(state, between, last, share)
 
-    def _last_step(self, state: RunState, cycles: float, since: float) -> RunState:
+    def _last_step(self, state: RunState, cycles: float, since: float, near: _Trend) -> RunState:
         """Return the state `cycles` cycles later, by one implicit Euler step; as `step`."""
-        begin = self._moment(state)
+        begin, contact = self._moment(state), joined(state.contacts)
+        self._solve_to(FINE)
         self._press(state.half_cycle, since + cycles)
-        return self._end(state, begin, self._stage(begin, joined(state.contacts), cycles), cycles)
+        last = self._stage(begin, near.from_one(contact, since, since + cycles), cycles)
+        near.add(since + cycles, last.contact)
+        return self._end(state, begin, last, cycles)
 
     def _moment(self, state: RunState) -> _Moment:
         heat, temperature = self.coupled.heat, None
@@ -443,9 +461,10 @@ class Stepper:
         """Return what each phase of a cycle adds at its pressure (m, n)."""
         return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
 
-    def last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
-        """Return the half-cycles of the last cycle of a jump."""
+    def _last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
+        """Return the half-cycles of the last cycle of a jump, whose end is what was solved last."""
         motion, found = self.system.motion, []
+        reached = before.half_cycle + cycles * motion.half_cycles
         contacts = [present(contact) for contact in after.contacts]
         heats = self._last_cycle_heat(after)
         # Half-cycles after one have worn what is missing at its end.
@@ -462,10 +481,10 @@ class Stepper:
         for stroke, depth in enumerate(depths):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
             records = [self._phase_record(k, contacts[k], before.contacts[k], cycles, adds[k]) for k in own]
-            number = after.half_cycle - (motion.half_cycles - 1 - stroke)
+            number = reached - (motion.half_cycles - 1 - stroke)
             own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
             heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
-            load = self.loading(after.half_cycle)
+            load = self.loading(reached)
             found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found
 

@@ -2,7 +2,7 @@
 
 `test_refusals.py` walks the source: a message that names two things which do not go together is entered here, or the
 test fails. Physics: there is no such thing, or no such state. Model: the equations, or a way to solve them, are of
-something else, and what to take instead says the message. Open: not written.
+something else, and what to take instead says the message. Nothing is refused as it is not written.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from pathlib import Path
 
 import fenwear
 
-PHYSICS, MODEL, OPEN = "physics", "model", "open"
-KINDS = {OPEN: "Not written", MODEL: "Of the model, or of the way it is solved", PHYSICS: "Of nature"}
+PHYSICS, MODEL = "physics", "model"
+KINDS = {MODEL: "Of the model, or of the way it is solved", PHYSICS: "Of nature"}
 ROOMS = ("assembly", "bodies", "case", "contact", "cycle", "heat", "interface", "layers", "sliding", "stick")
 
 ASKS = re.compile(
@@ -160,7 +160,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
     "cycle/steady.py": {
         "no one rigid motion wears all": (PHYSICS, "an end where loads press to either side in turn"),
         "its track deepens": (PHYSICS, "an end where the strip wears to and fro"),
-        "debris goes to and fro": (OPEN, "an end with debris to and fro on a strip that does not wear"),
         "with the worn depth or the distance slid": (PHYSICS, "an end of laws of depth or distance"),
         "the logarithm of time": (PHYSICS, "an end of creep without end"),
         "with any pressure exists": (PHYSICS, "an end of wear between bodies that are held apart"),

@@ -22,6 +22,7 @@ from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface.convolution import Convolution
 from fenwear.layers import Evolution
+from fenwear.layers.step import LayerEvolution
 from fenwear.memory import GIB, free_memory, memory_size
 from fenwear.optimum import Optimum
 from fenwear.parallel import agreed
@@ -100,6 +101,7 @@ class SteadyInequality:
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
         self.equations: ShapeEquations | SpreadShape | GridShape
         linear = self.system.heat is None and self.closure is None and self.system.creep is None
+        linear = linear and not self.system.track_changes
         grid = self._grid(ratios, scale, modes, balances) if linear and self.n >= GRIDDED else None
         if grid is not None:
             self.equations = GridShape(grid, modes, balances)
@@ -149,7 +151,29 @@ class SteadyInequality:
         f[self.omega] = np.where(still, 0.0, f[self.omega])
         if self.closure is not None:
             f[: m * n] += self.closure.closure(pressure).ravel() / self.gap_scale
+        if self.system.track_changes:
+            lies = self._passing.resting_where_it_lies(pressure)
+            f[: m * n] -= np.concatenate([own.wear_interpolation @ lies for own in self.wear.pairs]) / self.gap_scale
         return f
+
+    @property
+    def _passing(self) -> LayerEvolution:
+        """What a cycle does to debris."""
+        return self.system.passing(self.wear, conditions=self.conditions)
+
+    def _by_debris(self, pressure: Array) -> Array:
+        """Return the gaps of each phase by pressures of each phase through debris that the strip carries to and fro.
+
+        It lies otherwise under the punch in each position, so that the shape has it not: (m n, m n), mm/MPa.
+        """
+        debris, taken, pairs = self._passing.debris, self.wear.taken_slope(pressure), self.wear.pairs
+        assert debris is not None
+        found = np.zeros((self.m, self.n, self.m, self.n))
+        for j, (own, slope) in enumerate(zip(pairs, taken, strict=True)):
+            put = (own.wear_projection * slope).multiply((debris.fed[j] / debris.loss)[:, None])
+            for k, reads in enumerate(pairs):
+                found[k, :, j] = -(reads.wear_interpolation @ put).toarray()
+        return found.reshape(self.m * self.n, -1)
 
     def _jacobian(self, x: Array) -> Operator:
         pressure = x[: self.m * self.n].reshape(self.m, self.n)
@@ -168,6 +192,10 @@ class SteadyInequality:
         equations = self.equations
         if layer is not None and isinstance(equations, ShapeEquations):
             equations = equations.given_way(layer * (self.p_scale / self.gap_scale))
+        if self.system.track_changes and isinstance(equations, ShapeEquations):
+            by_debris = self._by_debris(pressure * self.p_scale) * (self.p_scale / self.gap_scale)
+            others = equations.coupling
+            equations = equations.with_heat(by_debris if others is None else others + by_debris)
         self._known = (slopes, held, layer, equations.derivative(scaled, held))
         return self._known[3]
 

@@ -74,6 +74,7 @@ def test_dependencies_are_declared() -> None:
         "ufl",
         "h5py",
         "markupsafe",
+        "pandas",
         "pydantic_core",
     }
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

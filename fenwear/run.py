@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +14,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Preparation, Tribosystem, regridded, renewed
-from fenwear.case import Case, plausibility_warnings
+from fenwear.case import Case, OneWay, Reciprocating, Rotation, plausibility_warnings
 from fenwear.cycle import (
     Block,
     Span,
@@ -469,14 +470,35 @@ class _Run:
 
 
 def position_warnings(system: Tribosystem) -> list[str]:
-    """Return what is to be said of the positions of a strip that wears."""
+    """Return what is to be said of the positions of a strip that wears, or that is rough."""
     spacing, motion = system.position_spacing, system.motion
-    if not system.track_deepens or spacing <= FAR_APART:
-        return []
+    rough = _standing_heights(system)
+    if rough or not system.track_deepens or spacing <= FAR_APART:
+        return rough
     wanted = int(np.ceil(motion.positions * spacing))
     return [
         f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its scar will have steps; "
         f"set motion.positions = {wanted}, or use fewer elements along the contact"
+    ]
+
+
+def _standing_heights(system: Tribosystem) -> list[str]:
+    """Return what is to be said of a rough strip that slides by: in each position its heights stand still."""
+    slid = system.position_spacing or float(system.path.max()) / system.node_spacing
+    if system.pair.strip.heights is None or not system.case.passes or slid <= 1:
+        return []
+    motion = system.case.motion
+    if isinstance(motion, OneWay | Rotation):
+        wanted = "sliding one way there are no positions to follow; expected a topography of the punch alone"
+    elif isinstance(motion, Reciprocating):
+        positions = system.motion.positions
+        needed = math.ceil(slid * (positions if positions > 1 else math.pi / 2))  # in the middle they are far apart
+        wanted = f"expected one for each contact node, motion.positions = {needed}"
+    else:
+        wanted = "expected rows of the cycle as near to each other as contact nodes"
+    return [
+        f"strip.topography: the strip slides over {slid:.3g} contact nodes from position to position, and in each its "
+        f"heights stand still below the punch, which takes their imprint, where they should pass it: {wanted}"
     ]
 
 

@@ -34,6 +34,7 @@ from fenwear.plausibility.curved import curved_text, turned
 from fenwear.plausibility.ends import contact_ends
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.layer import heated_layer, layer_warnings
+from fenwear.plausibility.polygon import polygon_text
 from fenwear.plausibility.rim import ContactRim, contact_rim
 from fenwear.plausibility.states import clipped_text, contact_limits
 from fenwear.plausibility.thickness import thickness
@@ -539,6 +540,45 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
     state = steady(assembled("example1", "geometry.degree=1", "geometry.parameters.elements_along_contact=4"))
     assert (state.phase_pressure > 0).all(axis=1).any()
     assert not [text for text in steady_warnings(state.system, state) if "across" in text]  # five nodes, all of them
+
+
+@pytest.mark.parametrize("elements", [30, 60])
+def test_a_curve_that_is_meshed_as_a_polygon(assembled: Assembled, elements: int) -> None:
+    """The waves that are told of are about those by which pressures differ from those on curved elements.
+
+    Where nodes are at the corners alone they lie on the curve: pressures are those of curved elements, and nothing is
+    told.
+    """
+    settings = (f"geometry.parameters.elements_along_contact={elements}", "motion.positions=2")
+    for degree in (1, 2):
+        straight, curved = (
+            assembled("fretting", *settings, f"geometry.degree={degree}", f"geometry.order={order}") for order in (1, 2)
+        )
+        pressure = start(straight)
+        off, told = np.abs(pressure - start(curved)).max(), polygon_text(straight, pressure, "at the start")
+        assert polygon_text(curved, start(curved), "at the start") == ""
+        if degree == 1:
+            assert off < 1e-3 * pressure.max()
+            assert told == ""
+        else:
+            assert told in initial_warnings(straight)
+            waves = float(re.findall(r"about ([\d.]+) MPa", told)[0])
+            assert 0.4 * waves < off < 2 * waves
+
+
+def test_a_rough_strip_stands_still(assembled: Assembled) -> None:
+    """Under a punch in few positions: told with how many would do, and nothing with as many."""
+    small = ("geometry.parameters.core_elements=0", "geometry.parameters.core=0", "geometry.parameters.across=3")
+    grid = ("punch.operator='fine'", "strip.operator='fine'", "grid={nodes=17, size=['0.4 mm', '0.4 mm']}")
+    rough = (*small, *grid, "unset=wear.strip", "strip.topography={rms='0.02 um', longest='0.4 mm'}")
+    slides = "motion={kind='reciprocating', amplitude='0.05 mm', period='1 s', positions="
+    (told,) = position_warnings(assembled("ball-on-flat", *rough, f"{slides}1}}"))
+    needed = int(told.rpartition("motion.positions = ")[2])
+    assert position_warnings(assembled("ball-on-flat", *rough, f"{slides}{needed}}}")) == []
+    (told,) = position_warnings(assembled("ball-on-flat", *rough, f"{slides}{needed // 2}}}"))
+    assert int(told.rpartition("motion.positions = ")[2]) == pytest.approx(needed, abs=2)
+    away = "motion={kind='one-way', direction='rightward', speed='2 mm/s', duration='1 s'}"
+    assert "sliding one way" in position_warnings(assembled("ball-on-flat", *rough, away))[0]
 
 
 def test_elements_thicker_than_the_layer_that_heats_up() -> None:

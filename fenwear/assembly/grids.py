@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 from fenwear.arrays import Array
 from fenwear.assembly.strokes import Sliding, make_sliding
-from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.contact_surface import ContactSurface, profile_at
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
@@ -147,14 +147,15 @@ def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurf
     """
     meshed, (axis, outward) = body.meshed, facet_side(body.meshed)
     reading = _reading(body, grid)
-    depth = outward * (grid.level - reading @ meshed.trace[:, axis])
-    if meshed.profile is not None:
-        depth = depth + reading @ (meshed.extension @ meshed.profile)
-    topography, heights = case.bodies[body.body.name].topography, None
+    depth = sag = outward * (grid.level - reading @ meshed.trace[:, axis])
+    description, heights = case.bodies[body.body.name], None
+    if description.profile is not None:
+        depth = depth + profile_at(body.body.name, np.array(description.profile.points), grid.flat)
+    topography = description.topography
     if topography is not None:
         heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
         depth = depth + heights.max() - heights
-    surface = replace(surface_on(body.body.name, grid, outward, depth), heights=heights)
+    surface = replace(surface_on(body.body.name, grid, outward, depth), heights=heights, sag=sag)
     return surface, _mortar(body, grid) if body.operator == CONDENSED else reading
 
 

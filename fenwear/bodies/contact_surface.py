@@ -60,6 +60,7 @@ class ContactSurface:
         contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
         grid: Of a surface that is a regular grid and no trace of a mesh; else None.
+        sag: How deep the mesh lies below a grid at its nodes (n,), mm, a part of the profile; None without a grid.
         made: The same as its mesh was made, where that has followed the wear since; else None.
         heights: Of a topography on it (n,), mm; None without.
     """
@@ -78,6 +79,7 @@ class ContactSurface:
     names: tuple[str, ...] = ()
     contact: NDArray[np.int64] | None = None
     grid: RegularGrid | None = None
+    sag: Array | None = None
     made: ContactSurface | None = None
     heights: Array | None = None
 
@@ -120,6 +122,12 @@ class ContactSurface:
         """Where the unworn surface is at the pressure nodes (n, d), mm: that of the mesh, and its profile."""
         return self.x if self.profile is None else self.x - self.profile[:, None] * self.outward
 
+    @property
+    def below_mesh(self) -> Array:
+        """By how much the unworn surface lies deeper in the body than its mesh at the pressure nodes (n,), mm."""
+        whole = np.zeros(len(self.weights)) if self.profile is None else self.profile
+        return whole if self.sag is None else whole - self.sag
+
     @cached_property
     def extension(self) -> csr_array:
         """What takes values at the pressure nodes to the trace nodes (N, n): linear on triangles.
@@ -157,20 +165,27 @@ class ContactSurface:
 
 
 def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
-    """Return a surface with a profile: linear between points, in space on Delaunay's triangles.
+    """Return a surface with a profile, as it was meshed but for that; arguments and errors as of `profile_at`."""
+    axis = int(np.abs(surface.weights @ surface.outward).argmax())
+    return replace(surface, profile=profile_at(surface.body, points, np.delete(surface.x, axis, axis=1)))
+
+
+def profile_at(body: str, points: Array, x: Array) -> Array:
+    """Return the depths of a profile at places (n,), mm: linear between its points, in space on Delaunay's triangles.
 
     Args:
-        surface: As it was meshed.
+        body: Whose it is.
         points: Coordinates along the surface and depths (k, d), mm: x (r) and depth; of solids two coordinates, those
             across the mean normal, and depth.
+        x: The places along the surface (n, d - 1), mm.
 
     Raises:
-        CaseError: the points do not reach over the whole surface, or two of them are at one place.
+        CaseError: the points do not reach over all places, or two of them are at one place.
     """
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator  # which takes long to load
 
-    key, axis = f"{surface.body}.profile.points", int(np.abs(surface.weights @ surface.outward).argmax())
-    places, depth, x = points[:, :-1], points[:, -1], np.delete(surface.x, axis, axis=1)
+    key = f"{body}.profile.points"
+    places, depth = points[:, :-1], points[:, -1]
     if places.shape[1] != x.shape[1]:
         expected = "[x, depth]" if x.shape[1] == 1 else "[x, y, depth]"
         raise CaseError(InputError(key, f"expected rows {expected} for this model, got {points.shape[1]} numbers"))
@@ -185,11 +200,11 @@ def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
         )
     if x.shape[1] == 1:
         order = places[:, 0].argsort()
-        return replace(surface, profile=np.interp(x[:, 0], places[order, 0], depth[order]))
+        return np.asarray(np.interp(x[:, 0], places[order, 0], depth[order]))
     values = LinearNDInterpolator(places, depth)(x)
     outside = np.isnan(values)  # by rounding, or in a corner that the points' hull leaves out
     values[outside] = NearestNDInterpolator(places, depth)(x[outside]) if outside.any() else 0.0
-    return replace(surface, profile=values)
+    return np.asarray(values)
 
 
 class Trace:

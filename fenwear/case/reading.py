@@ -46,6 +46,9 @@ def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
     data, folder = _read_tables(str(source))
     for setting in settings:
         _apply(data, setting)
+    beside = Path(source).parent
+    if folder is not None and folder != beside:  # that of a base: files of overrides lie beside the case itself
+        data = _anchored(data, beside)
     return make_case(data, folder)
 
 

@@ -17,6 +17,7 @@ from fenwear.plausibility.ends import ContactEnds, contact_ends, opened
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.grid_rim import grid_limits
 from fenwear.plausibility.layer import layer_warnings
+from fenwear.plausibility.polygon import polygon_text
 from fenwear.plausibility.rim import ContactRim, contact_rim
 from fenwear.plausibility.size import size_warnings
 from fenwear.plausibility.stroke import stroke_warnings
@@ -67,6 +68,7 @@ class StateMonitor:
             found[f"worn through, {name}"] = self._worn_through(block, name, elastic, depths)
         if self._first:
             found["few"] = few_across(self.system, self.limits, block.pressure[0], "at the start")
+            found["polygon"] = polygon_text(self.system, block.pressure[0], "at the start")
             self._first = False
         worst = int(np.argmax(block.complementarity_error))
         when = f"in half-cycle {int(block.half_cycle[worst]):,}"
@@ -202,6 +204,7 @@ def initial_warnings(system: Tribosystem) -> list[str]:
     error = complementarity_error(pressure, contact.gap[0], system.interface.elastic_length)
     texts.append(broken_text(float(error), "at the start"))
     texts.append(few_across(system, limits, pressure, "at the start"))
+    texts.append(polygon_text(system, pressure, "at the start"))
     where = "" if limits is None else limits.where(pressure > 0)
     if limits is not None and where:
         needed = limits.width_needed(0.0, float(weights @ pressure))
@@ -219,6 +222,7 @@ def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
     texts.append(broken_text(state.complementarity_error, "in the cyclic steady state"))
     few = (few_across(system, limits, pressure, "in the cyclic steady state") for pressure in state.phase_pressure)
     texts.append(next((text for text in few if text), ""))
+    texts.append(polygon_text(system, state.phase_pressure, "in the cyclic steady state"))
     if state.heat is not None:
         texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))
     where = "" if limits is None else limits.where((state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0))

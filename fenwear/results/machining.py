@@ -45,10 +45,9 @@ def write_shape(directory: Path, case: Case, surface: ContactSurface, shape: Ini
 
 
 def shape_points(surface: ContactSurface, depth: Array) -> list[list[float]]:
-    """Return [x, depth] or [x, y, depth] of each node, mm: with the profile that the surface has already."""
+    """Return [x, depth] or [x, y, depth] of each node, mm: with all that the surface lies below its mesh already."""
     axis = int(np.abs(surface.weights @ surface.outward).argmax())
-    whole = depth if surface.profile is None else depth + surface.profile
-    rows = np.column_stack([np.delete(surface.x, axis, axis=1), whole])
+    rows = np.column_stack([np.delete(surface.x, axis, axis=1), depth + surface.below_mesh])
     return [[float(value) for value in row] for row in rows]
 
 
@@ -56,6 +55,7 @@ def with_shape(case: Case, points: list[list[float]]) -> Case:
     """Return a case whose punch is made with a profile."""
     tables = case.resolved()
     tables["punch"]["profile"] = {"points": points}
+    tables["punch"].pop("topography", None)  # which the points have in them
     return make_case(tables, case.folder)
 
 

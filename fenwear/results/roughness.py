@@ -1,10 +1,10 @@
 """Roughness of worn surfaces in history.nc and summary.json: what a topography is, less what has worn off it.
 
-Numbers are those of ISO 25178 (Sa, Sq, Ssk), in the plane of ISO 4287 (Ra, Rq, Rsk), of the smallest rectangle of the
-contact grid around all that has worn, its form taken off: the polynomial of second order that is nearest by least
-squares, as a scar's own shape is no roughness. Before anything has worn it is that of the whole grid.
+Numbers are those of ISO 25178 (Sa, Sq, Ssk), in the plane of ISO 4287 (Ra, Rq, Rsk), of all within the convex hull of
+what has worn, its form taken off: the polynomial of second order that is nearest by least squares, as a scar's own
+shape is no roughness. Beyond the scar that shape does not go on. Before anything has worn it is that of the whole grid.
 
-The bearing curve (Abbott and Firestone) has what share of that rectangle lies above a height over its mean.
+The bearing curve (Abbott and Firestone) has what share of that place lies above a height over its mean.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from fenwear.cycle import Block
 from fenwear.results.surfaces import Column
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
-FEWEST = 8  # nodes along each axis of the rectangle, below which the whole grid is taken
-SHARES = (0.1, 0.5, 0.9)  # of the rectangle, whose heights of the bearing curve the summary has
+FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
+ON_HULL = 1e-9  # spacings: rounding
+SHARES = (0.1, 0.5, 0.9)  # of the place, whose heights of the bearing curve the summary has
 NAMES = {
     "roughness_mean": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
     "roughness_rms": ("mm", "root mean square of the same heights (Sq) of the {}"),
@@ -95,7 +96,7 @@ def worn_heights(block: Block, body: str, row: int) -> Array:
 
 
 def levelled(places: NDArray[np.int64], heights: Array, worn: NDArray[np.bool_]) -> Array:
-    """Return heights over their mean and form in the rectangle around what has worn (m,), mm.
+    """Return heights over their mean and form within the convex hull of what has worn (m,), mm.
 
     Args:
         places: Of the nodes on their grid (n, axes).
@@ -104,15 +105,28 @@ def levelled(places: NDArray[np.int64], heights: Array, worn: NDArray[np.bool_])
     """
     chosen = np.ones(len(heights), dtype=bool)
     if worn.any():
-        low, high = places[worn].min(axis=0), places[worn].max(axis=0)
-        if (high - low >= FEWEST).all():
-            chosen = ((places >= low) & (places <= high)).all(axis=1)
+        within = _within_hull(places, places[worn])
+        if within.sum() >= FEWEST ** places.shape[1]:
+            chosen = within
     x = 2.0 * (places[chosen] - places[chosen].mean(axis=0)) / np.maximum(np.ptp(places[chosen], axis=0), 1)
     powers = [x[:, k] for k in range(x.shape[1])]
     powers += [x[:, i] * x[:, j] for i in range(x.shape[1]) for j in range(i + 1)]
     form = np.column_stack([np.ones(len(x)), *powers])
     z = heights[chosen]
     return np.asarray(z - form @ np.linalg.lstsq(form, z)[0])
+
+
+def _within_hull(places: NDArray[np.int64], worn: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which places lie within the convex hull of others (n,); of those on a line the rectangle around it."""
+    low, high = worn.min(axis=0), worn.max(axis=0)
+    within: NDArray[np.bool_] = ((places >= low) & (places <= high)).all(axis=1)
+    if places.shape[1] == 1 or np.linalg.matrix_rank(worn - low) < places.shape[1]:
+        return within
+    from scipy.spatial import ConvexHull  # which takes long to load
+
+    sides = ConvexHull(worn).equations
+    within[within] = (places[within] @ sides[:, :-1].T + sides[:, -1] <= ON_HULL).all(axis=1)
+    return within
 
 
 def bearing_heights(z: Array, shares: Array) -> Array:

@@ -30,15 +30,20 @@ def test_wave_on_a_form() -> None:
     assert bearing_heights(z, shares) == pytest.approx(HEIGHT * np.cos(np.pi * shares), abs=0.02 * HEIGHT)
 
 
-def test_rectangle_around_what_has_worn() -> None:
-    """Counts alone, once it has some nodes; a plane and a saddle over it are form."""
-    grid = RegularGrid((0.0, 0.0), (1.0, 1.0), (30, 40), 2, 0.0)
+def test_a_scar_has_no_roughness() -> None:
+    """A ball that has worn flat is form within its scar; what lies beside it does not count, nor do few nodes alone."""
+    grid = RegularGrid((-15.0, -20.0), (1.0, 1.0), (31, 41), 2, 0.0)
     x, y = grid.flat.T
-    heights = np.where((x >= 5) & (x <= 20) & (y >= 8) & (y <= 31), 0.1 * x * y - 3 * x + y**2, 1e3 * np.sin(x + y))
-    worn = np.isin(x, (5, 20)) & np.isin(y, (8, 31))
-    assert np.abs(levelled(grid.places, heights, worn)).max() < 1e-9
-    assert len(levelled(grid.places, heights, worn)) == 16 * 24
-    assert len(levelled(grid.places, heights, worn & (x > 10))) == 1200
+    depth = np.maximum(12.5**2 - x**2 - (y - 2) ** 2 / 2, 0.0)
+    worn, wave = depth > 0, np.where(depth > 0, 1e-3 * (-1.0) ** (x + y), 1e3 * np.sin(x + y))
+    z = levelled(grid.places, wave - depth, worn)
+    assert len(z) == worn.sum()
+    assert roughness(z).rms == pytest.approx(1e-3, rel=0.02)
+    holes = worn & (np.hypot(x, y) > 4)  # within a scar that has not worn everywhere all counts
+    assert len(levelled(grid.places, wave - depth, holes)) == worn.sum()
+    assert len(levelled(grid.places, wave - depth, np.hypot(x, y) < 4)) == 31 * 41
+    line = (x == y) & (np.abs(x) < 10)
+    assert len(levelled(grid.places, wave - depth, line)) == 19**2
 
 
 def test_run_tells_how_rough_it_is(tmp_path: Path) -> None:

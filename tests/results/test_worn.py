@@ -61,6 +61,26 @@ def test_files_of_a_solid_have_its_surface(tmp_path: Path) -> None:
     assert (triangles["normal"][:, 2] < 0).all()  # the ball looks down
 
 
+@pytest.mark.parametrize("rough", [False, True])
+def test_a_grid_goes_on_from_its_files(tmp_path: Path, rough: bool) -> None:
+    """On a contact grid, too, whatever mesh lies below it: a ball's own roundness is not in the file, its heights are.
+
+    The grid ends within the meshed surface, and so does the file.
+    """
+    grid = ("punch.operator='fine'", "strip.operator='fine'", "grid={nodes=17, size=['0.4 mm', '0.4 mm']}")
+    small = ("geometry.parameters.core_elements=0", "geometry.parameters.core=0", "geometry.parameters.across=3")
+    heights = "punch.topography={rms='0.02 um', longest='0.4 mm'}"
+    settings = (*small, *grid, "unset=wear.strip", "motion.positions=1", "run.integration='explicit'", *QUIET)
+    own = (*settings, heights) if rough else settings
+    whole = load_history(run("ball-on-flat", tmp_path / "whole", *own, "run.half_cycles=6"))
+    export_worn(run("ball-on-flat", tmp_path / "first", *own, "run.half_cycles=4"), tmp_path / "surfaces")
+    profile = f"punch.profile.file='{tmp_path}/surfaces/worn_punch.csv'"
+    again = load_history(run("ball-on-flat", tmp_path / "again", *settings, profile, "run.half_cycles=2"))
+    after = whole.pressure.values[4:6]
+    assert np.abs(after - whole.pressure.values[:2]).max() > 5e-3 * after.max()
+    assert np.abs(again.pressure.values - after).max() < 1e-5 * after.max()
+
+
 def test_rings_and_bad_requests(tmp_path: Path) -> None:
     """A profile over r; one half-cycle at a time, of a run."""
     small = ("geometry.parameters.across=4", "run.half_cycles=2", "run.integration='explicit'", *QUIET)

@@ -50,13 +50,14 @@ def _angles(surface: ContactSurface) -> Array:
     """Return the angles at which neighbouring facets meet (m,), rad."""
     facets = surface.facets[:, CORNERS[surface.cell]]
     x, count = surface.trace[facets], facets.shape[1]
+    turned: Array
     if surface.dim == 2:
         along = x[:, 1] - x[:, 0]
-        normals, sides = np.stack([-along[:, 1], along[:, 0]], axis=1), facets[:, :, None]
+        turned, sides = np.stack([-along[:, 1], along[:, 0]], axis=1), facets[:, :, None]
     else:
-        normals = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
+        turned = np.asarray(np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]), dtype=float)
         sides = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2), axis=2)
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     _, number = np.unique(sides.reshape(len(facets) * count, -1), axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
     facet, number = order // count, number.ravel()[order]

@@ -103,7 +103,7 @@ def levelled(places: NDArray[np.int64], heights: Array, worn: NDArray[np.bool_])
         heights: (n,), mm.
         worn: Which nodes have worn (n,).
     """
-    chosen = np.ones(len(heights), dtype=bool)
+    chosen: NDArray[np.bool_] = np.ones(len(heights), dtype=bool)
     if worn.any():
         within = _within_hull(places, places[worn])
         if within.sum() >= FEWEST ** places.shape[1]:

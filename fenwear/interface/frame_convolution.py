@@ -17,7 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.fft
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.tensor import TensorWeights
@@ -91,8 +91,8 @@ class FrameConvolution:
         return np.asarray(scipy.fft.rfftn(over_period(self.table, size), axes=range(2, 2 + len(size))))
 
     @cached_property
-    def _kernels(self) -> dict[Any, Waves]:
-        return {np.dtype(np.float64): self.kernel(self._size)}
+    def _waves(self) -> Waves:
+        return self.kernel(self._size)
 
     def spread(self, values: Array) -> Array:
         """Return values at the nodes (..., n) on the grid, zero where no node is (..., m, ...)."""
@@ -119,26 +119,26 @@ class FrameConvolution:
         return self.values(self.on_grid(self.spread(traction.reshape(self.d, -1)))).ravel()
 
     def on_grid(self, fields: Array) -> Array:
-        """Return the displacements (d, m, ...) of tractions (d, m, ...), in their precision."""
-        force = fields * self._areas.astype(fields.dtype)
-        found = self.through([(_in_precision(self._kernels, fields.dtype), force, range(self.d))], self._size)
+        """Return the displacements (d, m, ...) of tractions (d, m, ...)."""
+        force = fields * self._areas
+        found = self.through([(self._waves, force, range(self.d))], self._size)
         if not force.any():
             return found
         for factors, response in self._factors:
             self._add(factors, response, force, found)
         if self.local is not None:
-            found[0] += self.spread(self.local).astype(fields.dtype) * fields[0]
+            found[0] += self.spread(self.local) * fields[0]
         return found
 
     def through(self, parts: Sequence[tuple[Waves, Array, Sequence[int]]], size: Sequence[int]) -> Array:
         """Return what waves make of fields over a period (d, m, ...), all of them added: of what acts on each other.
 
         Args:
-            parts: Waves, of component a by component b, where `pairs` has them (d, d, ...); and fields (k, m, ...), in
-                whose precision the result is, of these components.
+            parts: Waves, of component a by component b, where `pairs` has them (d, d, ...); and fields (k, m, ...) of
+                these components.
             size: The period.
         """
-        found: Array = np.zeros((self.d, *self.counts), dtype=parts[0][1].dtype)
+        found: Array = np.zeros((self.d, *self.counts))
         moved = dict[int, Waves]()
         for waves, fields, components in parts:
             acting = [k for k, field in enumerate(fields) if field.any()]
@@ -160,12 +160,11 @@ class FrameConvolution:
 
     def _add(self, factors: tuple[Array, ...], response: Array, force: Array, to: Array) -> None:
         """Add the displacements of forces by a correction."""
-        own = [factor.astype(force.dtype, copy=False) for factor in factors]
-        points = own[0].T @ (force if len(own) == 1 else force @ own[1]).reshape(self.d, self.counts[0], -1)
+        points = factors[0].T @ (force if len(factors) == 1 else force @ factors[1]).reshape(self.d, self.counts[0], -1)
         size = self.d * points[0].size
-        moved = (response.reshape(size, size).astype(force.dtype, copy=False) @ points.ravel()).reshape(points.shape)
-        spread = own[0] @ moved
-        to += spread[..., 0] if len(own) == 1 else spread @ own[1].T
+        moved = (response.reshape(size, size) @ points.ravel()).reshape(points.shape)
+        spread = factors[0] @ moved
+        to += spread[..., 0] if len(factors) == 1 else spread @ factors[1].T
 
     def around(self, nodes: NDArray[np.int64]) -> tuple[FrameConvolution, NDArray[np.int64]]:
         """Return the same on a box that holds some nodes, the last one if it does, and where these stand in it."""
@@ -251,37 +250,30 @@ class EndlessFrame:
         size, axes = np.linalg.eigh(symbol)
         size = np.maximum(size, LEAST * np.median(np.abs(size)))
         self._symbol = (axes * size[..., None, :]) @ axes.conj().swapaxes(-2, -1)
-        self._inverses: dict[float, dict[Any, Waves]] = {}
+        self._inverses: dict[float, Waves] = {}
 
-    def _inverse(self, stiff: float, dtype: DTypeLike) -> Waves:
+    def _inverse(self, stiff: float) -> Waves:
         """Return the waves of the inverse where tangents give way besides."""
         if stiff not in self._inverses:
             symbol, tangents = self._symbol.copy(), range(1, self.of.d)
             own = float(self.of.diagonal.reshape(self.of.d, -1)[1:].mean())
             symbol[..., tangents, tangents] += stiff * own
             inverse = np.moveaxis(np.linalg.inv(symbol), (-2, -1), (0, 1))
-            self._inverses[stiff] = {np.dtype(np.float64): np.ascontiguousarray(inverse)}
-        return _in_precision(self._inverses[stiff], dtype)
+            self._inverses[stiff] = np.ascontiguousarray(inverse)
+        return self._inverses[stiff]
 
     def solve(self, fields: Array, *stiff: Array | None) -> Array:
-        """Return the tractions (d, m, ...) of displacements (d, m, ...), in their precision.
+        """Return the tractions (d, m, ...) of displacements (d, m, ...).
 
         Args:
             fields: Where nothing gives way besides.
             stiff: Along the tangents (d - 1, m, ...) where they do, of each of `STIFF`; None for nowhere.
         """
-        parts = [(self._inverse(0.0, fields.dtype), fields, range(self.of.d))]
+        parts = [(self._inverse(0.0), fields, range(self.of.d))]
         for size, own in zip(STIFF, stiff, strict=False):
             if own is not None:
-                parts.append((self._inverse(size, fields.dtype), own, range(1, self.of.d)))
+                parts.append((self._inverse(size), own, range(1, self.of.d)))
         return self.of.through(parts, self.period)
-
-
-def _in_precision(kept: dict[Any, Waves], dtype: DTypeLike) -> Waves:
-    """Return waves for fields of a precision, which are kept by it; those of double precision are there."""
-    if np.dtype(dtype) not in kept:
-        kept[np.dtype(dtype)] = kept[np.dtype(np.float64)].astype(np.result_type(dtype, np.complex64))
-    return kept[np.dtype(dtype)]
 
 
 def frame_convolution(

@@ -137,9 +137,11 @@ class Step:
     @cached_property
     def going_on(self) -> Mask:
         """Which nodes would slip on as their traction has them, if it stayed (n,): none where a motion turns back."""
-        if self.imposed.displacement is None:
-            return np.ones(self.n, dtype=bool)
         before = self.before
+        if self.imposed.displacement is None:
+            along = self.position.pull[self.n :].reshape(self.m, self.n).T
+            grows = (self.imposed.force or 0.0) - before.force
+            return np.asarray((along * before.traction).sum(axis=1) * grows >= 0)
         f = np.concatenate([before.pressure, before.traction.T.ravel()])
         _, slip = self.jumps(StatusSolution(f, before.rigid, self.imposed.displacement, 1))
         return np.asarray((slip * before.traction).sum(axis=1) <= 0)
@@ -165,6 +167,9 @@ class Step:
         if self.closure is not None:
             j[: self.n] += self.closure.closure(found.f[: self.n])
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
+
+    def forget(self) -> None:
+        """Begin anew, where solutions are looked for from the last one on; here they are not."""
 
     def solve(self, status: ContactStatus) -> StatusSolution:
         """Return the solution of a contact status.

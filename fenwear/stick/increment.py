@@ -202,6 +202,7 @@ def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:
     Raises:
         ConvergenceError: it does not converge.
     """
+    step.forget()
     found, iterations, unique = _iterate(step, status, most)
     return step.state(found, iterations, unique=unique)
 

@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import flexible
@@ -31,14 +31,12 @@ from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
 from fenwear.stick.state import Imposed, StickState
 
-CLOSE = 1e-7  # residual of the laws over the largest pressure
+CLOSE = 1e-9  # residual of the laws over the largest pressure; near gross sliding errors are up to 1e3 times as large
 FEW = 20  # Newton steps from where it should take some
 PATIENCE = 15  # Newton steps that may go by without success
 ROUGH = {2: 1e-6, 3: 1e-2}  # of a residual that is left, at most: in the plane more costs next to nothing
 AHEAD = 0.1  # of a residual that is left, over that of the laws: Newton's steps speed up
-NUMBERS = {2: np.float64, 3: np.float32}  # of the solutions by products
 FINEST = {2: 1e-10, 3: 2e-5}  # of a residual that may be left in them
-SLIGHT = 1e-3  # of tractions: changes whose displacements are known to as many digits as the laws ask for
 SHARE = 0.1  # of the residual of the laws that ends a step, in its last solution
 RESTART, RESTARTS = 80, 2
 FAR = 0.5  # of a residual that may be left: more is no solution
@@ -59,6 +57,10 @@ class GridStep(Step):
         on = self.position.compliance.on_grid
         assert on is not None
         self.on = on
+        self.forget()
+
+    def forget(self) -> None:
+        """Look for the next solution from where the step begins, not from the last one, which may be far off."""
         self._last: StatusSolution | None = None
         self._wrong = 1.0
 
@@ -97,8 +99,7 @@ class GridStep(Step):
             displacement = float(self.imposed.displacement or 0.0)
         x = piece.known(f)
         f = piece.tractions(x) + piece.fixed
-        jump = self._jump(f.ravel(), last)
-        found = StatusSolution(f.ravel(), rigid, displacement, 1, jump=jump)
+        found = StatusSolution(f.ravel(), rigid, displacement, 1, jump=self.on.apply(f.ravel()))
         rest, forces = piece.residual(x, self._opened(found)), self._missing(found)
         closed = piece.closed
         moved, held = (part[:, :, closed] for part in self._rigid)
@@ -114,17 +115,9 @@ class GridStep(Step):
         loose = self.imposed.force is not None
         r = len(rigid)
         displacement += float(by[-1] * self.length) if loose else 0.0
-        jump = self._jump(f.ravel(), found)
-        self._last = StatusSolution(f.ravel(), rigid + by[:r] * self.units, displacement, 1, jump=jump)
+        jump, rigid = self.on.apply(f.ravel()), rigid + by[:r] * self.units
+        self._last = StatusSolution(f.ravel(), rigid, displacement, 1, jump=jump)
         return self._last
-
-    def _jump(self, f: Array, known: StatusSolution | None) -> Array:
-        """Return what tractions (d n,) displace: of slight changes of known ones in less precision."""
-        if known is not None and known.jump is not None:
-            change = f - known.f
-            if np.abs(change).max() <= SLIGHT * np.abs(f).max():
-                return np.asarray(known.jump + self.on.apply(change.astype(NUMBERS[self.d])))
-        return self.on.apply(f)
 
     def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
         """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
@@ -209,11 +202,6 @@ class _Piece:
         every = np.flatnonzero(closed).astype(np.int64)
         return cls(every, closed & ~flows, closed & ~slips, across, slides, stiff, fixed)
 
-    def of_numbers(self, dtype: DTypeLike) -> _Piece:
-        """The same in another precision."""
-        rest = (self.across, self.slides, self.stiff, self.fixed)
-        return _Piece(self.closed, self.pressed, self.kept, *(one.astype(dtype) for one in rest))
-
     def on_box(self, at: NDArray[np.int64], size: int) -> _Piece:
         """The same over the places of a box, the nodes that touch at these of them."""
         arrays = (self.across, self.slides, self.stiff, self.fixed)
@@ -229,8 +217,8 @@ class _Piece:
     @cached_property
     def _projector(self) -> Array:
         """Q of the normal, and of the tangents with themselves, and in two directions with each other (d or 4, n)."""
-        kept, across = self.kept.astype(self.stiff.dtype), self.across
-        found = [self.pressed.astype(self.stiff.dtype), *(kept + part * part for part in across)]
+        kept, across = self.kept.astype(float), self.across
+        found = [self.pressed.astype(float), *(kept + part * part for part in across)]
         return np.array(found if len(across) == 1 else [*found, across[0] * across[1]])
 
     def unknown(self, fields: Array) -> Array:
@@ -274,17 +262,15 @@ class _Solver:
     """
 
     def __init__(self, step: GridStep, piece: _Piece, moved: Array, held: Array) -> None:
-        self.dtype: np.dtype[Any] = np.dtype(NUMBERS[step.d])
         if not len(piece.closed):
             raise ConvergenceError(LOOSE)
         self.on, self.at = step.on.around(piece.closed)
         self.fields, self.length = (self.on.d, int(np.prod(self.on.counts))), float(step.length)
         self.cut = int(np.prod(self.fields))
-        boxed = piece.on_box(self.at, self.fields[1])
-        self.piece = boxed.of_numbers(self.dtype)
+        self.piece = piece.on_box(self.at, self.fields[1])
         scale = step.scale[:, piece.closed].mean(axis=1)[:, None]
-        self._share(boxed.stiff * (step.length / scale))
-        moved, held = (_spread(one.astype(self.dtype), self.at, self.fields[1]) for one in (moved, held))
+        self._share(self.piece.stiff * (step.length / scale))
+        moved, held = (_spread(one, self.at, self.fields[1]) for one in (moved, held))
         self.moved = np.array([self.piece.unknown(one) for one in moved]).reshape(len(moved), -1)
         self.held = np.array([self._weighed(one) for one in held]).reshape(len(held), -1)
         self.by_moved = np.array([self._inverse(one) for one in self.moved]).reshape(self.moved.shape)
@@ -299,10 +285,10 @@ class _Solver:
         sizes = np.log(STIFF)
         places = np.append(2 * sizes[0] - sizes[1], sizes)
         at = np.interp(np.log(np.maximum(over[1:].max(axis=0), 1e-9)), places, np.arange(len(places)))
-        shares = np.clip(1 - np.abs(at - np.arange(len(places))[:, None]), 0.0, 1.0).astype(self.dtype)
+        shares = np.clip(1 - np.abs(at - np.arange(len(places))[:, None]), 0.0, 1.0)
         self.shares, self.rest = [one if one.any() else None for one in shares[1:]], shares[0]
         known = np.append(0.0, np.full(len(over) - 1, STIFF[-1]))[:, None]
-        self.shrunk = np.sqrt((1 + known) / np.maximum(1 + over, 1 + known)).astype(self.dtype)
+        self.shrunk = np.sqrt((1 + known) / np.maximum(1 + over, 1 + known))
 
     def _weighed(self, force: Array) -> Array:
         """Return what forces of tractions (d, size) take of the unknowns: N^T."""
@@ -323,14 +309,14 @@ class _Solver:
     def _precondition(self, r: Array) -> Array:
         x = self._inverse(r[: self.cut])
         y = np.linalg.solve(self.schur, self.held @ x - r[self.cut :]) if len(self.held) else r[self.cut :]
-        return np.concatenate([x - y @ self.by_moved, y], dtype=self.dtype)
+        return np.concatenate([x - y @ self.by_moved, y])
 
     def _multiply(self, z: Array) -> Array:
         x, y = z[: self.cut].reshape(self.fields), z[self.cut :]
         opened = self.on.on_grid(self.piece.tractions(x).reshape(-1, *self.on.counts)).reshape(self.fields)
         opened /= self.length
         found = self.piece.unknown(opened) + self.piece.stiff * x
-        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[: self.cut]], dtype=self.dtype)
+        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[: self.cut]])
 
     def solve(self, rest: Array, forces: Array, accuracy: float) -> tuple[Array, Array]:
         """Return unknowns (d, k) and rigid motions (r,) for what misses at nodes that touch, to so much of it.
@@ -339,10 +325,10 @@ class _Solver:
             ConvergenceError: nothing holds the bodies.
         """
         size = max(float(np.abs(rest).max(initial=0.0)), float(np.abs(forces).max(initial=0.0)), 1e-300)
-        fields = self.piece.unknown(_spread((rest / size).astype(self.dtype), self.at, self.fields[1]))
-        right = np.concatenate([fields.ravel(), forces / size], dtype=self.dtype)
+        fields = self.piece.unknown(_spread(rest / size, self.at, self.fields[1]))
+        right = np.concatenate([fields.ravel(), forces / size])
         x, left, self.iterations = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
-        x = x.astype(np.float64) * size
+        x = x * size
         if not (left <= FAR and np.isfinite(x).all()):
             raise ConvergenceError(LOOSE)
         return x[: self.cut].reshape(self.fields)[:, self.at], x[self.cut :]

@@ -30,6 +30,8 @@ def check_laws(
         assert np.abs(size - mu * p)[moved].max(initial=0) < close * top, "what slips carries mu p"
         against = -np.einsum("nm,nm->n", t, s)
         assert np.abs(against - size * slid)[moved].max(initial=0) < 10 * close * top * slid.max(initial=0)
+        turned = np.linalg.norm(size[:, None] * s + slid[:, None] * t, axis=1)  # of the first order in the angle
+        assert turned[moved].max(initial=0) < 100 * close * top * slid.max(initial=0), "slip is against traction"
         inside = state.closed & (size < (1 - 1e-7) * mu * p)
         assert not slid[inside].any(), "it sticks inside"
     jumps = []

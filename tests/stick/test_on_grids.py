@@ -76,6 +76,7 @@ def test_as_by_matrices(by_force: bool, monkeypatch: pytest.MonkeyPatch) -> None
         np.testing.assert_allclose(after.slip, other.slip, rtol=0, atol=10 * CLOSE * most)
         np.testing.assert_allclose(after.on_strip, other.on_strip, rtol=0, atol=1e-6 * np.abs(other.on_strip).max())
         assert (after.sticking ^ other.sticking).sum() <= 2
+        assert after.parts == other.parts == 1  # whole, where the motion turns back, too
         assert np.isclose(bodies.middle.pair.weights @ after.pressure, LOAD, rtol=10 * CLOSE)
         if after is not before:
             assert np.ptp(after.pressure - ours[0][1].pressure) > 1e-3 * top  # coupled

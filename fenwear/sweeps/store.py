@@ -13,6 +13,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from fenwear.assembly.strokes import make_sliding
 from fenwear.case import Case
 from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import writing
@@ -89,7 +90,11 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     for name in order:
         what = meaning(name, plan.of, case)
         scale = degrees_of(case) if what.unit == KELVIN.unit else None
-        attributes = {"units": what.unit if scale is None else scale.unit, "long_name": case.names.told(what.name)}
+        unit = what.unit if scale is None else scale.unit
+        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.told(what.name)}
+        if name == "direction":
+            words = make_sliding(case).field.words(3 if case.model.kind == "solid" else 2)
+            attributes |= {"flag_values": list(words), "flag_meanings": " ".join(words.values())}
         arrays = {place: np.asarray(values[name]) for place, values in good.items() if name in values}
         if scale is not None:
             arrays = {place: scale.of(values) for place, values in arrays.items()}
@@ -173,4 +178,5 @@ def _way(dataset: xarray.Dataset, k: int) -> str:
     directions = dataset.coords.get("direction")
     if directions is None or len(set(directions.values)) < directions.size:
         return str(k + 1)
-    return "rightward" if float(directions[k]) > 0 else "leftward"
+    words = dict(zip(directions.attrs["flag_values"], directions.attrs["flag_meanings"].split(), strict=True))
+    return str(words[int(directions[k])])

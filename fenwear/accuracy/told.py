@@ -103,7 +103,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         for source, contribution in _steps(again, before, of_jumps, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
-        untold["steps" if "mesh" in found else "mesh"] = str(error)
+        untold["steps" if "mesh" in found else "mesh"] = _why(error)
     found |= of_heat(last, values)
     found["solver"] = _of_solver(values, last)
     return Uncertainty(values, found, untold, time.perf_counter() - begin)
@@ -213,6 +213,12 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     return replace(found, seconds=time.perf_counter() - begin)
 
 
+def _why(error: CaseError | ConvergenceError) -> str:
+    """Return why there is nothing to compare with; what a case is refused for is of a coarser one."""
+    coarser_one = "of the coarser mesh or grid that would be compared with: " if isinstance(error, CaseError) else ""
+    return f"{coarser_one}{error}"
+
+
 def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     """Return the numerical uncertainty of a cyclic steady state's largest pressures and temperature; collective.
 
@@ -231,7 +237,7 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
             before = values_of_steady(steady(set_up(lower.case, system, lower)))
             found["mesh"] = of_mesh(values, before, lower.ratio)
         except (CaseError, ConvergenceError) as error:
-            untold["mesh"] = str(error)
+            untold["mesh"] = _why(error)
     found |= of_steady_heat(system, values)
     left = state.complementarity_error + ROUNDING
     found["solver"] = {quantity: left * abs(value.number) for quantity, value in values.items()}

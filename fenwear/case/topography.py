@@ -16,8 +16,8 @@ class Topography(Part):
 
     file: str | None = Field(
         default=None,
-        description="a height map: .npz or .nc with height, x (and y), each with its unit; .csv with columns x, (y,) "
-        "height and their units",
+        description="a height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
+        ".csv with columns x, (y,) height and their units",
     )
     rms: Positive | None = Field(default=None, description="Sq of a made self-affine surface, mean zero")
     hurst: Annotated[Number, Field(gt=0, le=1)] = Field(default=0.8, description="H: the spectrum falls by q^-2(1+H)")

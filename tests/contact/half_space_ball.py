@@ -18,7 +18,7 @@ def ball(force: float, **more: Any) -> Case:
         force: That presses it, N.
         more: Tables in place of those here.
     """
-    x = np.linspace(-1.2, 1.2, 25)
+    x = np.linspace(-1.2, 1.2, 49)
     points = [(a, b, (a * a + b * b) / 40) for a in x for b in x]
     body = {"operator": "half-space", "regions": {}}
     data: dict[str, Any] = {

@@ -183,7 +183,8 @@ def test_what_a_layer_has_crept_stays_where_it_is() -> None:
     """Node by node as on a grid that was as wide at first; where nothing pressed nothing has crept."""
     layer = {"kind": "linear", "stiffness": "2e5 MPa/mm", "creep": {"terms": [{"compliance": 0.5, "time": "10 s"}]}}
     contact = {"friction": 0.3, "layer": layer}
-    system = assemble(growing({"across": 10}, contact=contact, run={"half_cycles": 12}))
+    wear = {body: {"coefficient": "1e-5 1/MPa"} for body in ("punch", "strip")}
+    system = assemble(growing({"across": 10}, contact=contact, wear=wear, run={"half_cycles": 12}))
     grown = list(evolve(system))
     last = grown[-1]
     assert len({block.system.pair.punch.grid for block in grown}) > 1
@@ -200,7 +201,7 @@ STICKS: dict[str, Any] = {
     "contact": {"friction": 0.8, "law": "coulomb"},
     "stick": {"steps": 4, "step_tolerance": 1},
     "motion": STILL,
-    "wear": {"punch": {"coefficient": "2e-5 1/MPa"}, "strip": {"coefficient": "2e-5 1/MPa"}},
+    "wear": {body: {"coefficient": "1e-4 1/MPa"} for body in ("punch", "strip")},
 }
 
 
@@ -291,7 +292,10 @@ def test_forces_on_a_coarser_grid_keep_sum_and_moment() -> None:
 @pytest.mark.slow
 def test_what_has_crept_is_that_of_a_wide_grid_that_stays() -> None:
     """Over a grid that has coarsened, and nearer to it with twice the nodes across."""
-    more = {"run": {"half_cycles": 16}, "wear": {body: {"coefficient": "2e-6 1/MPa"} for body in ("punch", "strip")}}
+    more = {
+        "run": {"half_cycles": 16, "integration": "implicit"},
+        "wear": {body: {"coefficient": "6e-6 1/MPa"} for body in ("punch", "strip")},
+    }
     fixed = list(evolve(assemble(creeping({"nodes": 73}, **more))))[-1]
     at, errors = np.linspace(-0.45, 0.45, 31), []
     for count in (10, 20):
@@ -301,8 +305,8 @@ def test_what_has_crept_is_that_of_a_wide_grid_that_stays() -> None:
         for body in (0, 1):
             one, wanted = (along(block, crept(block)[body], at) for block in (blocks[-1], fixed))
             errors[-1].append(np.abs(one - wanted).max() / np.abs(wanted).max())
-    assert max(errors[1]) < 0.6 * max(errors[0])
-    assert max(errors[1]) < 0.01
+    assert max(errors[1]) < 0.4 * max(errors[0])
+    assert max(errors[1]) < 0.004
 
 
 @pytest.mark.slow
@@ -344,7 +348,7 @@ def test_the_end_is_that_of_a_grid_that_stays(sticks: bool) -> None:
     """The steady state, and the end of partial slip, on the grid that they have grown to."""
     wear = {"punch": {"coefficient": "1e-6 1/MPa"}}
     more = (
-        {**STICKS, "wear": wear, "motion": {**STILL, "amplitude": 0.004}} if sticks else {"motion": STILL, "wear": wear}
+        {**STICKS, "wear": wear, "motion": {**STILL, "amplitude": 0.002}} if sticks else {"motion": STILL, "wear": wear}
     )
     system = assemble(growing({"across": 16}, **more))
     found = steady(system)

@@ -31,7 +31,7 @@ from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
 from fenwear.stick.state import Imposed, StickState
 
-CLOSE = 1e-9  # residual of the laws over the largest pressure; near gross sliding errors are up to 1e3 times as large
+CLOSE = 1e-7  # residual of the laws over the largest pressure
 FEW = 20  # Newton steps from where it should take some
 PATIENCE = 15  # Newton steps that may go by without success
 ROUGH = {2: 1e-6, 3: 1e-2}  # of a residual that is left, at most: in the plane more costs next to nothing

@@ -2,7 +2,7 @@
 
 The depth that a body has crept is how far its contact surface has gone back into it, against its side away from the
 contact, by what its compliance has grown to since it was loaded. It is seen at the contact nodes in the middle of a
-half-cycle; its volume is the integral over them.
+half-cycle; its volume is the integral over them, on a contact grid that grows over those that there were.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def variables(system: Tribosystem) -> dict[str, Variable]:
         name, end = member.name, ENDS[member.name]
         text = f"depth that the {name} has crept at the end of the half-cycle, apart from wear"
         found[f"creep_depth{end}"] = (("half_cycle", "x"), "mm", text)
-        volume = f"volume that the {name} has crept at the end of the half-cycle, apart from wear"
+        volume = f"volume that the {name} has crept over the contact nodes, at the end of the half-cycle"
         found[f"creep_volume{end}"] = (("half_cycle",), "mm3", volume)
     return found
 

@@ -32,6 +32,7 @@ from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, part
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
+UNKNOWN = ("gap", "creep_depth", "creep_depth_strip")  # beyond the grid that there was; a layer has crept by 0 there
 GRID = "contact_grid"  # corner, spacing and counts, where it grows
 SECONDS_BETWEEN_WRITES = 2.0
 SHARE = 20  # of the time between two writes over that of copying the file, which grows with it
@@ -231,7 +232,7 @@ def _on_grid(
     before: Tribosystem,
     after: Tribosystem,
 ) -> dict[str, NDArray[Any]]:
-    """Return rows of variables at the nodes of another contact grid; gaps that are not known are NaN."""
+    """Return rows of variables at the nodes of another contact grid; what is not known there is NaN."""
     of_punch, of_strip = node_maps(before, after)
     surfaces = {"": (of_punch, before.pair.weights, after.pair.weights)}
     surfaces["_strip"] = (of_strip, before.pair.strip.weights, after.pair.strip.weights)
@@ -249,7 +250,7 @@ def _on_grid(
         if name in ("weight", "weight_strip"):
             found[name] = np.broadcast_to(new, (*values.shape[:-1], len(new)))
             continue
-        start: Array = np.full(len(nodes), np.nan if name == "gap" else 0.0)
+        start: Array = np.full(len(nodes), np.nan if name in UNKNOWN else 0.0)
         found[name] = on_nodes(values, nodes, start) if len(values) else np.zeros((*values.shape[:-1], len(nodes)))
     return found
 

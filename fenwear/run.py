@@ -473,11 +473,11 @@ def position_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the positions of a strip that wears, or that is rough."""
     spacing, motion = system.position_spacing, system.motion
     rough = _standing_heights(system)
-    if rough or not system.track_deepens or spacing <= FAR_APART:
+    if rough or not system.track_changes or spacing <= FAR_APART:
         return rough
     wanted = int(np.ceil(motion.positions * spacing))
     return [
-        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its scar will have steps; "
+        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its track will have steps; "
         f"set motion.positions = {wanted}, or use fewer elements along the contact"
     ]
 

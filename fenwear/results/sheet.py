@@ -49,7 +49,11 @@ SLIDING: dict[str, Variable] = {
         "N",
         "integral of the pressure over the contact, mean over the half-cycle; more than the load on curved contacts",
     ),
-    "friction_force": (("half_cycle",), "N", "friction force: resultant of friction, mean over the half-cycle"),
+    "friction_force": (
+        ("half_cycle",),
+        "N",
+        "friction force: resultant of friction, mean over what is slid in the half-cycle",
+    ),
     "friction_work": (("half_cycle",), "mJ", "work of friction from the start"),
     "dissipated_energy": (("half_cycle", "x"), "mJ/mm2", "work of friction per area from the start"),
     "pressure_sum": (

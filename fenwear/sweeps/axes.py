@@ -180,15 +180,15 @@ def read_table(path: Path) -> list[Axis]:
     heading, units = zip(*map(_key_and_unit, rows[0]), strict=True)
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(heading):
-            expected = f"expected {len(heading)} values as in the heading, got {len(row)}"
+            expected = f"expected {len(heading)} values as in the heading, with commas between them, got {len(row)}"
             raise CaseError(InputError(str(path), f"row {number}: {expected}"))
     values = [[f"{text.strip()} {unit}".strip() for text, unit in zip(row, units, strict=True)] for row in rows[1:]]
     return [Axis(key, column) for key, column in zip(heading, zip(*values, strict=True), strict=True)]
 
 
 def _key_and_unit(name: str) -> tuple[str, str]:
-    key, bracket, unit = name.strip().removesuffix(")").partition(" (")
-    return (key, unit) if bracket else (name.strip(), "")
+    found = re.fullmatch(r"\s*([^\s(\[]+)\s*[(\[](.*)[)\]]\s*", name)
+    return (found[1], found[2].strip()) if found else (name.strip(), "")
 
 
 def settings(case: Case, given: Mapping[str, tuple[Axis, Value]]) -> list[str]:

@@ -95,14 +95,14 @@ def test_zip_and_tables(tmp_path: Path) -> None:
     plan = make_plan(CASE, read_table(path), "steady", zipped=True)
     assert plan.dimensions == {"variant": 3}
     assert [v.case.motion.amplitude for v in plan.variants if v.case] == [10, 12, 12]
-    path.write_text("contact.friction,wear.punch.energy (mm^3/(N*m)),motion.amplitude (cm)\n0.1,1e-6,1\n", "utf-8")
+    path.write_text("contact.friction,wear.punch.energy (mm^3/(N*m)),motion.amplitude [cm]\n0.1,1e-6,1\n", "utf-8")
     assert [(axis.key, axis.values) for axis in read_table(path)] == [
         ("contact.friction", ("0.1",)),
         ("wear.punch.energy", ("1e-6 mm^3/(N*m)",)),
         ("motion.amplitude", ("1 cm",)),
     ]
     path.write_text("contact.friction,motion.amplitude\n0.1,10 mm\n0.1\n", "utf-8")
-    with pytest.raises(CaseError, match="row 3: expected 2 values"):
+    with pytest.raises(CaseError, match="row 3: expected 2 values as in the heading, with commas"):
         read_table(path)
     path.write_text("contact.friction\n0.1\n-3\n", "utf-8")
     with pytest.raises(CaseError, match="variant 2: expected greater"):

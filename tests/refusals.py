@@ -16,7 +16,7 @@ import fenwear
 
 PHYSICS, MODEL = "physics", "model"
 KINDS = {MODEL: "Of the model, or of the way it is solved", PHYSICS: "Of nature"}
-ROOMS = ("assembly", "bodies", "case", "contact", "cycle", "heat", "interface", "layers", "sliding", "stick")
+ROOMS = ("assembly", "bodies", "case", "contact", "cycle", "heat", "interface", "layers", "life", "sliding", "stick")
 
 ASKS = re.compile(
     r"\b(expected|missing|exists?|solved for|belongs?|depends|act|grow|loads?|lose no|solves)\b|not (go|change)|^with ",
@@ -189,6 +189,13 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "every node slips": (PHYSICS, "an end of partial slip where all slips"),
     },
+    "life/model.py": {
+        "it changes as long as a run goes on": (PHYSICS, "steady quantities with laws of depth or distance"),
+        "is told of constant properties": (
+            MODEL,
+            "run-in and critical speeds with properties of T: rates of small disturbances of bodies that stay",
+        ),
+    },
     "stick/heat.py": {
         "the bodies lose no heat": (PHYSICS, "an end of bodies that lose no heat"),
         "'reduced' with contact.law": (MODEL, 'of parts: stick with `heat.operator = "full"`, as above'),
@@ -249,6 +256,18 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "interface/pair.py": ("the punch lies below",),
     "layers/between.py": ("missing, but required",),
     "layers/debris.py": ("the conditions of the phases",),
+    "life/calibrate.py": ("where the fit begins",),
+    "life/commands.py": ("the folder of the sampling",),
+    "life/data.py": (
+        "each with its unit",
+        "with one column",
+        "together with a column",
+        "belongs to one measured column",
+    ),
+    "life/least_squares.py": ("with profiles only", "gives no sigma"),
+    "life/pictures.py": ("with interactions",),
+    "life/quantities.py": ("with a level", "a level with its unit"),
+    "life/scatter.py": ("gives impossible values", "KEY=KIND"),
     "stick/cycle.py": ("did not come together",),
     "stick/final.py": ("did not come together",),
     "stick/fineness.py": ("too coarse",),

@@ -17,7 +17,10 @@ from fenwear.report.style import BLUE, GREY, RED, panels, reference_line
 from fenwear.results.disk import writing
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+DECADE = 10.0
 
 
 def tornado(sensitivities: Sequence[Sensitivity]) -> Figure:
@@ -62,6 +65,17 @@ def residuals(calibration: Calibration) -> Figure:
     return figure
 
 
+def _label_places(ax: Axes) -> None:
+    """Label a logarithmic axis of less than a decade by few numbers: powers of ten would stand on each other."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter  # which takes long to load
+
+    low, high = ax.get_xlim()
+    if high < DECADE * low:
+        ax.xaxis.set_major_locator(MaxNLocator(6))
+        ax.xaxis.set_major_formatter(ScalarFormatter(useMathText=True))
+        ax.xaxis.set_minor_locator(NullLocator())
+
+
 def life_figure(life: Lifetime) -> Figure:
     """Return the distribution of the lives and, where there are some, the Sobol indices."""
     figure, axes = panels(1 if life.sobol is None else 2, 3.0, share_x=False)
@@ -80,6 +94,7 @@ def life_figure(life: Lifetime) -> Figure:
         if np.isfinite(one.value) and np.isfinite(one.high):
             axes[0].plot([one.low, one.high], [one.level, one.level], color=RED, linewidth=1.5)
     axes[0].set_xscale("log")
+    _label_places(axes[0])
     axes[0].set_xlabel(f"{life.quantity} ({life.unit or 'cycles'})")
     axes[0].set_ylabel("share that has failed")
     axes[0].set_title("95 % intervals of the quantiles in red")

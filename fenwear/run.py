@@ -484,7 +484,7 @@ def position_warnings(system: Tribosystem) -> list[str]:
 
 def _standing_heights(system: Tribosystem) -> list[str]:
     """Return what is to be said of a rough strip that slides by: in each position its heights stand still."""
-    slid = system.position_spacing or float(system.path.max()) / system.node_spacing
+    slid = system.position_spacing or float(system.path.max()) / system.pair.punch.spacing()
     if system.pair.strip.heights is None or not system.case.passes or slid <= 1:
         return []
     motion = system.case.motion

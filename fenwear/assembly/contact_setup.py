@@ -349,13 +349,7 @@ class ContactSetup:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
         offsets = np.unique([phase.offset for phase in self.motion.phases])
         moved = self.path.max() if self.motion.steps else np.diff(offsets).max(initial=0.0) * self.sliding_ratio.max()
-        return float(moved / self.node_spacing)
-
-    @property
-    def node_spacing(self) -> float:
-        """How far contact nodes are apart, mm: the median."""
-        pair = self.pair  # among the nodes of a solid there is no order along the sliding
-        return float(np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights)))
+        return float(moved / self.pair.punch.spacing())
 
     @property
     def track_deepens(self) -> bool:

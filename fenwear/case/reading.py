@@ -44,12 +44,19 @@ def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
         CaseError: the file cannot be read, or anything in it is wrong; lists all problems.
     """
     data, folder = _read_tables(str(source))
+    geometry, beside = _geometry(data), Path(source).parent
     for setting in settings:
         _apply(data, setting)
-    beside = Path(source).parent
     if folder is not None and folder != beside:  # that of a base: files of overrides lie beside the case itself
         data = _anchored(data, beside)
+        folder = folder if _geometry(data) == geometry else beside
     return make_case(data, folder)
+
+
+def _geometry(data: Mapping[str, Any]) -> Any:
+    """Return the file of the geometry that tables name, whatever it is; None for none."""
+    table = data.get("geometry")
+    return table.get("file") if isinstance(table, Mapping) else None
 
 
 def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path | None]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json, show, show_results
+from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, show, show_results
 from fenwear.errors import CaseError, InputError, StackError
 
 QuantitiesOption = Annotated[
@@ -38,9 +38,11 @@ def verify_command(
                 show(f"{name:24} {title}")
         return
     found, directory = verify(cases, paper, output, log if as_json else print)
+    page = f"page in {directory}/verification.html"
     if as_json:
-        print_json(found)
-    log(f"page in {directory}/verification.html")
+        show_results(found, page)
+    else:
+        log(page)
     if not found["agree"]:
         log(f"does not agree: {', '.join(found['differing'])}")
         raise typer.Exit(1)

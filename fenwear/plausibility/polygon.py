@@ -13,11 +13,12 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.interface.frame import facet_normals
+from fenwear.interface.overlap import RING
 from fenwear.plausibility.ends import contact_modulus
 
 SMALLEST, SHARP = 1e-5, 0.5  # rad: angles that are rounding, and those that are edges as they were drawn
 SEEN = 0.05  # of the largest pressure: waves that are told of
-CORNERS = {"interval": (0, 1), "triangle": (0, 1, 2), "quadrilateral": (0, 1, 3, 2)}  # around a facet
 
 
 def polygon_text(system: Tribosystem, pressure: Array, when: str) -> str:
@@ -48,19 +49,14 @@ def _angle(body: ElasticBody) -> float:
 
 def _angles(surface: ContactSurface) -> Array:
     """Return the angles at which neighbouring facets meet (m,), rad."""
-    facets = surface.facets[:, CORNERS[surface.cell]]
-    x, count = surface.trace[facets], facets.shape[1]
-    turned: Array
-    if surface.dim == 2:
-        along = x[:, 1] - x[:, 0]
-        turned, sides = np.stack([-along[:, 1], along[:, 0]], axis=1), facets[:, :, None]
-    else:
-        turned = np.asarray(np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]), dtype=float)
+    facets = surface.facets[:, RING[surface.cell]]
+    count, normals = facets.shape[1], facet_normals(surface)
+    sides = facets[:, :, None]
+    if surface.dim == 3:
         sides = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2), axis=2)
-    normals = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     _, number = np.unique(sides.reshape(len(facets) * count, -1), axis=0, return_inverse=True)
     order = np.argsort(number.ravel(), kind="stable")
     facet, number = order // count, number.ravel()[order]
     both = np.flatnonzero(number[1:] == number[:-1])
-    between = np.abs(np.einsum("mi,mi->m", normals[facet[both]], normals[facet[both + 1]]))
-    return np.asarray(np.arccos(np.clip(between, 0.0, 1.0)))
+    between = np.einsum("mi,mi->m", normals[facet[both]], normals[facet[both + 1]])
+    return np.asarray(np.arccos(np.clip(between, -1.0, 1.0)))

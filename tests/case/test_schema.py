@@ -81,6 +81,14 @@ def test_files_lie_beside_the_case_that_names_them(tmp_path: Path, named: str) -
     assert case.program == load_case(shapes / "base.toml").program
     assert case.strip.profile is not None
     assert case.strip.profile.points[0] == (-9, 2e-3)
+    (place / "flat.csv").write_text("x (mm),depth (um)\n-7,1\n7,1\n")
+    (place / "own.geo").touch()
+    told = load_case(place / "case.toml", ["punch.profile.file=flat.csv", "geometry.file=own.geo"])
+    assert told.punch.profile is not None
+    assert told.punch.profile.points[0] == (-7, 1e-3)
+    assert told.folder is not None
+    assert (told.folder / told.geometry.file).samefile(place / "own.geo")
+    assert told.program == case.program
 
 
 def test_keys_of_a_base_are_taken_away(tmp_path: Path) -> None:

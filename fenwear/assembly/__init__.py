@@ -13,7 +13,7 @@ takes again what a changed case makes necessary, and keeps the rest.
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
 from fenwear.assembly.contact_law import ContactLaw
-from fenwear.assembly.contact_setup import Clock, ContactSetup, place, place_at_rest
+from fenwear.assembly.contact_setup import Clock, ContactSetup
 from fenwear.assembly.creep import Creep, CreepStage
 from fenwear.assembly.growing import (
     answers_anywhere,
@@ -30,6 +30,7 @@ from fenwear.assembly.growing import (
     with_room,
 )
 from fenwear.assembly.laws import law_named, register_contact_law
+from fenwear.assembly.placing import place, place_at_rest
 from fenwear.assembly.positions import place_case_bodies
 from fenwear.assembly.resource_report import body_lines, resources_text
 from fenwear.assembly.resources import Resources, body_resources

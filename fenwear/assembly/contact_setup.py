@@ -14,25 +14,20 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies, edges_of
 from fenwear.assembly.laws import law_named
-from fenwear.assembly.strokes import Sliding, check_stays
+from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
-from fenwear.case.motions import Cycle
 from fenwear.case.names import BY_ROLE, Names, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.passage import Passage
 from fenwear.interface import (
     ContactPair,
     RigidEquilibrium,
-    check_distance,
-    pair,
-    pass_material,
-    rigid_equilibrium,
 )
 from fenwear.interface.edges import Edges
-from fenwear.interface.placement import HERE, in_model, in_space
+from fenwear.interface.placement import in_model, in_space
 from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, conductance_of, layers_of
-from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
+from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.coating import coatings_of, covering
@@ -40,12 +35,10 @@ from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
-from fenwear.sliding.track import Border, on_closed_track
 from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
-STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stays in its place for the heat
 
 
 @dataclass(frozen=True)
@@ -585,130 +578,3 @@ class ContactSetup:
         law = laws[0]
         some = np.full(len(self.pair.weights), min(law.threshold + 1.0, law.cap))
         return optimum(self.rigid, ratio, WearRates((recession(some) / law.value(some),), laws), zone)
-
-
-@told_by_name
-def place(
-    bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, solver: str = "condensed", case: Case | None = None
-) -> ContactSetup:
-    """Bring the surfaces opposite each other in every phase of the motion; collective.
-
-    Without heat the strip moves as a whole. With heat its elasticity is that of the middle position: then only its
-    worn depth and, to and fro, its temperature change place.
-
-    Args:
-        bodies: Both bodies.
-        sliding: Motion, friction and wear.
-        heat: Settings of the heat between the bodies.
-        solver: Of the contact, "condensed" or "full".
-        case: What they were made from: it gives the loads of each phase, and whether meshes follow the wear.
-
-    Raises:
-        CaseError: the surfaces do not face each other, the stroke runs off them, or no pressure balances the loads.
-    """
-    rings = bodies.punch.law.kind == "axisymmetric"
-    middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
-    if bodies.followed is None:
-        check_distance(middle)
-    check_stays(middle, sliding)
-    if sliding.track is not None:
-        middle = on_closed_track(middle, sliding.field, sliding.track)
-    sliding = sliding.measured_on(middle)
-    # Round surfaces that slide along themselves stay; a whole strip is moved where it does not turn by a table.
-    whole = heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
-    places = [sliding.placement(phase) for phase in sliding.motion.phases]
-    pairs = {
-        moved: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
-        for moved in dict.fromkeys(places)
-        if moved != HERE
-    }
-    pairs[HERE] = middle
-    swept = sliding.track is None
-    border = Border.of_swept([pairs[at] for at in places]) if swept else Border.of_rings(middle, sliding.field)
-    pairs = border.on_all(pairs)
-    middle = pairs[HERE]
-    loaded = _loaded(bodies, sliding.motion, case)
-    rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
-    made = {HERE: rigid}  # phases there and back share theirs
-    rigids: list[RigidEquilibrium] = []
-    for moved, own in zip(places, loaded, strict=True):
-        if own is not bodies:
-            rigids.append(rigid_equilibrium(pairs[moved], own.punch, own.strip))
-            continue
-        if moved not in made:
-            made[moved] = rigid_equilibrium(pairs[moved], bodies.punch, bodies.strip)
-        rigids.append(made[moved])
-    placed = ContactSetup(
-        bodies=bodies,
-        sliding=sliding,
-        heat=heat,
-        solver=solver,
-        made_from=case,
-        loaded=loaded,
-        rigids=tuple(rigids),
-        rigid=rigid,
-        passage=None if heat is None else _passage(middle, sliding, rings=rings),
-    )
-    for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        when, key = f"in {placed.direction_words[phase.direction]} sliding", "punch.loads"
-        if case is not None and isinstance(case.motion, Cycle):
-            row = int(np.searchsorted(case.motion.course.fraction, phase.fraction))
-            when, key = f"from row {row} to row {row + 1}", "punch.loads" if case.motion.load is None else "motion.load"
-        check_equilibrium(one, when, ratio, key)
-    return placed
-
-
-@told_by_name
-def place_at_rest(
-    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None, *, passes: bool = False
-) -> ContactSetup:
-    """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
-
-    Where nodes stick or slip by themselves their law says how friction acts, and where the strip is in a time step.
-
-    Args:
-        bodies: Both bodies, under the mean of their loads.
-        sliding: Motion, friction and wear; a phase for each half-cycle.
-        middle: The surfaces there.
-        law: Of the contact, by its name.
-        case: What they were made from.
-        passes: Whether the strip's material moves past the punch's.
-    """
-    loaded = _loaded(bodies, sliding.motion, case)
-    rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
-    own = [rigid if one is bodies else rigid_equilibrium(middle, one.punch, one.strip) for one in loaded]
-    return ContactSetup(
-        bodies=bodies,
-        sliding=sliding,
-        heat=None if case is None else case.heat,
-        solver="condensed" if case is None else case.contact.solver,
-        law=law,
-        made_from=case,
-        loaded=loaded,
-        rigids=tuple(own),
-        rigid=rigid,
-        passes=passes,
-    )
-
-
-def _passage(middle: ContactPair, sliding: Sliding, *, rings: bool) -> Passage | None:
-    """Return where the punch is on a strip that passes under it to and fro or through a cycle.
-
-    None where it hardly moves, or is of rings, whose temperatures are the same all around.
-
-    Raises:
-        CaseError: the stroke runs off the strip's contact surface.
-    """
-    motion, here = sliding.motion, middle.strip.trace
-    if motion.one_way or rings:
-        return None
-    ends = [way.at(share).points(here) for row in motion.ways(sliding.field, 1) for way in row for share in (0.0, 1.0)]
-    moved = max(float(np.linalg.norm(end - here, axis=1).max()) for end in ends)
-    return Passage(middle, sliding.field, motion) if moved > STILL * middle.punch.spacing() else None
-
-
-def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:
-    """Return the bodies under the loads of each phase; collective."""
-    if case is None or all(load.steady for body in ("punch", "strip") for load in case.loads_of(body)):
-        return (bodies,) * len(motion.phases)
-    return tuple(bodies.under(case, phase.fraction) for phase in motion.phases)

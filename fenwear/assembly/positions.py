@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.contact_setup import ContactSetup, place
+from fenwear.assembly.contact_setup import ContactSetup
+from fenwear.assembly.placing import place
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.case import Case
 from fenwear.case.program import stages_of

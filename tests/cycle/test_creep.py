@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, march, steady
 from fenwear.cycle import Block, decay_rates, evolve, growth_rate
-from fenwear.cycle.stability import phase_tangent
 from fenwear.cycle.state import present
+from fenwear.cycle.tangent import phase_tangent
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 from fenwear.sliding.wear import WornDepths

@@ -16,8 +16,9 @@ from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle import Block, coupled, growth_rate, stationary_growth
 from fenwear.cycle.coupled import cycle_heat
-from fenwear.cycle.stability import phase_tangent, repeating_temperatures
+from fenwear.cycle.stability import repeating_temperatures
 from fenwear.cycle.state import RunState
+from fenwear.cycle.tangent import phase_tangent
 from fenwear.cycle.totals import none_yet
 from fenwear.heat import exchange
 from fenwear.life.model import steady_snapshot

@@ -11,8 +11,8 @@ from combinations import SMALL, STICK
 from fenwear import Tribosystem, assemble, load_case, steady
 from fenwear.arrays import Array
 from fenwear.cycle import Block, evolve, growth_rate, march
-from fenwear.cycle.stability import _lies_after, phase_tangent
 from fenwear.cycle.state import RunState
+from fenwear.cycle.tangent import lies_after, phase_tangent
 from fenwear.errors import CaseError
 from fenwear.results.between import values
 
@@ -202,7 +202,7 @@ def test_growth_rates_follow_what_the_strip_carries(laws: tuple[str, ...], way: 
     for phase in phases:
         pressure = contacts[phase].pressure[0]
         predicted = phase_tangent(system, phase, pressure, implicit=implicit, worn=known) @ predicted
-        known = _lies_after(system, phase, pressure, None, None, known)
+        known = lies_after(system, phase, pressure, None, None, known)
     change = 1e-9 * np.sin(np.arange(lies + n) ** 2)
     ends = [cycle(sign * change).worn for sign in (1.0, -1.0)]
     found = np.concatenate([ends[0].carried[0] - ends[1].carried[0], ends[0].punch - ends[1].punch]) / 2

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear import Tribosystem
-from fenwear.assembly import bodies, contact_setup
+from fenwear.assembly import bodies, placing
 from fenwear.bodies import material
 from fenwear.bodies.material import Isotropic
 from fenwear.contact import CondensedContact, SlidingContact
@@ -73,13 +73,13 @@ def lame_of_the_other_plane(patch: Patch) -> None:
 
 
 def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
-    right = contact_setup.pair
+    right = placing.pair
 
     def pair(*surfaces: Any, **options: Any) -> ContactPair:
         found = right(*surfaces, **options)
         return replace(found, **change(found))
 
-    patch.setattr(contact_setup, "pair", pair)
+    patch.setattr(placing, "pair", pair)
 
 
 def even_weights(patch: Patch) -> None:

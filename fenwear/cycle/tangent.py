@@ -1,0 +1,329 @@
+"""What a phase of a cycle makes of small changes of temperature, wear and what lies between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import Creep, Tribosystem, heating_friction
+from fenwear.heat.field import HeatState
+from fenwear.heat.periodic import CycleHeat
+from fenwear.interface import PressureCompliance
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.pressure_law import PressureLaw
+from fenwear.sliding.wear import PhasesWear, WornDepths
+
+STEP, MAX_HALVINGS, SETTLED = 1.0, 10, 1e-6  # of differences to temperatures, K; of their steps; of the slopes
+THIN = 1e-9  # mm: the least of differences to the thickness of debris
+
+
+def phase_tangent(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None = None,
+    state: HeatState | None = None,
+    conductance: Array | None = None,
+    *,
+    implicit: bool = True,
+    worn: WornDepths | None = None,
+) -> Array:
+    """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
+
+    With changes ds, dw at its start and dp of its pressure, d(mu p) = (mu + p mu_p) dp + p mu_s ds,
+
+        ds' = P ds + Q d(mu p) + Q_h h_p dp,   dw' = dw + D_p dp + D_s ds,
+
+    and where nodes are in contact the gap stays closed at its end, and the load balanced:
+
+        dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0,
+
+    with dw in place of dw' where the wear is explicit. Debris stands beside the temperatures, after them: s has its
+    thickness, which closes the gap, by that at the start of the phase where the wear is explicit. So does what creeps:
+    s has its state, S is that of the grown compliances, and G of a state what it opens at the end of the phase.
+
+    Args:
+        system: The assembled problem.
+        phase: Its number in the cycle.
+        pressure: During it (n,), MPa.
+        heat: Of cycles, at the friction there; None without heat.
+        state: Temperatures at its start; None where nothing depends on them.
+        conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
+        implicit: Whether the wear is.
+        worn: With debris, and the states that laws remember, which disturbances leave; by default those at the start.
+    """
+    n, interface, creep = len(pressure), system.interfaces[phase], system.creep
+    laws, rigid = _laws(system, phase, pressure, heat, state, worn), interface.rigid
+    dim = laws.mu_s.shape[1]
+    friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
+    by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu
+    balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
+    traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
+    gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)
+    if creep is not None:
+        crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
+        none: Array = np.zeros((n, len(crept.stays)))
+        laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
+        traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
+        gap_rows = np.hstack([gap_rows, crept.opened])
+        state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
+        state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
+    closed = pressure > 0
+    k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
+    opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
+    by_state = by_mu @ traction_s + gap_rows @ state_s + before_s
+    slope = system.layers.slope(pressure[None])
+    if slope is not None:
+        opened = opened + np.diag(slope[0])
+    if implicit:
+        opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
+    matrix: Array = np.zeros((k + r, k + r))
+    matrix[:k, :k] = opened[np.ix_(closed, closed)] / scale
+    matrix[:k, k:] = rigid.rigid_normal[closed]
+    matrix[k:, :k] = (rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p)[:, closed]
+    disturbance: Array = np.zeros((k + r, dim + n))
+    disturbance[:k, :dim] = by_state[closed] / scale
+    disturbance[:k, dim:] = np.eye(n)[closed] / scale
+    disturbance[k:, :dim] = balance_by_mu @ traction_s
+    answer: Array = np.zeros((n, dim + n))
+    answer[closed] = -np.linalg.solve(matrix, disturbance)[:k]
+    change: Array = np.zeros((dim + n, dim + n))
+    change[:dim, :dim], change[dim:, :dim], change[dim:, dim:] = state_s, laws.worn_s, np.eye(n)
+    change[:dim] += state_p @ answer
+    change[dim:] += laws.worn_p @ answer
+    return change
+
+
+def lies_after(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: WornDepths | None,
+) -> WornDepths | None:
+    """Return what lies between after a phase, of what does at its start."""
+    if worn is None or system.layers.debris is None:
+        return worn
+    conditions = _conditions(system, phase, pressure, heat, state, worn)
+    passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
+    added, _ = passing.debris_changes(pressure[None], worn, None)
+    return system.layers.with_thickness(worn, np.asarray(system.layers.where_it_lies(worn)) + added)
+
+
+def _goes_on(
+    laws: _Laws,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    conductance: Array | None,
+    *,
+    implicit: bool,
+) -> tuple[Array, Array, Array, Array]:
+    """Return what the state of heat and debris does in a phase.
+
+    Returns:
+        The gap by it at the end and at the start of the phase (n, dim), and itself at the end by what it was at the
+        start (dim, dim) and by the pressure (dim, n).
+    """
+    n, dim = laws.mu_s.shape
+    of_heat = 0 if heat is None else heat.dim
+    gap_rows, before_s, state_s, state_p = (np.zeros(shape) for shape in ((n, dim), (n, dim), (dim, dim), (dim, n)))
+    if heat is not None:
+        gap_rows[:, :of_heat] = heat.gap_rows[phase]
+        if conductance is None:
+            conductance = heat.exchange.conductance(pressure)
+        state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
+    if laws.lies is not None:
+        state_p[of_heat:], state_s[of_heat:], reads = laws.lies
+        (gap_rows if implicit else before_s)[:, of_heat:] = -reads
+    return gap_rows, before_s, state_s, state_p
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """Friction and wear of a phase, and their derivatives to its pressure and to the temperatures at its start.
+
+    Attributes:
+        mu: (n,).
+        rate: What each node slides for a unit of the stroke's law (n,): friction heat is mu p times that.
+        mu_p: To the pressure of the same node (n,), 1/MPa.
+        mu_s: To the state of the heat, and to the thickness of debris at its start where there is any, of L nodes where
+            it lies (n, dim).
+        worn_p, worn_s: Of the gap that the wear of the phase opens (n, n) and (n, dim).
+        lies: Of the thickness of debris at its end (L, n) and (L, dim), and what of it lies at the contact's nodes
+            (n, L); None without.
+    """
+
+    mu: Array
+    rate: Array
+    mu_p: Array
+    mu_s: Array
+    worn_p: Array
+    worn_s: Array
+    lies: tuple[Array, Array, Array] | None = None
+
+
+def _conditions(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: WornDepths | None,
+) -> ContactConditions:
+    """Return the conditions of a phase, at temperatures and with what lies between at its start."""
+    surfaces = None
+    if heat is not None and state is not None:
+        surfaces = heat.exchange.contact_temperatures(state, phase - 1)
+    return system.conditions(phase, pressure, surfaces, worn)
+
+
+def _laws(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: WornDepths | None = None,
+) -> _Laws:
+    n, conditions = len(pressure), _conditions(system, phase, pressure, heat, state, worn)
+    lies = () if conditions.debris is None else (conditions.debris,)
+    around = (pressure, *conditions.temperatures, *lies)
+
+    def at(p: Array, punch: Array, strip: Array, *debris: Array) -> ContactConditions:
+        return replace(conditions, pressure=p, temperatures=(punch, strip), debris=debris[0] if debris else None)
+
+    def friction(*values: Array) -> Array:
+        return system.friction.values(at(*values))
+
+    def depths(*values: Array) -> Array:
+        wear = system.wear.phases([at(*values)], [phase])
+        worn = (None if body is None else body.depth(values[0][None])[0] for body in (wear.punch, wear.strip))
+        return np.array([np.zeros(n) if depth is None else depth for depth in worn])
+
+    wear = system.wear.phases([at(*around)], [phase])
+    mu_p, *mu_t = _slopes(friction, around)
+    by_depths = _slopes(depths, around)
+    worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
+    picked, rate = _picked(heat, phase, n), heating_friction(system, np.ones(n), phase)
+    mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
+    worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
+    if not lies:
+        return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+    debris, pair = system.layers.debris, system.pairs[phase]
+    assert debris is not None
+    if system.layers.strip_carries:
+        onto, reads, puts = [pair.wear_projection], pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
+    else:
+        onto, reads, puts = None, np.eye(n), np.eye(n)
+    path, taken, thickness = system.path[phase], depths(*around).sum(axis=0), system.layers.where_it_lies(worn)
+    over = debris.over(path[None], [conditions], onto)
+    # Of what is fed, by what is worn at the nodes of the contact, to pressure, temperatures and thickness there.
+    put = over.slope(None)[0][:, None] * puts
+    lies_p, *lies_t, lies_here = (put * slope.sum(axis=0) for slope in by_depths)
+    if system.layers.varies:
+        by_loss = over.by_loss(np.asarray(thickness), (puts @ taken)[None])[:, None] * puts * path
+        more_p, *more_t, more_here = (
+            by_loss * slope for slope in _slopes(lambda *values: debris.lost(at(*values)), around)
+        )
+        lies_p, lies_here = lies_p + more_p, lies_here + more_here
+        lies_t = [own + more for own, more in zip(lies_t, more_t, strict=True)]
+    lies_s: Array = np.hstack(
+        [(np.array(lies_t) @ picked).sum(axis=0), np.diag(np.exp(-over.loss)) + lies_here @ reads]
+    )
+    mu_s, worn_s = np.hstack([mu_s, mu_t[2][:, None] * reads]), np.hstack([worn_s, worn_t[2] @ reads])
+    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, (lies_p, lies_s, reads))
+
+
+class _Creeping(NamedTuple):
+    """What creeps in a phase.
+
+    Attributes:
+        opened: Gap by its state (n, k).
+        stays: What is left of its state (k,).
+        by_state: Its state at the end by that of the heat (k, dim).
+        by_pressure: By the pressures (k, n).
+    """
+
+    opened: Array
+    stays: Array
+    by_state: Array
+    by_pressure: Array
+
+
+def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p: Array, traction_s: Array) -> _Creeping:
+    """Return what creeps in a phase.
+
+    Args:
+        creep: All that does.
+        phase: Its number.
+        ratios: tau (n, d), and that of a friction that is larger by 1.
+        traction_p, traction_s: What changes of pressure and of the state of the heat add to mu, times the pressure.
+    """
+    opened, stays, by_pressure = creep.tangent(phase, ratios[0])
+    by_mu = creep.tangent(phase, ratios[1])[2] - by_pressure
+    return _Creeping(opened, stays, by_mu @ traction_s, by_pressure + by_mu * traction_p)
+
+
+def _heated(
+    heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws, conductance: Array
+) -> tuple[Array, Array]:
+    """Return the changes of the state at the end of a phase by those at its start, and by its pressure."""
+    exchange = heat.exchange
+    unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
+    by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
+    by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.dim))
+    by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
+    if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
+        rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
+        by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
+    changes: Array = by_power @ (pressure[:, None] * laws.mu_s)
+    changes[:, : heat.dim] += by_state
+    return changes, by_pressure
+
+
+def _picked(heat: CycleHeat | None, phase: int, n: int) -> Array:
+    """Return the rows that pick the temperatures of both surfaces at the start of a phase (2, n, dim)."""
+    if heat is None:
+        return np.zeros((2, n, 0))
+    return np.array(heat.exchange.contact_changes(np.eye(heat.dim), phase - 1))
+
+
+def _opened(wear: PhasesWear, slope: Array) -> Array:
+    """Return the gap (n, n) that depths worn off punch and strip open, for each unit at a node `slope` (2, n)."""
+    punch, strip = (
+        None if body is None else replace(body, rate=slope[k : k + 1], law=PressureLaw())
+        for k, body in enumerate((wear.punch, wear.strip))
+    )
+    if punch is None and strip is None:
+        return np.zeros((slope.shape[1],) * 2)
+    left, right = replace(wear, punch=punch, strip=strip).border(slope[:1])
+    return np.asarray(left[0] @ right[0])
+
+
+def _slopes(law: Callable[..., Array], around: Sequence[Array]) -> list[Array]:
+    """Return the derivatives of a law of (p, T_punch, T_strip), and of debris, node by node, to each of them.
+
+    Central differences whose step is made smaller until it makes no difference; 0 where p is.
+    """
+    found = []
+    for which, value in enumerate(around):
+        step = 0.01 * value if which in (0, 3) else np.full(len(value), STEP)
+        if which == 3:
+            step = np.maximum(step, THIN)
+        before: Array | None = None
+        for _ in range(MAX_HALVINGS):
+            ends = [law(*(v + sign * step if k == which else v for k, v in enumerate(around))) for sign in (1, -1)]
+            difference = ends[0] - ends[1]
+            slope = np.divide(difference, 2 * step, out=np.zeros_like(difference), where=step > 0)
+            if before is not None and np.abs(slope - before).max() <= SETTLED * np.abs(slope).max():
+                break
+            before, step = slope, step / 4
+        found.append(slope)
+    return found

@@ -193,7 +193,10 @@ def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str)
 def _print_way(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float], in_all: float) -> None:
     """Print how the state is reached, and where the time went."""
     if rate > 0:
-        show(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
+        show(
+            f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state; "
+            "it may be one of several"
+        )
     elif not followed:
         show('  the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so')
     elif cycles is None:

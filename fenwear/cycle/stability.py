@@ -46,13 +46,10 @@ def growth_rate(
         implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
 
     Raises:
-        CaseError: a coefficient is negative or not finite there.
+        CaseError: a coefficient is negative or not finite there, or the pressures are of other phases or nodes.
         ConvergenceError: friction and the temperatures that it depends on do not come together, or numbers overflow.
     """
-    if system.passing_laws:
-        raise CaseError(
-            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
-        )
+    _check_state(system, pressure)
     system = with_reduced_heat(system)  # before rank 0 leads
     return system.led_whole(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
 
@@ -63,14 +60,23 @@ def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None
     Real parts; those that neither grow nor decay, such as rigid motions of the shape, and those that are gone after a
     cycle are left out. Arguments and errors as of `growth_rate`, which is the first of them.
     """
-    if system.passing_laws:
-        raise CaseError(
-            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
-        )
+    _check_state(system, pressure)
     system = with_reduced_heat(system)
     sizes = np.abs(system.led_whole(partial(_factors, system, pressure, conductances, implicit=True)))
     counted = (np.abs(sizes - 1) > NEUTRAL) & (sizes > ROUNDING)
     return np.sort(np.log(sizes[counted]) / system.motion.period)[::-1]
+
+
+def _check_state(system: Tribosystem, pressure: Array) -> None:
+    """Raise where these pressures are no state that could grow or decay."""
+    if system.passing_laws:
+        raise CaseError(
+            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
+        )
+    shape = (len(system.motion.phases), len(system.pair.weights))
+    if pressure.shape != shape:
+        message = f"expected pressures of {shape[0]} phases at {shape[1]} nodes, as `SteadyState.phase_pressure`"
+        raise CaseError(InputError("pressure", f"{message}, got {pressure.shape}"))
 
 
 def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:

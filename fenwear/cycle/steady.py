@@ -271,6 +271,11 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | 
     except ConvergenceError as error:
         if capped := _no_state_under_cap(problem):
             raise ConvergenceError(capped) from error
+        if system.layers.debris is not None:  # it presses most where it is thickest, and comes from where it presses
+            raise ConvergenceError(
+                f"{error}; where much debris lies between, there may be several states, or none that is stable. Follow "
+                "it by `run`, or give the debris a shorter life"
+            ) from error
         if system.strip_wears or _uniform_wear_exists(system):
             raise
         raise ConvergenceError(

@@ -125,7 +125,7 @@ def check_command(
         *initial_warnings(system),
     ]
     warm = with_reduced_heat(system, keep=True)
-    warnings += [*heat_warnings(heat_gain(warm)), *fineness_warnings(warm)]
+    warnings += [*heat_warnings(heat_gain(warm), jumps=loaded.run.integration == "jump"), *fineness_warnings(warm)]
     for warning in warnings:
         log(f"warning: {warning}")
     if full:

@@ -6,11 +6,14 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.contact import ContactState
 from fenwear.cycle.block import Block
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.program import Span, follow_program
-from fenwear.cycle.state import RunState
+from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.uniqueness import NO_JUMPS, heat_gain
+from fenwear.errors import ConvergenceError
 
 
 def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **course: Any) -> Iterator[Block]:
@@ -24,8 +27,27 @@ def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **cou
         course: What `march` and `jump` share: where it starts, and what ends it before.
     """
     if how == "jump":
-        return jump(system, span.until, tolerance=tolerance, loading=span.loading, **course)
+        return _told_of_heat(system, jump(system, span.until, tolerance=tolerance, loading=span.loading, **course))
     return march(system, span.until, implicit=how == "implicit", loading=span.loading, **course)
+
+
+def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
+    """Yield the blocks of jumps; say where they fail as friction heat breaks up the contact; collective."""
+    contacts: ContactState | None = None
+    try:
+        for block in blocks:
+            contacts = joined(block.end.contacts)
+            yield block
+    except ConvergenceError as error:
+        system = with_reduced_heat(system)
+        at = [None, *([] if contacts is None else [contacts.pressure])]  # bands of few nodes have less
+        gain = max(heat_gain(system, pressure) or 0.0 for pressure in at)
+        if gain < 1:
+            raise
+        raise type(error)(
+            f"{error}; the friction heat of a half-cycle gives back up to {gain:.3g} times the pressure "
+            f"it is from: {NO_JUMPS}"
+        ) from error
 
 
 def evolve(

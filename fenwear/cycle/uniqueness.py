@@ -21,6 +21,9 @@ from fenwear.assembly import Tribosystem
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
 
+NO_JUMPS = (  # V_cr of R. A. Burton, and what becomes of the contact beyond it: hot bands that wear, cool and move
+    'hot bands come and go within few of them, which jumps cannot pass over: run.integration = "implicit" follows them'
+)
 FEW = 50  # contact nodes up to which all eigenvalues are found
 
 
@@ -77,15 +80,21 @@ def opened_by_heat(system: Tribosystem, phase: int, pressure: Array) -> Array:
     return np.asarray(exchange.gap_change(changes, phase) / system.interfaces[phase].elastic_length)
 
 
-def heat_warnings(gain: float | None) -> list[str]:
-    """Return what is to be said of a contact whose friction heat gives back a share of the pressure."""
+def heat_warnings(gain: float | None, *, jumps: bool = False) -> list[str]:
+    """Return what is to be said of a contact whose friction heat gives back a share of the pressure.
+
+    Args:
+        gain: The share.
+        jumps: Whether a run goes on by jumps.
+    """
     if gain is None or gain < 1:
         return []
+    beyond = f"; {NO_JUMPS}" if jumps else ""
     return [
         f"friction heats what presses, and what is heated presses more: within a half-cycle the heat gives back "
         f"{gain:.3g} times the pressure that it is from, and from 1 on the contact may have several answers; which of "
         "them is found depends on how and from where it is solved. Expected less friction or speed, less heat into the "
-        "contact, or, to follow how the contact breaks up, shorter half-cycles"
+        f"contact, or, to follow how the contact breaks up, shorter half-cycles{beyond}"
     ]
 
 

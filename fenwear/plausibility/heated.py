@@ -42,7 +42,8 @@ class HeatMonitor:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)
             values |= {CHANGE: fineness.change, DIFFERENCE: fineness.difference}
         found = dict(fineness_remarks(system))
-        for text in heat_warnings(gain):
+        jumps = system.made_from is not None and system.made_from.run.integration == "jump"
+        for text in heat_warnings(gain, jumps=jumps):
             found["answers"] = text
         new = [text for kind, text in found.items() if kind not in self._texts]
         worst = {KINDS[name] for name, value in values.items() if value and value >= self.numbers.get(name, value)}

@@ -221,7 +221,7 @@ class CreepStep:
         position, interface = self._position, self._position.interface
         force, operator = position.pair.normal * (position.pair.weights * pressure)[:, None], interface.punch
         if part == 1:
-            force, operator = -(position.reading.T @ position.pair.placement.back(force)), interface.strip
+            force, operator = -position.reaction(force), interface.strip
         moved = force if self._creep.behind is not None else operator.apply(force)
         return self._creep.elastic(force, moved, 0.0)
 
@@ -264,8 +264,7 @@ class CreepStep:
 
 def _normals_of_strip(position: Position) -> Array:
     """Return the normals at the nodes of the strip's operator (q, d): those of the contact nodes that read them."""
-    reading = position.reading
-    found = np.asarray(reading.T @ position.pair.placement.back(position.frame[:, 0]))
+    found = position.reaction(position.frame[:, 0])
     lengths = np.linalg.norm(found, axis=1)
     mean = position.pair.placement.back(position.frame[:, 0]).mean(axis=0)
     found[lengths == 0] = mean

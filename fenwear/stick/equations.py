@@ -276,7 +276,7 @@ class Step:
         moved = found.moved or self._moved(f, found.jump)
         crept = self.before.crept
         if self.creep is not None and self.imposed.loaded.by_force is not None:
-            (punch, strip), (push, back) = self.imposed.loaded.by_force, self._forces(f)
+            (punch, strip), (push, back) = self.imposed.loaded.by_force, self.position.forces(f)
             elastic = (
                 self.creep.elastic(push, moved.on_punch, punch),
                 self.creep.elastic(-back, moved.on_strip, strip),
@@ -310,14 +310,8 @@ class Step:
             jump: What they move the surfaces by (d n,); None where it is not known.
         """
         del jump
-        (force, back), interface = self._forces(f), self.interface
+        (force, back), interface = self.position.forces(f), self.interface
         return SurfaceDisplacement(np.zeros(0), interface.punch.apply(force), -interface.strip.apply(back))
-
-    def _forces(self, f: Array) -> tuple[Array, Array]:
-        """Return the forces of tractions (d n,) on the punch (n, d), and against those on the strip (q, d)."""
-        position = self.position
-        force = position.in_space(f * position.weights)
-        return force, position.reading.T @ position.pair.placement.back(force)
 
 
 def _solved(A: Array, b: Array) -> tuple[Array, int]:

@@ -95,6 +95,15 @@ class Position:
         """Takes displacements of the strip at the nodes of its operator to the contact nodes (n, q)."""
         return self.pair.transfer if self.interface.strip_moves else identity(len(self.pair.weights))
 
+    def reaction(self, force: Array) -> Array:
+        """Return what acts against the strip at the nodes of its operator (q, d) by forces on the punch (n, d)."""
+        return np.asarray(self.reading.T @ self.pair.placement.back(force))
+
+    def forces(self, f: Array) -> tuple[Array, Array]:
+        """Return the forces of tractions (d n,) on the punch (n, d), and against those on the strip (q, d)."""
+        force = self.in_space(f * self.weights)
+        return force, self.reaction(force)
+
     @cached_property
     def compliance(self) -> FrameCompliance:
         """C, mm/MPa."""

@@ -178,8 +178,7 @@ def record(
     before, state, position = at.contact, after.contact, interface.position(step.offset)
     weights = position.pair.weights
     f = np.concatenate([state.pressure, state.traction.T.ravel()])
-    force = position.in_space(f * position.weights)
-    back = position.reading.T @ position.pair.placement.back(force)
+    force, back = position.forces(f)
     on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
     layers, closure = interface.layers, interface.layers.closure_at(position.pair, at.worn)
     closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)

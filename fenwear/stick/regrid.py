@@ -37,8 +37,7 @@ def on_other_grid(
     loaded = after.expanded(interface.loaded(step.fraction).times(at.load), step.offset)
     opening, pressure = after.opening(position, worn), _at(contact.pressure, nodes)
     traction = _along(contact.traction, nodes)
-    force = position.in_space(np.concatenate([pressure, traction.T.ravel()]) * position.weights)
-    back = position.reading.T @ position.pair.placement.back(force)
+    force, back = position.forces(np.concatenate([pressure, traction.T.ravel()]))
     beside = None
     if contact.beside is not None:
         old = before.interface.position(before.program.steps[at.next_step - 1].offset)

@@ -187,12 +187,12 @@ def record(
         on_punch, on_strip, closed = (
             own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
         )
-    stored = np.vdot(force, on_punch) - np.vdot(back, on_strip)
+    stored = float(np.vdot(force, on_punch) - np.vdot(back, on_strip))
     lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
     work = state.force * (state.displacement - before.displacement) + lowered
     carried = position.beside(state.beside) - position.beside(before.beside)
     work += float((f * position.weights) @ carried)
-    stored += weights @ (state.pressure * closed)
+    stored += float(weights @ (state.pressure * closed))
     slipped = np.linalg.norm(state.slip, axis=1)
     coatings, bases = wear.both(state.pressure, slipped, step.duration)
     values = (

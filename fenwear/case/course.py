@@ -51,7 +51,7 @@ class ProgramStep(Part):
     distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or: of sliding")
     time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or: how long")
     load: _ramp(Annotated[Force, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="normal force: all loads of the case change in its proportion"
+        default=None, description="normal force, its mean over a cycle: all loads of the case change in its proportion"
     )
     load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         default=None, description="or: all loads of the case times this"

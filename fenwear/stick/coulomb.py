@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from zlib import crc32
 
 import numpy as np
 
@@ -61,14 +62,14 @@ class Memory:
         cycle: The last one, on the shape of the run, from which jumps go on; None where there is none.
         warm: Temperatures at the end of that cycle, where there is one with heat; else none.
         stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
-        meshes: What tells apart the bodies that it belongs to.
+        made_of: What tells apart the bodies, and what is done to them, that the cycle belongs to.
     """
 
     at: PartialSlipState
     cycle: FrettingCycle | None = None
     warm: tuple[HeatState, ...] = ()
     stuck: Array | None = None
-    meshes: float = 0.0
+    made_of: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -111,14 +112,15 @@ class StickSetup:
     Attributes:
         problem: The bodies, and what is done to them in a cycle.
         fineness: Of its time steps; None where they are taken as they are given.
-        meshes: What tells these bodies apart from those on other meshes or with other properties.
+        made_of: What tells these bodies, and what is done to them, apart from those on other meshes, with other
+            properties or in another stage of a program.
         ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
         prepared: Whether heat is, and its time steps are fine enough, where they are to be.
     """
 
     problem: PartialSlipProblem
     fineness: Fineness | None
-    meshes: float
+    made_of: float
     ends: Ends | None = None
     prepared: bool = True
 
@@ -203,7 +205,7 @@ class Coulomb:
         worn = carried(memory.at.worn, before, after)
         at = problems[1].led(partial(on_other_grid, memory.at, *problems, nodes, worn))
         stuck = None if stuck is None else on_nodes(stuck, nodes, np.zeros(len(nodes)))
-        return Memory(at, stuck=stuck, meshes=memory.meshes)
+        return Memory(at, stuck=stuck, made_of=memory.made_of)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle; implicitly, of one cycle."""
@@ -255,7 +257,7 @@ def system_of(
             problem, fineness = fine_enough(problem, case)
             ends = fineness.ends
     exchange = None if problem.heat is None else problem.heat.exchange
-    setup = StickSetup(problem, fineness, _told_apart(bodies), ends, heat != "none")
+    setup = StickSetup(problem, fineness, _told_apart(case, bodies), ends, heat != "none")
     return replace(system, exchange=exchange, law_state=setup)
 
 
@@ -268,11 +270,12 @@ def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
     return sliding.measured_on(pair).motion.as_one(sliding.field.over(float(rate)))
 
 
-def _told_apart(bodies: Bodies) -> float:
-    """Return a number of the wear that the meshes follow and of the warmth of properties; collective."""
+def _told_apart(case: Case, bodies: Bodies) -> float:
+    """Return a number of the wear that the meshes follow, the warmth of properties and what is done; collective."""
     worn = 0.0 if bodies.followed is None else float(bodies.followed.punch.sum() + bodies.followed.strip.sum())
     warm = 0.0 if bodies.warmed is None else float(sum(one.sum() for one in bodies.warmed))
-    return worn + bodies.comm.allreduce(warm)
+    done = case.motion, case.stick, case.contact, case.wear, case.heat, case.loading
+    return float(crc32(repr((worn, bodies.comm.allreduce(warm), done)).encode()))
 
 
 class _Run:
@@ -382,7 +385,7 @@ class HalfCycles(_Run):
         if exchange is not None and at.temperature is not None:
             warm = exchange.at(at.temperature)
         memory = Memory(
-            replace(at, worn=worn, held=None, temperature=None), stuck=stuck.astype(float), meshes=self.setup.meshes
+            replace(at, worn=worn, held=None, temperature=None), stuck=stuck.astype(float), made_of=self.setup.made_of
         )
         return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
 
@@ -413,10 +416,9 @@ class Jumps(_Run):
         """Return the state after the next jump that is accurate enough, and its last cycle."""
         problem, strokes, exchange = self.problem, self.strokes, self.system.exchange
         now = self._cycle(state)
-        load = self.loading(float(state.half_cycle))
         begun = None if state.finer is None else state.finer.worn
-        ends = replace(now, length=state.jump_length, end=replace(now.end, load=load), finer=begun)
-        then = jumped(problem, ends, until // strokes, self.tolerance, self._fits)
+        begin = replace(now, length=state.jump_length, finer=begun)
+        then = jumped(problem, begin, until // strokes, self.tolerance, self._load, self._fits)
         cycles = then.number - now.number
         number = then.number * strokes
         totals = state.totals + self._adds(now, then, cycles)
@@ -442,7 +444,7 @@ class Jumps(_Run):
         if exchange is not None and then.warm is not None and then.end.temperature is not None:
             warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
         kept = replace(then, end=replace(then.end, temperature=None), warm=None, finer=None)
-        memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.meshes)
+        memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.made_of)
         done = RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory)
         return (done if then.finer is None else replace(done, finer=self._finer(done, then, until))), made
 
@@ -460,13 +462,18 @@ class Jumps(_Run):
         """Return whether the contact has room on its grid: it grows before its rim is reached."""
         return not at_rim(self.system, (cycle.worn.punch > 0) | cycle.records.touched)
 
+    def _load(self, cycles: float) -> float:
+        """Return the factor of all loads after so many cycles."""
+        return self.loading(cycles * self.strokes)
+
     def _cycle(self, state: RunState) -> FrettingCycle:
-        """Return the cycle on the shape of a state."""
+        """Return the cycle on the shape of a state: a new one where a stage of a program begins, or meshes are new."""
         memory, exchange = state.memory, self.system.exchange
-        if memory is None or memory.cycle is None or memory.meshes != self.setup.meshes:
-            at = self.at(state, self.loading(float(state.half_cycle)))
-            return first_cycle(self.problem, at, state.worn, state.half_cycle // self.strokes, self.temperature(state))
-        cycle: FrettingCycle = memory.cycle
+        number = state.half_cycle // self.strokes
+        cycle: FrettingCycle | None = None if memory is None else memory.cycle
+        load = self._load(number)
+        if cycle is None or memory is None or memory.made_of != self.setup.made_of or cycle.end.load != load:
+            return first_cycle(self.problem, self.at(state, load), state.worn, number, self.temperature(state))
         if exchange is None:
             return cycle
         (after,) = memory.warm

@@ -12,6 +12,8 @@ What lies between goes on with the depths: y has its state, too. Of coated bodie
 lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
 through their end (`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere.
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
+Loads that change are those of each rate's own time: alone they would leave that rule nothing to see, so that the wear
+halfway is looked at, too.
 Both look at begin and end alone: where coefficients change with the depth, as where a coating's friction ends,
 Simpson's rule with the wear of one more cycle, at the shape halfway, gives it, too.
 
@@ -53,6 +55,7 @@ def jumped(
     now: FrettingCycle,
     cycles: int,
     tolerance: float,
+    load: Callable[[float], float] = lambda _: 1.0,
     fits: Callable[[FrettingCycle], bool] = lambda _: True,
 ) -> FrettingCycle:
     """Return the cycle after the next jump that is accurate enough.
@@ -62,6 +65,7 @@ def jumped(
         now: The cycle to go on from.
         cycles: How many in all.
         tolerance: Largest estimated error of one jump.
+        load: Factor of all loads after so many cycles.
         fits: Whether the nodes suffice for the cycle after it: it is halved where they do not.
 
     Raises:
@@ -71,7 +75,7 @@ def jumped(
     while True:
         tried = min(length, cycles - now.number)
         try:
-            then = _attempt(problem, now, tried)
+            then = _attempt(problem, now, tried, load)
         except ConvergenceError:
             if tried == 1:
                 raise
@@ -156,7 +160,9 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
     return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
-def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> FrettingCycle:
+def _attempt(
+    problem: PartialSlipProblem, now: FrettingCycle, cycles: int, load: Callable[[float], float]
+) -> FrettingCycle:
     """Return the cycle after a jump."""
     problem = problem.worn_like(now.records, now.first_step)
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
@@ -185,17 +191,17 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     solve = _Implicit(problem, now, cycles).solve
     off = None if now.finer is None else begin - whole(problem.coatings.measured(now.finer))
     first = solve(rate)
-    start = _slid_on(now, cycles)
+    start = _slid_on(now, cycles, load)
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = solve(rate_of(middle) - 2 * first)
     worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     end = whole(problem.coatings.measured(worn))
     then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + rate_of(then)))
-    if cycles > 1 and problem.losses.changes_between(now.worn, worn):
+    if cycles > 1 and (start.load != now.end.load or problem.losses.changes_between(now.worn, worn)):
         halfway = (begin + end) / 2 + cycles / 8 * (rate - rate_of(then))  # cubic by Hermite
         shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
-        between_them = _rate(problem, _slid_on(now, cycles / 2), shape, now.number + cycles // 2, now)
+        between_them = _rate(problem, _slid_on(now, cycles / 2, load), shape, now.number + cycles // 2, now)
         simpson = cycles / 6 * (rate + 4 * rate_of(between_them) + rate_of(then))
         seen = solve(end - begin - simpson)
         missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
@@ -352,9 +358,9 @@ class _Implicit:
         return found
 
 
-def _slid_on(now: FrettingCycle, cycles: float) -> PartialSlipState:
-    """Return the end of a cycle after so many more, as far as what its nodes have slipped tells."""
-    slid = now.end.slid
+def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
+    """Return the end of a cycle under the load of so many later, as far as what its nodes have slipped tells."""
+    slid, end = now.end.slid, replace(now.end, load=load(now.number + cycles))
     if slid is None:
-        return now.end
-    return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slip_magnitude.sum(axis=0))
+        return end
+    return replace(end, slid=slid + max(cycles - 1, 0) * now.records.slip_magnitude.sum(axis=0))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fenwear import Block, CaseError, assemble, jump, load_case, march
+from fenwear.cycle import evolve
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.fineness import HALVINGS, fine_enough
@@ -98,6 +99,33 @@ def test_jumps_tend_to_the_march() -> None:
     assert differences[1] < differences[0]
     assert others[0] < 0.1
     assert others[1] < min(0.02, others[0])
+
+
+HARDLY_WORN = ("wear.punch.coefficient='1e-14 1/MPa'", "wear.strip.coefficient='1e-14 1/MPa'", "stick.step_tolerance=1")
+
+
+def work_of_program(steps: str, integration: str = "jump") -> float:
+    """Return the work of friction of a program on bodies that hardly wear, mJ."""
+    settings = [*SMALL, *HARDLY_WORN, "stick.steps=10", f"program.steps={steps}", f"run.integration={integration}"]
+    system = assemble(load_case("fretting-partial-slip", [*settings, "unset=['run.half_cycles']"]))
+    return list(evolve(system))[-1].totals.of("work")[-1]
+
+
+def test_a_spectrum_does_the_work_of_its_cycles() -> None:
+    """In jumps each block has cycles of its own from its first one on, whatever came before."""
+    blocks = [(50, 3.0), (20, 4.5), (100, 2.2), (20, 4.5), (3, 3.0)]
+    expected = 0.0
+    for count, amplitude in blocks:
+        own = problem(*HARDLY_WORN, "stick.steps=10", f"motion.amplitude='{amplitude} um'")
+        expected += count * second_cycle(own).energy(own.weights)
+    steps = [f"{{cycles={count}, amplitude='{amplitude} um'}}" for count, amplitude in blocks]
+    assert work_of_program(f"[{', '.join(steps)}]") == pytest.approx(expected, rel=5e-4)
+
+
+def test_jumps_follow_loads() -> None:
+    """Loads that leap, and a ramp of them, do the work in jumps that they do in a march."""
+    steps = "[{cycles=10}, {cycles=100, load_factor=[1.4, 0.8]}, {cycles=10, load_factor=1}]"
+    assert work_of_program(steps) == pytest.approx(work_of_program(steps, "explicit"), rel=3e-3)
 
 
 def test_worn_volume_goes_with_the_work_of_friction() -> None:

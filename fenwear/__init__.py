@@ -29,6 +29,7 @@ __all__ = [
     "cycles_to_reach",
     "evolve",
     "export",
+    "flash_temperatures",
     "growth_rate",
     "jump",
     "load_case",
@@ -72,6 +73,7 @@ _HOMES = {
     "export": "results.export",
     "read_history": "report.figures",
     "to_dataset": "results.dataset",
+    "flash_temperatures": "flash.temperatures",
     "sweep": "sweeps",
 }
 

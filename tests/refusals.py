@@ -16,7 +16,20 @@ import fenwear
 
 PHYSICS, MODEL = "physics", "model"
 KINDS = {MODEL: "Of the model, or of the way it is solved", PHYSICS: "Of nature"}
-ROOMS = ("assembly", "bodies", "case", "contact", "cycle", "heat", "interface", "layers", "life", "sliding", "stick")
+ROOMS = (
+    "assembly",
+    "bodies",
+    "case",
+    "contact",
+    "cycle",
+    "flash",
+    "heat",
+    "interface",
+    "layers",
+    "life",
+    "sliding",
+    "stick",
+)
 
 ASKS = re.compile(
     r"\b(expected|missing|exists?|solved for|belongs?|depends|act|grow|loads?|lose no|solves)\b|not (go|change)|^with ",
@@ -174,6 +187,14 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
             "wears a facet of its own, deeper for ever",
         )
     },
+    "flash/source.py": {
+        "shifts and turns the strip in many ways": (
+            MODEL,
+            "`flash` of a cycle that is a table: kernels of sources have one way to and fro",
+        ),
+        "where a cycle is done again": (MODEL, "`flash` of a test program with stick, whose last cycle is done again"),
+        "sources that move as a whole": (MODEL, "`flash` where the strip turns about a point near to the contact"),
+    },
     "heat/fitted.py": {"grow without heat": (MODEL, "a reduced basis whose temperatures grow of themselves")},
     "stick/coulomb.py": {
         "with a pressure_threshold": (
@@ -253,6 +274,8 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "cycle/stability.py": ("beyond all numbers", "did not come together"),
     "cycle/steady_inequality.py": ("the steady state with heat of {} contact nodes",),
     "cycle/uniqueness.py": ("is heated presses more",),
+    "flash/settings.py": ("its temperatures in its history", "expected one material where"),
+    "flash/temperatures.py": ("each instant of the long stroke",),
     "interface/pair.py": ("the punch lies below",),
     "layers/between.py": ("missing, but required",),
     "layers/debris.py": ("the conditions of the phases",),

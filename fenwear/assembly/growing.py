@@ -20,6 +20,7 @@ from fenwear.assembly.bodies import with_surfaces
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.grids import on_grid
+from fenwear.assembly.positions import place_case_bodies
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.bodies.grid import RegularGrid
@@ -60,6 +61,14 @@ def regridded(system: Tribosystem, grid: RegularGrid) -> Tribosystem:
     punch, strip = on_grid(system.case, system.sliding, before.punch, before.strip, grid)
     law: ContactLaw = system.contact_law
     return law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
+
+
+def placed_on(placed: ContactSetup, grid: RegularGrid) -> ContactSetup:
+    """Return placed bodies on another grid of their punch, without any elasticity; collective."""
+    before, case = placed.bodies, placed.case
+    punch, strip = on_grid(case, placed.sliding, before.punch, before.strip, grid)
+    bodies = with_surfaces(case, replace(before, punch=punch, strip=strip))
+    return place_case_bodies(case, bodies, placed.sliding)
 
 
 def relaid(system: Tribosystem, case: Case, grid: RegularGrid | None = None) -> Tribosystem:

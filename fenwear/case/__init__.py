@@ -9,7 +9,7 @@ from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocat
 from fenwear.case.own_laws import State, register_law
 from fenwear.case.plausible import plausibility_warnings
 from fenwear.case.quantities import Kind
-from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
+from fenwear.case.reading import builtin_cases, changed_case, heat_of, load_case, make_case
 from fenwear.case.schema import Case
 from fenwear.case.setup import Setup, Way
 from fenwear.case.thermal import Heat, Track
@@ -50,6 +50,7 @@ __all__ = [
     "WearLaw",
     "builtin_cases",
     "changed_case",
+    "heat_of",
     "load_case",
     "make_case",
     "plausibility_warnings",

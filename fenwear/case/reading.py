@@ -18,6 +18,7 @@ from fenwear.case.problems import problems_of
 from fenwear.case.profile import BODIES, with_profiles
 from fenwear.case.program import check_length, half_cycles_of, with_program
 from fenwear.case.schema import Case, Written
+from fenwear.case.thermal import Heat
 from fenwear.case.units import shown
 from fenwear.errors import CaseError, InputError
 
@@ -252,3 +253,19 @@ def changed_case(case: Case, *settings: str) -> Case:
     own, before = changed.written, case.written  # quantities are resolved now: how they were written is known of before
     as_were = {key: before.united.get(key, text) for key, text in own.united.items()}
     return changed.at(case.folder, Written(own.bare, as_were))
+
+
+def heat_of(settings: Sequence[str]) -> Heat:
+    """Return a table of heat by itself, of settings `heat.key=value`, all else of it by default.
+
+    Raises:
+        CaseError: lists every unknown key, wrong unit and impossible value.
+    """
+    data: dict[str, Any] = {"heat": {}}
+    for setting in settings:
+        _apply(data, setting)
+    try:
+        return Heat.model_validate(data["heat"])
+    except pydantic.ValidationError as error:
+        found = [{**one, "loc": ("heat", *one["loc"])} for one in error.errors()]
+        raise CaseError([p for one in found for p in problems_of(one, data)]) from None

@@ -56,6 +56,49 @@ def export_command(
         show(str(path))
 
 
+@app.command("flash")
+def flash_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run on a contact grid.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The folder of maps and pictures; by default DIR/flash.")
+    ] = None,
+    settings: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help='A key of heat, of a material or of a body\'s temperatures: --set heat.convection="20 W/(m^2 K)"',
+        ),
+    ] = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Tell how hot the contact of a run on a grid gets: flash temperatures by moving sources, one way."""
+    from fenwear.flash.temperatures import flash_temperatures
+    from fenwear.flash.told import dataset, numbers, text
+    from fenwear.report.draw import DPI
+    from fenwear.report.flash import figures
+    from fenwear.report.style import name_bodies, save
+    from fenwear.results.disk import writing
+    from fenwear.results.netcdf import write
+
+    found = flash_temperatures(directory, settings)
+    folder, names = output or directory / "flash", found.heating.placed.names
+
+    def keep() -> None:
+        maps = dataset(found)
+        drawn = figures(maps)
+        name_bodies(drawn.values(), names)
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            write(folder / "flash.nc", maps)
+            for name, figure in drawn.items():
+                save(figure, folder / f"{name}.png", DPI)
+
+    on_root(MPI.COMM_WORLD, keep)
+    told = numbers(found) if as_json else names.told(text(found, str(directory)))
+    show_results(told, f"maps and pictures in {folder}")
+
+
 @app.command("compare")
 def compare_command(
     directories: Annotated[

@@ -13,7 +13,7 @@ import tomllib
 import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
@@ -245,6 +245,37 @@ def grid(directory: Path, system: Tribosystem) -> RegularGrid | None:
 
     found, own = on_root(system.comm, read), system.pair.punch.grid
     return None if found is None or own is None else own.with_numbers(found)
+
+
+@dataclass(frozen=True)
+class LastContact:
+    """The contact of the last cycle of a run, as its checkpoint has it.
+
+    Attributes:
+        half_cycle: It ends with.
+        pressure: Of each phase (phases, n), MPa; NaN where there was none yet.
+        worn: Depths at its end.
+        grid: Corner, spacing and counts of a contact grid that grows (3, d - 1); None of one that stays.
+        followed: The wear that the meshes follow; None where they are as made.
+    """
+
+    half_cycle: int
+    pressure: Array
+    worn: WornDepths
+    grid: Array | None
+    followed: WornDepths | None
+
+
+def last_contact(directory: Path) -> LastContact:
+    """Return the contact of a run's last cycle; for one rank.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is damaged.
+    """
+    arrays = _arrays(find(directory))
+    worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
+    follows = WornDepths(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
+    return LastContact(int(arrays["half_cycle"]), arrays["pressure"], worn, arrays.get(GRID), follows)
 
 
 def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:

@@ -1,0 +1,253 @@
+"""How hot the contact of a finished run gets: flash temperatures of its last cycle, and what the finite bodies add.
+
+It goes one way: pressures and wear of the run make the heat, and its temperatures do not act back on them. How far that
+may be tells the share of a pressure that its own bulge would give back: heat mu v p that goes into both bodies by their
+shares s_i raises waves of the number k by alpha_i (1 + nu_i) s_i / (K_i k^2), which pressures of E* k / 2 flatten,
+
+    G = mu v E* sum of alpha_i (1 + nu_i) s_i / K_i / (2 k),
+
+at rest and in the end: at G = 1 waves grow by themselves (R. A. Burton, Wear 59, 1980, 1; J. R. Barber, Wear 26, 1973,
+425). It is told of the longest that fits into the contact, k = 2 pi over its length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import build_conduction
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.half_space import extent_along
+from fenwear.case import Case, Heat
+from fenwear.flash.bulk import bulk_of, spots_of
+from fenwear.flash.kernels import cell_integrals, history_kernel
+from fenwear.flash.partition import NO_BULK, Bulk, HeatedSide, mean_power, shared
+from fenwear.flash.response import Instants, Periodic, Response
+from fenwear.flash.settings import Conductor, conductors, run_case_of
+from fenwear.flash.source import Heating, Past, heating_of
+from fenwear.results.history import CASE
+
+HALF_SPACE = "half-space"
+BODIES = ("punch", "strip")
+FEW = 12  # nodes across what touches, below which temperatures are rough
+FELT = 0.1  # share of a pressure that its bulge gives back, from which on it is told
+QUICK = 1.0  # of the time in which heat spreads over the contact, over that of a stroke: beyond, instants feel others
+
+
+@dataclass(frozen=True)
+class FlashTemperatures:
+    """Temperatures of a contact over a cycle, at t instants of m by n nodes.
+
+    Attributes:
+        heating: What heats.
+        heat: That goes into punch and strip (t, m, n), mW/mm².
+        flash: Rise of the surfaces of both over their bulk (t, m, n), K.
+        bulk: What is added to it at the contact by each finite body, K over the surroundings; None where it is not
+            known.
+        way: How it was found: "steady", "harmonics" or "instants".
+        peclet: Largest v a / 2 kappa of both bodies, a half the contact's length.
+        quick: a^2 / kappa over the time of a half-cycle, of both; 0 of one that is steady.
+        feedback: G; None without `expansion`.
+        across: Nodes across what touches along both axes.
+        warnings: What is to be known of them.
+    """
+
+    heating: Heating
+    heat: tuple[Array, Array]
+    flash: tuple[Array, Array]
+    bulk: tuple[float, float] | None
+    way: str
+    peclet: tuple[float, float]
+    quick: tuple[float, float]
+    feedback: float | None
+    across: tuple[int, int]
+    warnings: tuple[str, ...]
+
+    @property
+    def powers(self) -> tuple[float, float]:
+        """Mean heat into punch and strip, mW."""
+        cell = self.heating.window.cell
+        first, second = (mean_power(one, cell) for one in self.heat)
+        return first, second
+
+
+def flash_temperatures(directory: Path | str, settings: Sequence[str] = ()) -> FlashTemperatures:
+    """Return the temperatures of the last cycle of a run on a contact grid; collective.
+
+    Args:
+        directory: Of the run.
+        settings: Overrides `key=value` of its materials, of a table of heat, and of held temperatures.
+
+    Raises:
+        CaseError: there is no such run, or what its temperatures need is missing; names the keys.
+        ConvergenceError: the share of the heat was not found.
+    """
+    folder = Path(directory)
+    case, heat = run_case_of(folder / CASE, settings)
+    heating = heating_of(run_case_of(folder / CASE, ())[0], folder)
+    ever = np.zeros(len(heating.placed.pair.weights), dtype=bool)
+    ever[heating.window.nodes] = heating.touching.any(axis=0)
+    both = conductors(heating.placed, case, heat, ever)
+    friction = (1 - heat.debris) * heating.heat
+    bulks, remarks = _bulks(case, heat, heating, both)
+    sides = [
+        HeatedSide(_response(heating, one, moves=name == "strip"), one.conductivity, one.diffusivity, bulk or NO_BULK)
+        for name, one, bulk in zip(BODIES, both, bulks or (None, None), strict=True)
+    ]
+    own = _shared(heat, heating, sides, friction)
+    parts = own, friction - own
+    flash = sides[0].response.apply(parts[0]), sides[1].response.apply(parts[1])
+    powers = mean_power(parts[0], heating.window.cell), mean_power(parts[1], heating.window.cell)
+    levels = None
+    if bulks is not None:
+        first, second = (one.base + one.per_power * power for one, power in zip(bulks, powers, strict=True))
+        levels = first, second
+    numbers = _numbers(heating, both)
+    feedback = _feedback(heating, both, powers)
+    warnings = [*remarks, *_warnings(heating, numbers, feedback)]
+    way = "steady" if np.isinf(heating.period) else "instants" if heating.pasts else "harmonics"
+    return FlashTemperatures(heating, parts, flash, levels, way, *numbers, feedback, _across(heating), tuple(warnings))
+
+
+def _response(heating: Heating, one: Conductor, *, moves: bool) -> Response:
+    """Return the half-space that a body is."""
+    sides, shape, kappa = heating.window.sides, heating.window.shape, one.diffusivity
+    if np.isinf(heating.period):
+        velocity = heating.velocities[0] if moves else np.zeros(2)
+        x, y = (float(part) / (2 * kappa) for part in velocity)
+        return Instants(one.conductivity, cell_integrals(shape, sides, float(np.hypot(x, y)), (x, y))[None])
+    if heating.pasts:
+        kernels = [
+            history_kernel(
+                shape,
+                sides,
+                kappa,
+                heating.period,
+                past if moves else partial(_still, past),
+                heating.fastest if moves else 0.0,
+            )
+            for past in heating.pasts
+        ]
+        return Instants(one.conductivity, np.array(kernels))
+    shifts = heating.shifts if moves else np.zeros_like(heating.shifts)
+    return Periodic(one.conductivity, kappa, heating.period, sides, shape, shifts)
+
+
+def _still(past: Past, before: Array) -> tuple[Array, Array]:
+    """Return the heat of before of a body that stays in its place."""
+    return np.zeros((len(before), 2)), past(before)[1]
+
+
+def _shared(heat: Heat, heating: Heating, sides: Sequence[HeatedSide], friction: Array) -> Array:
+    """Return what of the heat goes into the punch (t, m, n), mW/mm²."""
+    resistance = None
+    if heat.conductance == 0 and heat.conductance_per_pressure is None:
+        return heat.partition * friction
+    if heat.conductance_per_pressure is not None:
+        first, second = heat.conductance_per_pressure
+        per_pressure = first * second / (first + second)
+        resistance = 1 / (per_pressure * np.where(heating.touching, heating.pressure, 1.0))
+    elif heat.conductance != "perfect":
+        resistance = np.full(friction.shape, 1 / float(heat.conductance))
+    period = np.inf if heating.pasts else heating.period
+    return shared(
+        sides[0],
+        sides[1],
+        friction,
+        heating.touching,
+        heating.window.sides,
+        period,
+        resistance=resistance,
+        given=heat.partition,
+    )
+
+
+def _bulks(
+    case: Case, heat: Heat, heating: Heating, both: Sequence[Conductor]
+) -> tuple[tuple[Bulk, Bulk] | None, list[str]]:
+    """Return what the finite bodies add, None where one of them has no steady state, and what is said; collective.
+
+    Of a strip that goes one way the meshed part is none of its own: it is as warm as it comes.
+    """
+    placed, grid, window = heating.placed, heating.grid, heating.window
+    bodies = build_conduction(case.model_copy(update={"heat": heat}), placed.bodies.punch, placed.bodies.strip)
+    assert bodies is not None
+    elastics: tuple[ElasticBody, ElasticBody] = placed.bodies.punch, placed.bodies.strip
+    x, powers = grid.flat[window.nodes.ravel()], window.cell * heating.heat.reshape(len(heating.heat), -1)
+    places = np.broadcast_to(x, (len(powers), *x.shape)), x - heating.shifts[:, None]
+    found: list[Bulk] = []
+    remarks: list[str] = []
+    for name, body, elastic, one, at in zip(BODIES, bodies, elastics, both, places, strict=True):
+        spots = spots_of(at.reshape(-1, 2), powers.ravel())
+        ends = np.array([extent_along(elastic, axis) for axis in grid.axes]).T
+        beyond = bool((spots.places < ends[0]).any() or (spots.places > ends[1]).any())
+        if elastic.operator == HALF_SPACE or beyond or (name == "strip" and np.isinf(heating.period)):
+            found.append(NO_BULK)
+            if beyond:
+                remarks.append(f"the {name} is not meshed as far as it slides: it is taken as a half-space")
+            continue
+        bulk = bulk_of(body, elastic, one.conductivity, spots)
+        if bulk is None:
+            text = f"the {name} loses heat nowhere, so that it has no steady temperature: told is the flash above the"
+            return None, [f"{text} bulk alone; give heat.convection, or {name}.temperatures"]
+        found.append(bulk)
+    return (found[0], found[1]), remarks
+
+
+def _numbers(heating: Heating, both: Sequence[Conductor]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the largest Peclet number of each body, and the time in which heat spreads over a half-cycle's."""
+    half = float(heating.extent.max()) / 2
+    first, second = (heating.fastest * half / (2 * one.diffusivity) for one in both)
+    if np.isinf(heating.period):
+        return (first, second), (0.0, 0.0)
+    one, two = (2 * half**2 / one.diffusivity / heating.period for one in both)
+    return (first, second), (one, two)
+
+
+def _across(heating: Heating) -> tuple[int, int]:
+    first, second = (round(one) for one in heating.extent / heating.window.sides)
+    return first, second
+
+
+def _feedback(heating: Heating, both: Sequence[Conductor], powers: tuple[float, float]) -> float | None:
+    """Return G of the longest wave in the contact by the largest heat for a pressure; None without expansion."""
+    materials = [one.material for one in both]
+    if any(one.expansion is None for one in materials):
+        return None
+    touching = heating.touching
+    per_pressure = float((heating.heat[touching] / heating.pressure[touching]).max(initial=0.0))  # mu v
+    ease = sum((1 - one.poisson**2) / float(one.young) for one in materials)
+    shares = np.abs(powers) / max(sum(powers), 1e-300)
+    bulge = sum(
+        float(one.material.expansion) * (1 + one.material.poisson) * share / one.conductivity
+        for one, share in zip(both, shares, strict=True)
+    )
+    return per_pressure / ease * bulge * float(heating.extent.max()) / (4 * np.pi)
+
+
+def _warnings(
+    heating: Heating, numbers: tuple[tuple[float, float], tuple[float, float]], feedback: float | None
+) -> list[str]:
+    """Return what is to be known of the temperatures."""
+    found = []
+    if min(_across(heating)) < FEW:
+        found.append(
+            f"what touches is {min(_across(heating))} nodes wide, and temperatures are rough below {FEW}: take a finer "
+            "grid"
+        )
+    if heating.pasts and max(numbers[1]) > QUICK:
+        found.append(
+            "each instant of the long stroke is by itself, its heat shared as if it had always been shared so; heat "
+            f"spreads over the contact in {max(numbers[1]):.2g} half-cycles, where 1 is expected at most"
+        )
+    if feedback is not None and feedback > FELT:
+        found.append(
+            f"the bulge of the heat would give back {feedback:.2g} of a pressure: it is left out here, and from about "
+            f"{FELT:g} on the contact would be smaller, pressed more and hotter"
+        )
+    return found

@@ -208,7 +208,7 @@ class CondensedContact:
         self.most = np.inf if self._many or m > 1 else most
         upper[:n] = self.most / self._pressure_scale
         self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
-        self.inequality.sets_first, self.inequality.by_digits = self._many, self._gridded
+        self.inequality.sets_first, self.inequality.by_digits = self._many, self.gridded
 
     def _slide(self, phases: Iterable[int]) -> None:
         """Take the friction of phases."""
@@ -226,7 +226,7 @@ class CondensedContact:
         self.blocks = [block for block in blocks if block is not None]
         for derived in ("_grid", "_own_diagonal"):
             self.__dict__.pop(derived, None)
-        if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self._gridded:
+        if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self.gridded:
             self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
@@ -336,7 +336,7 @@ class CondensedContact:
         return self._elastic
 
     @property
-    def _gridded(self) -> bool:
+    def gridded(self) -> bool:
         """Whether all compliances are convolutions on a grid."""
         return bool(self.blocks) and all(isinstance(block.compliance, Convolution) for block in self.blocks)
 
@@ -349,7 +349,7 @@ class CondensedContact:
         self, wear: Array | None = None, before: Operator | None = None, layer: Array | None = None
     ) -> ManyNodes | GriddedPhases:
         """Return the derivative without a matrix of all nodes."""
-        if self._gridded and wear is None:
+        if self.gridded and wear is None:
             return GriddedPhases(self._grid)
         known = before if isinstance(before, ManyNodes) else None
         if self._spread is None or layer is not None:
@@ -378,7 +378,7 @@ class CondensedContact:
             return self._linear
         m, n = self.shape
         pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
-        if self._gridded and self._coupling is None:
+        if self.gridded and self._coupling is None:
             return self._worn_on_grid(pressure, scale)
         left, slope = None, self._wearing.local(pressure)
         if slope is None:
@@ -474,12 +474,12 @@ class CondensedContact:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing
         self.inequality.curved = self._mu is not None or (
-            wearing is not None and (wearing.curved or (self.follows and not self._gridded))
+            wearing is not None and (wearing.curved or (self.follows and not self.gridded))
         )
         bends = wearing is not None and wearing.curved and n > SOME  # of fewer a factor costs less than to ask for it
         self.inequality.diagonal = self._diagonal if bends else None
         x, f, iterations = self._solve(start)
-        if self._gridded and isinstance(operator := self._linear, GriddedPhases):
+        if self.gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)
         x, f = x.reshape(m, -1), f.reshape(m, -1)
         pressure, open_ = x[:, :n] * self._pressure_scale, x[:, :n] <= ZERO

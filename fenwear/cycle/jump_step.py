@@ -117,7 +117,9 @@ class _Trend:
             self._contacts.setdefault(time, contact)
 
     def from_one(self, contact: ContactState | None, since: float, to: float) -> ContactState | None:
-        """Return what a contact at one time will be near at another one."""
+        """Return what a contact at one time will be near at another one; where it is not known, what is known there."""
+        if contact is None:
+            contact, since = self._near(to)
         if contact is None or len(self._contacts) < 2:
             return contact
         pressure, rigid = contact.pressure.copy(), contact.rigid.copy()
@@ -126,6 +128,11 @@ class _Trend:
                 pressure += sign * share * known.pressure
                 rigid += sign * share * known.rigid
         return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
+
+    def _near(self, time: float) -> tuple[ContactState | None, float]:
+        """Return the contact that is known next to a time, and when it is; None of none."""
+        known = min(self._contacts, key=lambda known: abs(known - time), default=time)
+        return self._contacts.get(known), known
 
     def _line(self, time: float) -> list[tuple[float, ContactState]]:
         """Return the shares at a time of the two contacts next to it, and them; of one alone that is of that time."""
@@ -381,7 +388,7 @@ class Stepper:
         """
         gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
         if start is None:  # the first of all: what conducts is seen from the contact without heat
-            start = self._solve(gap, None, (before.worn, cycles))
+            start = self._solve(gap, self._of_first_phase(gap), (before.worn, cycles))
         solved = self.coupled.solve(
             before.temperature,
             cycles - 0.5,
@@ -406,6 +413,19 @@ class Stepper:
         if creep is not None:
             worn = replace(worn, crept=creep.rate(contact.pressure))
         return _Stage(contact, heated, worn, adds, solved.conductances, self._through_coatings(contact.pressure))
+
+    def _of_first_phase(self, gap: Array) -> ContactState | None:
+        """Return the contact of the first phase alone, in every phase; None where all are found by factors at once.
+
+        Products cost as many times as much as there are phases, and sets of nodes are many from nothing.
+        """
+        if len(gap) == 1 or not (isinstance(self.contact, CondensedContact) and self.contact.gridded):
+            return None
+        alone = self.system.phase_contact([0])
+        alone.press(self._load)
+        first = alone.solve(gap[0])
+        pressure, open_, rigid = (np.repeat(own, len(gap), axis=0) for own in (first.pressure, first.gap, first.rigid))
+        return ContactState(pressure, open_, rigid, first.iterations)
 
     def _through_coatings(self, pressure: Array) -> ThroughCoatings | None:
         """Return what is worn through coatings at pressures (m, n); None without coatings."""

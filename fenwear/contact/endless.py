@@ -140,10 +140,9 @@ class EndlessGrid:
         if self._worn is not None:
             by, to, small = self._worn
             if by.ndim == 3:
-                common = (small * (by @ waves)[:, None]).sum(axis=2)
-                waves = waves - to @ common
+                waves = waves - to @ _through(small, by @ waves)
             else:
-                common = (small * (by * waves[:, None]).sum(axis=2)[:, None]).sum(axis=2)
+                common = _through(small, (by * waves[:, None]).sum(axis=2))
                 waves = waves - (to * common[:, None]).sum(axis=2)
         return waves * self.inverse
 
@@ -157,7 +156,7 @@ class EndlessGrid:
         if by.ndim == 3:
             by, to = by[..., None], to[..., None]
         m = moved.shape[1]
-        columns = (small[:, :, :, None] * (by * moved[:, None])[:, None]).sum(axis=2)  # (i, pairs, m, j)
+        columns = _through(small[:, :, :, None], by * moved[:, None])  # (i, pairs, m, j)
         rows = (to * divided[:, :, None]).transpose(1, 0, 2, 3)  # (m, i, pairs, j)
         return found - (rows.reshape(m, -1) @ columns.transpose(0, 1, 3, 2).reshape(-1, m)).real
 
@@ -188,13 +187,15 @@ class Patch:
         self._m, self._r = m, r = modes.shape[:2]
         self._moved = [endless.forward(modes[:, s]) for s in range(r)]
         if isinstance(balance, float):
-            self._held = [endless.measure(balance * moved) for moved in self._moved]
+            held = [endless.measure(balance * moved) for moved in self._moved]
         else:
-            self._held = [endless.measure(endless.forward(balance[:, s])) for s in range(r)]
+            held = [endless.measure(endless.forward(balance[:, s])) for s in range(r)]
+        # Real parts of their products with waves are products of numbers twice as many.
+        self._held = [np.conj(one).view(np.float64) for one in held]
         schur = np.zeros((m, r, m, r))
         for s in range(r):
             for t in range(r):
-                schur[:, s, :, t] = endless.between(self._held[s], self._moved[t])
+                schur[:, s, :, t] = endless.between(held[s], self._moved[t])
         free = np.abs(modes).reshape(m * r, -1).any(axis=1)
         self._schur = np.where(np.outer(free, free), schur.reshape(m * r, m * r), np.diag(np.where(free, 0.0, 1.0)))
         if r and not (np.abs(np.diagonal(self._schur)) > 0).all():
@@ -202,7 +203,7 @@ class Patch:
 
     def _forces(self, waves: Waves) -> Array:
         """Return E of pressures (m, r)."""
-        found = [np.einsum("imj,imj->m", held, waves).real for held in self._held]
+        found = [np.einsum("imj,imj->m", held, waves.view(np.float64)) for held in self._held]
         return np.stack(found, axis=1) if found else np.zeros((self._m, 0))
 
     def solve(self, gaps: Array, forces: Array) -> tuple[Array, Array]:
@@ -215,6 +216,14 @@ class Patch:
             for s, moved in enumerate(self._moved):
                 waves -= moved * a[:, s, None]
         return endless.back(endless.solve(waves)), a
+
+
+def _through(small: Waves, waves: Waves) -> Waves:
+    """Return products of each wave's matrix of pairs (i, pairs, pairs, ...) with numbers of it (i, pairs, ...)."""
+    found = small[:, :, 0] * waves[:, :1]
+    for pair in range(1, waves.shape[1]):
+        found += small[:, :, pair] * waves[:, pair, None]
+    return found
 
 
 def _rows(waves: Waves) -> Waves:

@@ -90,7 +90,7 @@ class WornGrid:
             right: Array = np.zeros(len(free))
             right[kept] = b
             multiply, precondition = (lambda x: self.multiply(x) * free), (lambda rows: near.solve(rows) * free)
-            x, rest, iterations = flexible(multiply, precondition, right, ACCURACY, RESTART, RESTARTS)
+            x, rest, iterations, _ = flexible(multiply, precondition, right, ACCURACY, RESTART, RESTARTS)
             self.iterations += iterations
             if not rest <= FAR:
                 raise np.linalg.LinAlgError("singular matrix")

@@ -213,7 +213,7 @@ class GriddedPhases:
             right = np.zeros(self.m * self.size)
             right[kept] = b
             whole = right.reshape(self.m, -1)
-            p, a, rest = closed.solve(on.box.spread(whole[:, : self.n]), whole[:, self.n :], ACCURACY)
+            p, a, *_, rest = closed.solve(on.box.spread(whole[:, : self.n]), whole[:, self.n :], ACCURACY)
             if not rest <= FAR:
                 raise np.linalg.LinAlgError("singular matrix")
             found = np.zeros((self.m, self.size))
@@ -299,10 +299,12 @@ class _Change:
             last, idle = size, stays
             solver = _Closed(self.on, self.slopes, closed, all_motions, solver)
             final = changed <= FEW * closed.sum()
-            by_p, by_a, _ = solver.solve(-gaps, -forces, max(wanted / size, 0.0 if final else ROUGH))
-            p, a = np.maximum(p + by_p, least), a + by_a
-            by = self.on.multiply(p, a, self.slopes)
-            gaps, forces = self.gaps + by[0], self.forces + by[1]
+            by_p, by_a, *by, _ = solver.solve(-gaps, -forces, max(wanted / size, 0.0 if final else ROUGH))
+            p, a, gaps, forces = p + by_p, a + by_a, gaps + by[0], forces + by[1]
+            if (p < least).any():
+                p = np.maximum(p, least)
+                whole = self.on.multiply(p, a, self.slopes)
+                gaps, forces = self.gaps + whole[0], self.forces + whole[1]
             now = (p > least) | (~closed & (gaps < -below))
             changed, closed = (now != closed).sum(), now
         return p, a, p > least
@@ -357,8 +359,9 @@ class _Closed:
         return x[:cut].reshape(self.closed.shape), x[cut:].reshape(self.rigid.shape)
 
     def _multiply(self, x: Array) -> Array:
+        """Return the product at all nodes in the box."""
         p, a = self._parts(x)
-        return self._joined(*self.on.multiply(p, a * self.rigid, self.slopes))
+        return np.concatenate([part.ravel() for part in self.on.multiply(p, a, self.slopes)])
 
     def _precondition(self, x: Array) -> Array:
         return self._joined(*self.patch.solve(*self._parts(x)))
@@ -366,8 +369,14 @@ class _Closed:
     def _joined(self, p: Array, a: Array) -> Array:
         return np.concatenate([(p * self.closed).ravel(), (a * self.rigid).ravel()])
 
-    def solve(self, gaps: Array, forces: Array, accuracy: float) -> tuple[Array, Array, float]:
-        """Return pressures (m, ...) and rigid motions (m, r), and what residual is left over the right-hand side."""
+    def solve(self, gaps: Array, forces: Array, accuracy: float) -> tuple[Array, Array, Array, Array, float]:
+        """Return pressures (m, ...) and rigid motions (m, r), their gaps in all of the box and their forces.
+
+        And what residual is left over the right-hand side.
+        """
+        kept = np.concatenate([self.closed.ravel(), self.rigid.ravel()])
         right = self._joined(gaps, forces)
-        x, rest, self.iterations = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
-        return *self._parts(x), rest
+        x, rest, self.iterations, product = flexible(
+            self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS, kept
+        )
+        return *self._parts(x), *self._parts(product), rest

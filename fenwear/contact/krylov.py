@@ -94,7 +94,8 @@ def flexible(
     accuracy: float,
     restart: int,
     restarts: int,
-) -> tuple[Array, float, int]:
+    kept: Array | float = 1.0,
+) -> tuple[Array, float, int, Array]:
     """Return the solution of a square system in the precision of b (size,), by flexible GMRES.
 
     Preconditioned from the right, so that the residual is that of the system itself: a few digits end it where they
@@ -107,23 +108,25 @@ def flexible(
         accuracy: Residual over the right-hand side that ends it.
         restart: Iterations after which it begins anew.
         restarts: How often.
+        kept: One where products are those of the system, else zero; directions are zero there.
 
     Returns:
-        The solution, its residual over the right-hand side, and how many iterations it took.
+        The solution, its residual over the right-hand side, how many iterations it took, and its product.
     """
-    x, r = np.zeros_like(b), b
+    x, product, r = np.zeros_like(b), np.zeros_like(b), b
     whole = size = float(np.linalg.norm(b))
     iterations, enough = 0, accuracy * whole
     for _ in range(restarts):
         if not size > enough:
             break
-        directions: list[Array] = []
+        directions, products = list[Array](), list[Array]()
         basis = np.empty((restart + 1, len(b)), dtype=b.dtype)
         basis[0] = r / size
         rows: Array = np.zeros((restart + 1, restart))
         for k in range(restart):
             directions.append(precondition(basis[k]))
-            w = multiply(directions[k])
+            products.append(multiply(directions[k]))
+            w = products[k] * kept
             for _again in range(1 if accuracy > FEW else 2):  # classical Gram and Schmidt, twice for many digits
                 parts = basis[: k + 1] @ w
                 w = w - parts @ basis[: k + 1]
@@ -137,12 +140,14 @@ def flexible(
             if rest <= enough or not length > 0:
                 break
             basis[k + 1] = w / length
-        for part, direction in zip(y.astype(b.dtype), directions, strict=True):
+        for part, direction, of_direction in zip(y.astype(b.dtype), directions, products, strict=True):
             x += part * direction
+            product += part * of_direction
         if rest <= enough:
-            return x, rest / whole, iterations
-        r = b - multiply(x)
+            return x, rest / whole, iterations, product
+        product = multiply(x)
+        r = b - product * kept
         before, size = size, float(np.linalg.norm(r))
         if not size < before:
             break
-    return x, size / max(whole, 1e-300), iterations
+    return x, size / max(whole, 1e-300), iterations, product

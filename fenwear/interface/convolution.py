@@ -141,14 +141,16 @@ class Box:
     Attributes:
         low: Its least place along each axis.
         counts: Places along each axis.
-        nodes: Numbers of the nodes in it (k,); a slice where all are.
-        at: Where they stand in it, its last axis the fastest (k,); a slice where they stand in its order.
+        nodes: Numbers of the nodes in it (k,).
+        at: Where they stand in it, its last axis the fastest (k,).
+        within: Places of the whole grid, where all have a node, numbered with the last axis the fastest; else None.
     """
 
     low: tuple[int, ...]
     counts: tuple[int, ...]
     nodes: NDArray[np.int64]
     at: NDArray[np.int64]
+    within: tuple[int, ...] | None = None
 
     @classmethod
     def around(cls, places: NDArray[np.int64], shape: Sequence[int], touched: NDArray[np.int64] | None = None) -> Box:
@@ -165,7 +167,11 @@ class Box:
         inside = ((places >= low) & (places < low + counts)).all(axis=1)
         nodes = np.flatnonzero(inside)
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
-        return cls(tuple(int(k) for k in low), tuple(int(k) for k in counts), nodes, at)
+        full = len(places) == np.prod(whole) and np.array_equal(
+            np.ravel_multi_index(tuple(places.T), tuple(whole)), np.arange(len(places))
+        )
+        within = tuple(int(k) for k in whole) if full else None
+        return cls(tuple(int(k) for k in low), tuple(int(k) for k in counts), nodes, at, within)
 
     def holds(self, places: NDArray[np.int64]) -> bool:
         """Return whether all of some places (k, axes) are in it."""
@@ -174,13 +180,17 @@ class Box:
 
     def spread(self, values: Array) -> Array:
         """Return values of all nodes (m, n) in the box, zero where no node is (m, ...)."""
+        if self.within is not None:
+            cut = (slice(low, low + count) for low, count in zip(self.low, self.counts, strict=True))
+            return values.reshape(-1, *self.within)[:, *cut].copy()
         found = np.zeros((len(values), int(np.prod(self.counts))), dtype=values.dtype)
         found[:, self.at] = values[:, self.nodes]
         return found.reshape(-1, *self.counts)
 
     def values(self, boxed: Array) -> Array:
         """Return what a box (m, ...) has at its nodes (m, k)."""
-        return np.asarray(boxed.reshape(len(boxed), -1)[:, self.at])
+        flat = boxed.reshape(len(boxed), -1)
+        return np.asarray(flat if self.within is not None else flat[:, self.at])
 
 
 def _padded(count: int) -> int:

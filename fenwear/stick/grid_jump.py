@@ -112,7 +112,7 @@ class GridJump:
             raise ConvergenceError(TOO_LARGE)
         if not b.any():
             return alone
-        x, rest, _ = flexible(self._multiply, self._precondition, b, ACCURACY, RESTART, RESTARTS)
+        x, rest, *_ = flexible(self._multiply, self._precondition, b, ACCURACY, RESTART, RESTARTS)
         if not (rest <= FAR and np.isfinite(x).all()):
             raise ConvergenceError("the pressures' answer to a jump's wear did not converge")
         return alone - self._worn(x)

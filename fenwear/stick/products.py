@@ -327,7 +327,7 @@ class _Solver:
         size = max(float(np.abs(rest).max(initial=0.0)), float(np.abs(forces).max(initial=0.0)), 1e-300)
         fields = self.piece.unknown(_spread(rest / size, self.at, self.fields[1]))
         right = np.concatenate([fields.ravel(), forces / size])
-        x, left, self.iterations = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
+        x, left, self.iterations, _ = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
         x = x * size
         if not (left <= FAR and np.isfinite(x).all()):
             raise ConvergenceError(LOOSE)

@@ -13,6 +13,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.gridded import GriddedPhases
+from fenwear.contact.krylov import flexible
 from fenwear.cycle.block import Block
 from fenwear.interface import compliance
 from fenwear.interface.convolution import Box, OnBox
@@ -144,3 +145,36 @@ def test_creep_with_stick_by_products_is_as_by_matrices(who: str, monkeypatch: p
     ):
         wanted = of(by_matrices)
         assert of(by_products) == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
+
+
+def test_boxes_of_nodes_in_any_order() -> None:
+    """Values within a box are those of its places, cut out where nodes are in the grid's order or looked for."""
+    shape, rng = (30, 24), np.random.default_rng(2)
+    places = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 2)
+    values, touched = rng.standard_normal((3, len(places))), np.flatnonzero(((places - [12, 9]) ** 2).sum(axis=1) < 20)
+    order = rng.permutation(len(places))
+    number = np.argsort(order)
+    boxes = [Box.around(places, shape, touched), Box.around(places[order], shape, number[touched])]
+    assert boxes[0].within == shape
+    assert boxes[1].within is None
+    cut, looked_for = boxes[0].spread(values), boxes[1].spread(values[:, order])
+    assert cut.shape < (3, *shape)
+    np.testing.assert_array_equal(cut, looked_for)
+    cut *= 2.0
+    assert (values[:, touched] == boxes[0].values(looked_for)[:, np.isin(boxes[0].nodes, touched)]).all()
+
+
+@pytest.mark.parametrize("restart", [3, 40])
+def test_products_of_solutions_come_with_them(restart: int) -> None:
+    """What GMRES has multiplied adds up to the product of its solution, rows beside the system's among it."""
+    rng = np.random.default_rng(1)
+    kept = np.arange(60) % 3 > 0
+    matrix = np.eye(60) + 0.4 * rng.standard_normal((60, 60)) / np.sqrt(60)
+    b = np.where(kept, rng.standard_normal(60), 0.0)
+    x, rest, _, product = flexible(
+        lambda p: np.asarray(matrix @ p), lambda r: r, b, 1e-3, restart, 30, kept.astype(np.float64)
+    )
+    assert rest <= 1e-3
+    assert not x[~kept].any()
+    np.testing.assert_allclose(product, matrix @ x, rtol=0, atol=1e-13)
+    assert np.linalg.norm((b - product)[kept]) <= 1.001e-3 * np.linalg.norm(b)

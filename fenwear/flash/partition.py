@@ -109,7 +109,7 @@ def shared(
     right = second.rise(heat, cell) - first.bulk.base
     if resistance is not None:
         right = right + given * resistance * heat
-    x, rest, _ = flexible(
+    x, rest, *_ = flexible(
         multiply, lambda x: inside(precondition(x.reshape(heat.shape))), inside(right), ACCURACY, RESTART, RESTARTS
     )
     if not rest <= ENOUGH:

@@ -33,7 +33,8 @@ from fenwear.case import Case, Cycle
 from fenwear.case.program import stages_of
 from fenwear.cycle import march
 from fenwear.errors import CaseError, InputError
-from fenwear.parallel import on_root
+from fenwear.memory import free_memory, memory_size
+from fenwear.parallel import agreed, on_root
 from fenwear.results import checkpoint
 from fenwear.sliding.motion import Motion
 from fenwear.stick.coulomb import Steps
@@ -42,7 +43,8 @@ from fenwear.stick.records import TimeStepRecords
 FINE = 64  # parts of a position of the strip between which places are taken as straight
 FEWEST, MOST = 32, 256  # steps of a cycle; of time steps at most
 PER_CONTACT = 8.0  # steps in which the strip passes by the contact's length at the largest speed
-CELLS = 2.5e7  # of the strip's doubled grid in all steps, beyond which a long stroke goes by instants
+CELLS = 1e7  # of the strip's doubled grid in all steps, beyond which a long stroke goes by instants
+PER_CELL = 110.0  # bytes (measured, 84 to 102)
 LONG = 2.0  # contact lengths that such a stroke is at least
 BY_THEMSELVES = 9  # instants of a half-cycle then
 VARIES = 0.2  # of the speed, over the contact: beyond, the strip turns about a point that is too near
@@ -100,7 +102,7 @@ class Heating:
         window: The part of the grid.
         times: From the cycle's begin (t,), s.
         pressure: (t, m, n), MPa.
-        heat: Q (t, m, n), mW/mm².
+        heat: Q (t, m, n), mW/mm²; on the rim of the grid, whose nodes have a half, over whole cells.
         velocities: Of the strip (t, 2), mm/s.
         shifts: Where the strip is (t, 2), mm.
         period: Of the cycle, s; infinite where the strip goes one way.
@@ -171,7 +173,8 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         conditions = placed.conditions(k, last.pressure[k], worn=last.worn, half_cycles=last.half_cycle)
         heat[k] = last.pressure[k] * heating_friction(placed, placed.friction.values(conditions), k)
     window = Window.around(_grid(placed), last.pressure)
-    pressure, heat = (values[:, window.nodes] for values in (last.pressure, heat))
+    heat *= placed.pair.weights / window.cell
+    pressure, heat = last.pressure[:, window.nodes], heat[:, window.nodes]
     along = _along(placed, last.pressure)
     if motion.one_way:
         velocity = motion.directions[0] * motion.mean_speed * along[None]
@@ -182,6 +185,8 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         )
     course = Course.of(motion)
     steps, pasts, way = _steps(course, window, pressure, along, len(motion.phases), motion.half_cycles)
+    if not pasts:
+        _check_memory(placed.comm, _cells(window, steps, way * np.abs(along) / np.linalg.norm(along)))
     edges = course.period * np.arange(steps + 1) / steps
     times = (edges[1:] + edges[:-1]) / 2
     phases = course.phase(times)
@@ -261,11 +266,29 @@ def _steps(
     passes = PER_CONTACT * course.period * float(course.speeds.max() * np.linalg.norm(along)) / length
     wanted = max(FEWEST, passes)
     steps = phases * int(np.ceil(wanted / phases))
-    cells = steps * float(np.prod(2 * (np.array(window.shape) + way / window.sides)))
     far = float(np.linalg.norm(way))
-    if cells > CELLS and far > LONG * length:
+    if _cells(window, steps, way) > CELLS and far > LONG * length:
         return half_cycles * BY_THEMSELVES, True, far
     return steps, False, far
+
+
+def _cells(window: Window, steps: int, way: Array) -> float:
+    """Return how many cells a strip has that goes so far along both axes (2,), mm, over twice its grid in all steps."""
+    return steps * float(np.prod(2 * (np.array(window.shape) + way / window.sides)))
+
+
+def _check_memory(comm: MPI.Comm, cells: float) -> None:
+    """Make sure that the temperatures of so many cells fit into the memory; collective.
+
+    Raises:
+        CaseError: they do not.
+    """
+    free, taken = agreed(comm, free_memory()), PER_CELL * cells
+    if free is not None and taken > free:
+        message = (
+            f"temperatures of the cycle take about {memory_size(taken)}, but {memory_size(free)} are free; expected"
+        )
+        raise CaseError(InputError("grid.nodes", f"{message} fewer, or a shorter stroke"))
 
 
 def _past(course: Course, along: Array, now: float) -> Past:
@@ -305,7 +328,9 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
     times = period * (np.arange(steps) + 0.5) / steps
     own = np.minimum(np.searchsorted(edges[1:], times), count - 1)
     window = Window.around(_grid(system), records.pressure)
-    work = np.concatenate([np.zeros((1, len(system.pair.weights))), records.dissipated.cumsum(axis=0)])[:, window.nodes]
+    _check_memory(system.comm, _cells(window, steps, np.zeros(2)))
+    done = records.dissipated * system.pair.weights / window.cell
+    work = np.concatenate([np.zeros((1, done.shape[1])), done.cumsum(axis=0)])[:, window.nodes]
     parts = np.array([_read(edges, work, t) for t in period * np.arange(steps + 1) / steps])
     heat = np.maximum(np.diff(parts, axis=0), 0.0) * steps / period
     places = np.append(records.displacement[-1], records.displacement)

@@ -45,7 +45,7 @@ def numbers(found: FlashTemperatures) -> dict[str, Any]:
         "contact_mm": heating.extent.tolist(),
         "nodes_across": list(found.across),
         "thermal_feedback": found.feedback,
-        "warnings": list(found.warnings),
+        "warnings": [heating.placed.names.told(one) for one in found.warnings],
     }
 
 

@@ -171,6 +171,25 @@ def test_refused(run: Callable[..., Path], settings: tuple[str, ...], message: s
         flash_temperatures(run(*BALL), settings)
 
 
+def test_refused_without_memory(run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What does not fit is said before it is tried."""
+    monkeypatch.setattr(source, "free_memory", lambda: 1e6)
+    with pytest.raises(CaseError, match=r"grid\.nodes: temperatures of the cycle take about .* fewer, or a shorter"):
+        flash_temperatures(run(*BALL), STEEL)
+
+
+def test_program_on_a_grid_that_grows(run: Callable[..., Path]) -> None:
+    """Of the motion of its last step, on the grid that the run has come to: as the same motion and load all along."""
+    grid = ("grid.across=12", "unset=wear.strip", "wear.punch.coefficient=3e-7")
+    steps = "program={steps=[{cycles=20,period=0.2},{cycles=20,period=0.1}]}"
+    jumps = ("run.integration='jump'", "unset=run.half_cycles")
+    found = flash_temperatures(run("ball-on-flat", *grid, steps, *jumps), STEEL)
+    _check(found, 48.0)
+    whole = flash_temperatures(run("ball-on-flat", *grid, "run.integration='jump'", "run.half_cycles=80"), STEEL)
+    assert found.heating.window.sides == pytest.approx(whole.heating.window.sides)
+    assert found.flash[1].max() == pytest.approx(whole.flash[1].max(), rel=1e-3)
+
+
 def test_refused_turning_about_the_contact(run: Callable[..., Path]) -> None:
     """A strip that turns below the punch slides in all directions there."""
     turns = "motion={kind='rotation',angular_speed=1,duration=0.1,centre=[0.25,0,0]}"

@@ -22,6 +22,7 @@ from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.interface import ContactPair, Interface, RigidEquilibrium, interpolation
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.wear import Wear
+from fenwear_verify import flash as flash_cases
 from fenwear_verify import registered, run_cases
 from fenwear_verify import wear as wear_cases
 from fenwear_verify.bodies import builtin, rigid_punch
@@ -47,6 +48,16 @@ def opposite_friction(patch: Patch) -> None:
     """Tangential compliance with the other sign."""
     right = Interface.compliance
     patch.setattr(Interface, "compliance", lambda self, slip, scale=1.0: right(self, -slip, scale))
+
+
+def kernels_the_other_way(patch: Patch) -> None:
+    """Heat of a grid carried against its material."""
+    right = flash_cases.cell_integrals
+
+    def turned(shape: Any, sides: Any, decay: Any, drift: tuple[float, float]) -> Any:
+        return right(shape, sides, decay, (-drift[0], -drift[1]))
+
+    patch.setattr(flash_cases, "cell_integrals", turned)
 
 
 def opposite_moment(patch: Patch) -> None:
@@ -235,6 +246,7 @@ def forgotten_heat(patch: Patch) -> None:
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
         ("square-source", material_the_other_way),
+        ("flash", kernels_the_other_way),
         ("energy", half_speed),
         ("energy", forgotten_heat),
     ],

@@ -13,7 +13,7 @@ from fenwear.report.course import directions_present, mark_few
 from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.shapes import worn_range
 from fenwear.report.stick_course import THROUGH_MIDDLE, line_along
-from fenwear.report.style import direction_words, from_zero, legend_beside, panels, run_style, strip_moves
+from fenwear.report.style import by_powers, direction_words, from_zero, legend_beside, panels, run_style, strip_moves
 from fenwear.report.surface import along_contact, centre_of_wear, model_of, surface_of
 from fenwear.results.sheet import BODIES
 
@@ -69,7 +69,7 @@ def runs_figure(names: Sequence[str], histories: Sequence[xarray.Dataset]) -> Fi
             ax.set_xlabel(line.across)
             ax.set_ylabel(line.up)
             if line.across == "half-cycle n":
-                ax.set_xscale("log")
+                by_powers(ax)
             if line.from_zero:
                 from_zero(ax)
             if line.ends is not None:

@@ -17,6 +17,7 @@ from fenwear.report.style import (
     RED,
     STANDARD,
     Style,
+    by_powers,
     direction_style,
     from_zero,
     legend_beside,
@@ -79,7 +80,7 @@ def convergence_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figur
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
         legend_beside(ax, strip_moves(history))
-    axes[0].set_yscale("log")
+    by_powers(axes[0], "y")
     for ax in axes[1:]:
         from_zero(ax)
     run_axis(axes[-1], history, look)
@@ -314,7 +315,7 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: boo
     first, last = float(x[0]), float(x[-1])
     slows_down = int(history.half_cycle[-1]) > 10_000 or "max_temperature" not in history
     if logarithmic and slows_down and first > 0 and last > MANY * first:
-        ax.set_xscale("log")
+        by_powers(ax)
         ax.set_xlim(first, last)
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)

@@ -19,6 +19,7 @@ from fenwear.results.disk import write_text
 from fenwear.results.netcdf import load
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.figure import Figure
 
 CAPTIONS = "captions.txt"
@@ -41,11 +42,18 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Style = STANDA
 
 
 def draw_figures(
-    directory: Path, half_cycles: Sequence[int] = (), look: Style = STANDARD, formats: Sequence[str] = ("png",)
+    directory: Path,
+    half_cycles: Sequence[int] = (),
+    look: Style = STANDARD,
+    formats: Sequence[str] = ("png",),
+    history: xarray.Dataset | None = None,
 ) -> list[Path]:
-    """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
+    """Draw all figures of a run, and their captions, into its folder `figures`; return the paths.
+
+    Its history is read where it is not given.
+    """
     folder = directory / FOLDER
-    history = read_history(directory)
+    history = read_history(directory) if history is None else history
     drawn = all_figures(history, half_cycles, look)
     if model_of(history) == "plane":
         drawn |= field_figures(directory, read_case(directory), look)

@@ -121,8 +121,8 @@ def map_figure(
     drawn: Any = None
     for number, (n, ax) in enumerate(zip(half_cycles, axes, strict=True)):
         found, most = values[number], float(largest[number])
-        triangles, shown = surface.drawn(np.clip(found, levels[0], None))
-        drawn = ax.tricontourf(triangles, shown, levels=levels, cmap=colormaps[quantity.colours], extend=extend)
+        how: Any = {"levels": levels, "cmap": colormaps[quantity.colours], "extend": extend}
+        drawn = surface.contours(ax, np.clip(found, levels[0], None), **how)
         title = f"{look.of_one if look.axis == 'cycles' else ''} {look.name(history, n)} {look.of_unit}".strip()
         if quantity.variable == "pressure":
             _contact_edge(ax, surface, found)
@@ -186,7 +186,7 @@ def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
     """Draw where contact ends."""
     level = EDGE_OF_CONTACT * float(pressure.max())
     if pressure.min() < level < pressure.max():
-        ax.tricontour(*surface.drawn(pressure), levels=[level], colors="black", linewidths=1.0)
+        surface.contours(ax, pressure, filled=False, levels=[level], colors="black", linewidths=1.0)
 
 
 def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD, *, along: bool) -> Figure:

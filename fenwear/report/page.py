@@ -66,7 +66,8 @@ def write_report(
 def _write_report(
     directory: Path, log: Callable[[str], None], complete: bool, look: Style, formats: Sequence[str]
 ) -> list[Path]:
-    paths = draw_figures(directory, read_case(directory).get("output", {}).get("figures_at", ()), look, formats)
+    history, wanted = read_history(directory), read_case(directory).get("output", {}).get("figures_at", ())
+    paths = draw_figures(directory, wanted, look, formats, history)
     if complete:
         from fenwear.report.animation import draw_animation
 
@@ -76,7 +77,7 @@ def _write_report(
         except DrawingError as error:
             log(f"warning: {error}")
     report = directory / REPORT
-    write_text(report, page(directory, look))
+    write_text(report, page(directory, look, history))
     return [*paths, report]
 
 
@@ -125,9 +126,9 @@ class Places:
     rows: list[Row]
 
 
-def page(directory: Path, look: Style = STANDARD) -> str:
-    """Return report.html of a run whose figures are drawn."""
-    history, summary = read_history(directory), read_summary(directory)
+def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None = None) -> str:
+    """Return report.html of a run whose figures are drawn; its history is read where it is not given."""
+    history, summary = read_history(directory) if history is None else history, read_summary(directory)
     images, turned = _images(directory), _turned(history)
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     return render(

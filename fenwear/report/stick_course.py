@@ -11,7 +11,7 @@ import xarray
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
-from fenwear.report.style import Style, contact_axis
+from fenwear.report.style import Style, by_powers, contact_axis
 from fenwear.report.surface import along_contact, model_of, surface_of
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def course_axis(ax: Axes, history: xarray.Dataset, look: Style) -> Array:
     x = course(history, look)
     ax.set_xlabel(look.label)
     if history.cycle.values[-1] > MANY:
-        ax.set_xscale("log")
+        by_powers(ax)
         each = x[-1] / max(float(history.cycle.values[-1]), 1.0)
         x = np.maximum(x, each)  # the first cycle has no place on it
     return x

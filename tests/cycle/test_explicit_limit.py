@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator
 
-from fenwear import Tribosystem, march
-from fenwear.cycle import stability_number
+from fenwear import Tribosystem, assemble, load_case, march
+from fenwear.arrays import Array
+from fenwear.cycle import explicit_limit, stability_number
 
 MEAN = 1e4 / 600
 EVEN = ("geometry.degree=1", "geometry.parameters.edge_grading=1", "geometry.parameters.elements_along_contact=32")
@@ -59,3 +61,15 @@ def test_proportional_to_the_step(assembled: Callable[..., Tribosystem]) -> None
     assert stability_number(assembled("example1", "motion.amplitude=4.5")) == pytest.approx(3 * one, rel=1e-3)
     squared = assembled("example1", "wear.punch.pressure_exponent=2", "wear.punch.coefficient=3.926990816987242e-8")
     assert stability_number(squared) == pytest.approx(2 * MEAN * one, rel=1e-3)
+
+
+def test_modes_that_lie_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two shoes that are alike have fastest modes that ARPACK may not tell apart: products alone find their size."""
+    system, largest = assemble(load_case("drum-brake")), []
+
+    def not_apart(operator: LinearOperator, **_: object) -> Array:
+        largest.append(np.abs(np.linalg.eigvals(operator @ np.eye(operator.shape[0]))).max())
+        raise ArpackNoConvergence("not apart", np.zeros(0), np.zeros((0, 0)))
+
+    monkeypatch.setattr(explicit_limit, "eigs", not_apart)
+    assert stability_number(system) == pytest.approx(max(largest) / 2, rel=0.02)

@@ -187,6 +187,9 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
             "wears a facet of its own, deeper for ever",
         )
     },
+    "flash/settings.py": {
+        "to and fro the same material stays": (PHYSICS, "`flash` with `heat.inflow` of a strip that goes to and fro")
+    },
     "flash/source.py": {
         "shifts and turns the strip in many ways": (
             MODEL,

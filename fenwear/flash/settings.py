@@ -10,10 +10,14 @@ import numpy as np
 
 from fenwear.arrays import Mask
 from fenwear.assembly import ContactSetup
-from fenwear.case import Case, Heat, Material, changed_case, heat_of, load_case
+from fenwear.case import Case, Heat, Material, OneWay, Rotation, changed_case, heat_of, load_case
 from fenwear.errors import CaseError, InputError
 
 NEEDED = ("conductivity", "heat_capacity", "density")
+TAKEN = (
+    *("partition", "debris", "conductance", "conductance_per_pressure", "convection"),
+    *("ambient", "inflow", "initial"),
+)
 OTHERS = ("temperatures", "insulated")  # of a body
 
 
@@ -46,11 +50,19 @@ def run_case_of(path: Path, settings: Sequence[str]) -> tuple[Case, Heat]:
             message = f"{key} is of the run itself; expected keys of heat, materials, or temperatures of a body"
             raise CaseError(InputError("--set", message))
     heat = heat_of(of_heat)
-    refused = {
-        "conductance": (heat.conductance == "layer", "a number, or that per pressure: 'layer' is of a run with heat"),
-        "track": (heat.track is not None, "none: a strip that slides one way is told above its bulk"),
-    }
-    problems = [InputError(f"heat.{key}", f"expected {text}") for key, (given, text) in refused.items() if given]
+    given = [one.partition("=")[0].strip().partition(".")[2] for one in of_heat]
+    problems = [
+        InputError(f"heat.{key}", f"plays no part in what follows from pressures; expected one of {', '.join(TAKEN)}")
+        for key in given
+        if key not in TAKEN
+    ]
+    if heat.conductance == "layer":
+        problems.append(
+            InputError("heat.conductance", "expected a number, or that per pressure: a grid has no 'layer'")
+        )
+    if heat.inflow is not None and not isinstance(case.motion, OneWay | Rotation):
+        text = "expected one-way sliding: to and fro the same material stays, and none enters"
+        problems.append(InputError("heat.inflow", text))
     if problems:
         raise CaseError(problems)
     return (changed_case(case, *others) if others else case), heat

@@ -10,15 +10,12 @@ would not fit into the memory goes by instants that know where the strip has bee
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Mask
+from fenwear.arrays import Array
 from fenwear.assembly import (
     ContactSetup,
     assemble,
@@ -28,19 +25,18 @@ from fenwear.assembly import (
     regridded,
     renewed,
 )
-from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, Cycle
 from fenwear.case.program import stages_of
 from fenwear.cycle import march
 from fenwear.errors import CaseError, InputError
+from fenwear.flash.course import Course, past_of
+from fenwear.flash.heating import Heating, Window, grid_of
 from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import agreed, on_root
 from fenwear.results import checkpoint
-from fenwear.sliding.motion import Motion
 from fenwear.stick.coulomb import Steps
 from fenwear.stick.records import TimeStepRecords
 
-FINE = 64  # parts of a position of the strip between which places are taken as straight
 FEWEST, MOST = 32, 256  # steps of a cycle; of time steps at most
 PER_CONTACT = 8.0  # steps in which the strip passes by the contact's length at the largest speed
 CELLS = 1e7  # of the strip's doubled grid in all steps, beyond which a long stroke goes by instants
@@ -48,96 +44,6 @@ PER_CELL = 110.0  # bytes (measured, 84 to 102)
 LONG = 2.0  # contact lengths that such a stroke is at least
 BY_THEMSELVES = 9  # instants of a half-cycle then
 VARIES = 0.2  # of the speed, over the contact: beyond, the strip turns about a point that is too near
-MARGIN = 0.25  # of the sides of what touches: how far beside it temperatures are told
-
-Past = Callable[[Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True)
-class Window:
-    """The part of a contact grid that touches, and some nodes beside it.
-
-    Attributes:
-        nodes: Their numbers in the grid (m, n).
-        sides: Of a cell, mm.
-    """
-
-    nodes: NDArray[np.int64]
-    sides: tuple[float, float]
-
-    @classmethod
-    def around(cls, grid: RegularGrid, pressure: Array) -> Window:
-        """Return that of nodes whose pressures (t, N) are above zero at any instant."""
-        places = grid.places[pressure.max(axis=0) > 0]
-        low, high = places.min(axis=0), places.max(axis=0)
-        beside = np.ceil(MARGIN * (high - low + 1)).astype(int)
-        low, high = np.maximum(low - beside, 0), np.minimum(high + beside, np.array(grid.counts) - 1)
-        number = np.arange(int(np.prod(grid.counts))).reshape(grid.counts)
-        first, second = (float(one) for one in grid.spacing)
-        return cls(number[low[0] : high[0] + 1, low[1] : high[1] + 1], (first, second))
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Nodes (m, n)."""
-        return self.nodes.shape[0], self.nodes.shape[1]
-
-    def extent(self, touching: Mask) -> Array:
-        """Return the sides of what touches at any of some instants (t, m, n), as (2,), mm."""
-        counts = [len(np.unique(places)) for places in np.nonzero(touching)[1:]]
-        return np.asarray(np.array(self.sides) * counts)
-
-    @property
-    def cell(self) -> float:
-        """Area of a node, mm²."""
-        return self.sides[0] * self.sides[1]
-
-
-@dataclass(frozen=True)
-class Heating:
-    """Heat of friction at t instants, each of which stands for as much of the cycle.
-
-    Attributes:
-        placed: The bodies, on the grid that the pressures are of.
-        half_cycle: That the cycle ends with.
-        window: The part of the grid.
-        times: From the cycle's begin (t,), s.
-        pressure: (t, m, n), MPa.
-        heat: Q (t, m, n), mW/mm²; on the rim of the grid, whose nodes have a half, over whole cells.
-        velocities: Of the strip (t, 2), mm/s.
-        shifts: Where the strip is (t, 2), mm.
-        period: Of the cycle, s; infinite where the strip goes one way.
-        pasts: Where instants are by themselves, what was before each, see `fenwear.flash.kernels.history_kernel`.
-        fastest: Largest speed of the cycle, mm/s.
-        way: From one end of the strip's stroke to the other, mm.
-    """
-
-    placed: ContactSetup
-    half_cycle: int
-    window: Window
-    times: Array
-    pressure: Array
-    heat: Array
-    velocities: Array
-    shifts: Array
-    period: float
-    pasts: tuple[Past, ...]
-    fastest: float
-    way: float = 0.0
-
-    @property
-    def grid(self) -> RegularGrid:
-        """The contact."""
-        return _grid(self.placed)
-
-    @property
-    def touching(self) -> Mask:
-        """Nodes of the window that touch (t, m, n)."""
-        return self.pressure > 0
-
-    @property
-    def extent(self) -> Array:
-        """Sides of what touches (2,), mm."""
-        return self.window.extent(self.touching)
 
 
 def heating_of(case: Case, directory: Path) -> Heating:
@@ -164,7 +70,7 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     if stage is not None or last.followed is not None:
         placed = place_case(case, followed=last.followed)
     if last.grid is not None:
-        placed = placed_on(placed, _grid(placed).with_numbers(last.grid))
+        placed = placed_on(placed, grid_of(placed).with_numbers(last.grid))
     motion = placed.motion
     if last.pressure.shape != (len(motion.phases), len(placed.pair.weights)) or np.isnan(last.pressure).any():
         raise CaseError(InputError(str(directory), "expected a run that has done a whole cycle"))
@@ -172,12 +78,12 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     for k in range(len(heat)):
         conditions = placed.conditions(k, last.pressure[k], worn=last.worn, half_cycles=last.half_cycle)
         heat[k] = last.pressure[k] * heating_friction(placed, placed.friction.values(conditions), k)
-    window = Window.around(_grid(placed), last.pressure)
+    along = _along(placed, last.pressure)
+    window = Window.around(grid_of(placed), last.pressure)
     heat *= placed.pair.weights / window.cell
     pressure, heat = last.pressure[:, window.nodes], heat[:, window.nodes]
-    along = _along(placed, last.pressure)
     if motion.one_way:
-        velocity = motion.directions[0] * motion.mean_speed * along[None]
+        velocity = motion.directions[0] * motion.mean_speed * along
         fast, whole = float(np.linalg.norm(velocity)), heat[:1] * motion.mean_speed
         still = np.zeros((1, 2))
         return Heating(
@@ -191,7 +97,6 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     times = (edges[1:] + edges[:-1]) / 2
     phases = course.phase(times)
     mean = np.diff(np.interp(edges, course.times, course.slid)) * steps / course.period
-    signs = np.array(motion.directions)[phases]
     return Heating(
         placed,
         last.half_cycle,
@@ -199,62 +104,13 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         times,
         pressure[phases],
         heat[phases] * mean[:, None, None],
-        (signs * mean)[:, None] * along,
+        np.zeros(2),
         course.place(times)[:, None] * along,
         course.period,
-        tuple(_past(course, along, float(t)) for t in times) if pasts else (),
+        tuple(past_of(course, along, float(t)) for t in times) if pasts else (),
         float(course.speeds.max() * np.linalg.norm(along)),
         way,
     )
-
-
-@dataclass(frozen=True)
-class Course:
-    """Where the strip is, and how fast, over a cycle to and fro.
-
-    Attributes:
-        times: From 0 to the period (k + 1,), s.
-        offsets: Of the strip then (k + 1,), mm or rad of the motion.
-        slid: Up to then (k + 1,), the same.
-        ends: Of the phases (phases,), s.
-    """
-
-    times: Array
-    offsets: Array
-    slid: Array
-    ends: Array
-
-    @classmethod
-    def of(cls, motion: Motion) -> Course:
-        """Return that of a motion."""
-        offsets = motion.offsets(FINE)
-        durations = np.array([phase.duration for phase in motion.phases])
-        times = np.append(0.0, np.repeat(durations / FINE, FINE).cumsum())
-        slid = np.append(0.0, np.abs(np.diff(offsets, axis=1)).ravel().cumsum())
-        return cls(times, np.append(offsets[0, 0], offsets[:, 1:].ravel()), slid, durations.cumsum())
-
-    @property
-    def period(self) -> float:
-        """Of the cycle, s."""
-        return float(self.times[-1])
-
-    @property
-    def speeds(self) -> Array:
-        """Mean ones between the times (k,), mm/s or rad/s."""
-        return np.asarray(np.diff(self.slid) / np.diff(self.times))
-
-    def place(self, t: Array) -> Array:
-        """Return offsets at any times, mm or rad."""
-        return np.asarray(np.interp(t % self.period, self.times, self.offsets))
-
-    def speed(self, t: Array) -> Array:
-        """Return speeds at any times, mm/s or rad/s."""
-        middles = (self.times[1:] + self.times[:-1]) / 2
-        return np.asarray(np.interp(t, middles, self.speeds, period=self.period))
-
-    def phase(self, t: Array) -> NDArray[np.int64]:
-        """Return the numbers of the phases at times within the cycle."""
-        return np.minimum(np.searchsorted(self.ends, t), len(self.ends) - 1)
 
 
 def _steps(
@@ -291,17 +147,6 @@ def _check_memory(comm: MPI.Comm, cells: float) -> None:
         raise CaseError(InputError("grid.nodes", f"{message} fewer, or a shorter stroke"))
 
 
-def _past(course: Course, along: Array, now: float) -> Past:
-    """Return what gives, for times before an instant, places of the strip now less those then, and heat over now's."""
-    here, speed = course.place(np.array([now])), float(course.speed(np.array([now]))[0])
-
-    def past(before: Array) -> tuple[Array, Array]:
-        then = now - before
-        return (course.place(then) - here)[:, None] * along, np.asarray(course.speed(then) / speed, dtype=np.float64)
-
-    return past
-
-
 def _of_time_steps(case: Case, directory: Path) -> Heating:
     """Return the heat of surfaces that stick or slip, of a cycle that goes on from the run's end; collective."""
     if case.program is not None:
@@ -327,15 +172,15 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
     steps = count if even else int(np.clip(2 * count, FEWEST, MOST))
     times = period * (np.arange(steps) + 0.5) / steps
     own = np.minimum(np.searchsorted(edges[1:], times), count - 1)
-    window = Window.around(_grid(system), records.pressure)
-    _check_memory(system.comm, _cells(window, steps, np.zeros(2)))
+    window = Window.around(grid_of(system), records.pressure)
     done = records.dissipated * system.pair.weights / window.cell
     work = np.concatenate([np.zeros((1, done.shape[1])), done.cumsum(axis=0)])[:, window.nodes]
     parts = np.array([_read(edges, work, t) for t in period * np.arange(steps + 1) / steps])
     heat = np.maximum(np.diff(parts, axis=0), 0.0) * steps / period
     places = np.append(records.displacement[-1], records.displacement)
     offsets = np.interp(times, edges, places)
-    speeds = np.diff(places) / records.duration
+    way = float(np.ptp(places)) * np.abs(along)
+    _check_memory(system.comm, _cells(window, steps, way))
     return Heating(
         system,
         until,
@@ -343,12 +188,12 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
         times,
         records.pressure[own][:, window.nodes],
         heat,
-        speeds[own][:, None] * along,
+        np.zeros(2),
         offsets[:, None] * along,
         period,
         (),
-        float(np.abs(speeds).max() * np.linalg.norm(along)),
-        float(np.ptp(places) * np.linalg.norm(along)),
+        float(np.abs(np.diff(places) / records.duration).max() * np.linalg.norm(along)),
+        float(np.linalg.norm(way)),
     )
 
 
@@ -359,20 +204,16 @@ def _read(edges: Array, values: Array, t: float) -> Array:
     return np.asarray((1 - share) * values[k] + share * values[k + 1])
 
 
-def _grid(placed: ContactSetup) -> RegularGrid:
-    grid = placed.pair.punch.grid
-    assert grid is not None
-    return grid
-
-
 def _along(placed: ContactSetup, pressure: Array) -> Array:
     """Return how a unit of the motion moves the strip in the middle of the contact (2,).
 
     Raises:
-        CaseError: it moves otherwise at its rim.
+        CaseError: nothing touches, or it moves otherwise at its rim.
     """
     mean = placed.pair.weights * pressure.mean(axis=0)
-    velocity = placed.sliding.field.velocity(placed.pair.punch.x)[:, _grid(placed).axes]
+    if not mean.any():
+        raise CaseError(InputError("geometry", "nothing touches in the last cycle, so that there is no heat"))
+    velocity = placed.sliding.field.velocity(placed.pair.punch.x)[:, grid_of(placed).axes]
     middle = mean @ velocity / mean.sum()
     differs = np.linalg.norm(velocity[mean > 0] - middle, axis=1).max()
     if not differs <= VARIES * np.linalg.norm(middle):

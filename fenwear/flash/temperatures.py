@@ -25,11 +25,13 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.half_space import extent_along
 from fenwear.case import Case, Heat
 from fenwear.flash.bulk import bulk_of, spots_of
+from fenwear.flash.course import Past
+from fenwear.flash.heating import Heating
 from fenwear.flash.kernels import cell_integrals, history_kernel
 from fenwear.flash.partition import NO_BULK, Bulk, HeatedSide, mean_power, shared
 from fenwear.flash.response import Instants, Periodic, Response
 from fenwear.flash.settings import Conductor, conductors, run_case_of
-from fenwear.flash.source import Heating, Past, heating_of
+from fenwear.flash.source import heating_of
 from fenwear.results.history import CASE
 
 HALF_SPACE = "half-space"
@@ -118,7 +120,7 @@ def _response(heating: Heating, one: Conductor, *, moves: bool) -> Response:
     """Return the half-space that a body is."""
     sides, shape, kappa = heating.window.sides, heating.window.shape, one.diffusivity
     if np.isinf(heating.period):
-        velocity = heating.velocities[0] if moves else np.zeros(2)
+        velocity = heating.velocity if moves else np.zeros(2)
         x, y = (float(part) / (2 * kappa) for part in velocity)
         return Instants(one.conductivity, cell_integrals(shape, sides, float(np.hypot(x, y)), (x, y))[None])
     if heating.pasts:
@@ -172,7 +174,7 @@ def _bulks(
 ) -> tuple[tuple[Bulk, Bulk] | None, list[str]]:
     """Return what the finite bodies add, None where one of them has no steady state, and what is said; collective.
 
-    Of a strip that goes one way the meshed part is none of its own: it is as warm as it comes.
+    Of a strip that goes one way the meshed part is none of its own: it is as warm as it comes, `heat.inflow`.
     """
     placed, grid, window = heating.placed, heating.grid, heating.window
     bodies = build_conduction(case.model_copy(update={"heat": heat}), placed.bodies.punch, placed.bodies.strip)
@@ -186,8 +188,9 @@ def _bulks(
         spots = spots_of(at.reshape(-1, 2), powers.ravel())
         ends = np.array([extent_along(elastic, axis) for axis in grid.axes]).T
         beyond = bool((spots.places < ends[0]).any() or (spots.places > ends[1]).any())
-        if elastic.operator == HALF_SPACE or beyond or (name == "strip" and np.isinf(heating.period)):
-            found.append(NO_BULK)
+        one_way = name == "strip" and np.isinf(heating.period)
+        if elastic.operator == HALF_SPACE or beyond or one_way:
+            found.append(Bulk(0.0 if heat.inflow is None or not one_way else heat.inflow - heat.ambient))
             if beyond:
                 remarks.append(f"the {name} is not meshed as far as it slides: it is taken as a half-space")
             continue

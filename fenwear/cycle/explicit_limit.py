@@ -71,5 +71,5 @@ def _growth(apply: Callable[[Array], Array], vector: Array) -> float:
     for _ in range(PRODUCTS):
         vector = apply(vector)
         size = float(np.linalg.norm(vector))
-        vector = vector / size
+        vector = np.asarray(vector / size, dtype=float)
     return size

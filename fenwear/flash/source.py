@@ -37,7 +37,7 @@ from fenwear.results import checkpoint
 from fenwear.stick.coulomb import Steps
 from fenwear.stick.records import TimeStepRecords
 
-FEWEST, MOST = 32, 256  # steps of a cycle; of time steps at most
+FEWEST, MOST = 64, 256  # steps of a cycle; of time steps at most
 PER_CONTACT = 8.0  # steps in which the strip passes by the contact's length at the largest speed
 CELLS = 1e7  # of the strip's doubled grid in all steps, beyond which a long stroke goes by instants
 PER_CELL = 110.0  # bytes (measured, 84 to 102)

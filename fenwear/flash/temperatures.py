@@ -24,8 +24,8 @@ from fenwear.assembly import build_conduction
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.half_space import extent_along
 from fenwear.case import Case, Heat
-from fenwear.flash.bulk import bulk_of, spots_of
 from fenwear.flash.course import Past
+from fenwear.flash.finite_body import bulk_of, spots_of
 from fenwear.flash.heating import Heating
 from fenwear.flash.kernels import cell_integrals, history_kernel
 from fenwear.flash.partition import NO_BULK, Bulk, HeatedSide, mean_power, shared

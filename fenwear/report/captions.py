@@ -49,9 +49,9 @@ TEXTS = {
     "the largest value. Colours end where late states do.",
     "wear_strip_map": "Maps of the worn depth of the strip over its largest at {chosen}, which is told above each.",
     "surface_map": "Maps of the height of the punch over its smooth shape, worn depths taken off, at {chosen}. "
-    "What is more than twice as deep as the first map has the darkest colour.",
+    "Within the convex hull of its scar its form is off, too, the nearest surface of second order (S-F, ISO 25178).",
     "surface_strip_map": "Maps of the height of the strip over its smooth shape, worn depths taken off, at {chosen}. "
-    "What is more than twice as deep as the first map has the darkest colour.",
+    "Within the convex hull of its scar its form is off, too, the nearest surface of second order (S-F, ISO 25178).",
     "roughness": "Rough surfaces where they have worn, without their form: (a) mean and root mean square of the "
     "heights and (b) their skewness over the {axis}, and bearing curves at {chosen}: what share of the surface lies "
     "above a height over its mean.",

@@ -152,7 +152,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
     drawn: dict[str, Figure] = {}
     model = model_of(history)
     if model == "solid":
-        surfaces = with_surfaces(history)
+        surfaces = with_surfaces(history, chosen[-MAPS:])
         shown = quantities(surfaces) | quantities_between(history)
         drawn |= {name: map_figure(surfaces, one, chosen[-MAPS:], look) for name, one in shown.items()}
         drawn |= tracks_of(history, look)

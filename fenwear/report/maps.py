@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other
 BESIDE = 3  # contacts whose cuts stand beside each other
-DEEP = 2.0  # of the deepest place of the first map: heights below have one colour
 EDGE_OF_CONTACT = 1e-2  # of the largest pressure
 
 
@@ -82,7 +81,7 @@ def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
         ),
     }
     for body, end in BODIES.items():
-        title = f"Height of the {body}"
+        title = f"Height of the {body}, without the form of its scar"
         found[f"surface{end}_map"] = Quantity(f"surface{end}", body, title, "µm", 1e3, "cividis", f"{body}:\nheight")
     return {name: q for name, q in found.items() if q.variable in history}
 
@@ -175,8 +174,6 @@ def _levels(
     if quantity.variable == "pressure":
         low, top = 0.0, pressure_top(history, half_cycles)
         cut, high = high > top, min(high, top)
-    if quantity.variable.startswith("surface"):  # a scar that is deep would leave nothing of the roughness to be seen
-        low = max(low, DEEP * float(values[0].min()))
     low = 0.0 if 0 < low < high / 2 else low
     levels = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high if high > low else low + 1.0)
     return np.asarray(levels), "max" if cut else "neither"

@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.report.course import mark_few, run_axis
 from fenwear.report.style import STANDARD, Style, legend_beside, level_line, panels, run_style, shades
 from fenwear.report.surface import AXES, model_of, surface_of
-from fenwear.results.roughness import bearing_heights, levelled
+from fenwear.results.roughness import bearing_heights, evaluated, levelled
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -28,12 +28,22 @@ def rough(history: xarray.Dataset) -> dict[str, str]:
     return {body: end for body, end in BODIES.items() if f"topography{end}" in history}
 
 
-def with_surfaces(history: xarray.Dataset) -> xarray.Dataset:
-    """Return a history with the heights of rough surfaces, less what has worn, as `surface`, mm."""
+def with_surfaces(history: xarray.Dataset, half_cycles: Sequence[int]) -> xarray.Dataset:
+    """Return a history with the heights of rough surfaces at some half-cycles as `surface`, mm, NaN at others.
+
+    Less what has worn, and where numbers of roughness are of them less their form, too (the S-F surface of ISO 25178):
+    a scar may be many times as deep as its roughness.
+    """
     found = {}
-    for end in rough(history).values():
-        worn = history[f"wear{end}"]
-        found[f"surface{end}"] = (history[f"topography{end}"] - worn).transpose(*worn.dims)
+    for body, end in rough(history).items():
+        worn, places = history[f"wear{end}"], _places(history, body, end)
+        heights = np.full(worn.shape, np.nan)
+        for row in np.flatnonzero(np.isin(history.half_cycle.values, half_cycles)):
+            depth = worn.values[row]
+            heights[row] = history[f"topography{end}"].values - depth
+            chosen = evaluated(places, depth > 0)
+            heights[row, chosen] = levelled(places, heights[row], depth > 0)
+        found[f"surface{end}"] = worn.copy(data=heights)
     return history.assign(found)
 
 

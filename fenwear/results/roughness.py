@@ -95,19 +95,29 @@ def worn_heights(block: Block, body: str, row: int) -> Array:
     return levelled(surface.grid.places, surface.heights - depth, depth > 0)
 
 
+def evaluated(places: NDArray[np.int64], worn: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which nodes roughness is of (n,): within the convex hull of what has worn; all where that is next to none.
+
+    Args:
+        places: Of the nodes on their grid (n, axes).
+        worn: Which nodes have worn (n,).
+    """
+    if worn.any():
+        within = _within_hull(places, places[worn])
+        if within.sum() >= FEWEST ** places.shape[1]:
+            return within
+    return np.ones(len(places), dtype=bool)
+
+
 def levelled(places: NDArray[np.int64], heights: Array, worn: NDArray[np.bool_]) -> Array:
-    """Return heights over their mean and form within the convex hull of what has worn (m,), mm.
+    """Return heights over their mean and form where they are `evaluated` (m,), mm.
 
     Args:
         places: Of the nodes on their grid (n, axes).
         heights: (n,), mm.
         worn: Which nodes have worn (n,).
     """
-    chosen: NDArray[np.bool_] = np.ones(len(heights), dtype=bool)
-    if worn.any():
-        within = _within_hull(places, places[worn])
-        if within.sum() >= FEWEST ** places.shape[1]:
-            chosen = within
+    chosen = evaluated(places, worn)
     x = 2.0 * (places[chosen] - places[chosen].mean(axis=0)) / np.maximum(np.ptp(places[chosen], axis=0), 1)
     powers = [x[:, k] for k in range(x.shape[1])]
     powers += [x[:, i] * x[:, j] for i in range(x.shape[1]) for j in range(i + 1)]

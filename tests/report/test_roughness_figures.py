@@ -47,15 +47,28 @@ def test_bearing_curves_have_the_roughness(history: xarray.Dataset) -> None:
         assert np.trapezoid(np.abs(heights), share) == pytest.approx(mean, rel=0.02)
 
 
-def test_heights_are_less_what_has_worn(history: xarray.Dataset) -> None:
-    """Maps show the topography less the worn depth; a run without a topography has none."""
-    found = with_surfaces(history)
+def test_heights_are_less_what_has_worn_and_its_form(history: xarray.Dataset) -> None:
+    """Maps show the topography less the worn depth, within the scar less a surface of second order: its Sq is Sq."""
+    last = int(history.half_cycle[-1])
+    found = with_surfaces(history, [last])
     for end in ("", "_strip"):
         assert found[f"surface{end}"].dims == history[f"wear{end}"].dims
-        gone = history[f"topography{end}"] - found[f"surface{end}"]
-        np.testing.assert_allclose(gone.T.values, history[f"wear{end}"].values, rtol=0, atol=1e-15)
+        assert np.isnan(found[f"surface{end}"].values[:-1]).all()
+        here = found.sel(half_cycle=last)
+        form = (here[f"topography{end}"] - here[f"wear{end}"] - here[f"surface{end}"]).values
+        within = np.abs(form) > 1e-12
+        x, y = (here[f"{axis}{end}"].values[within] for axis in "xy")
+        assert within[here[f"wear{end}"].values > 0].all()
+        assert within.mean() < 0.9
+        powers = np.column_stack([x**i * y**j for i in range(3) for j in range(3 - i)])
+        nearest = powers @ np.linalg.lstsq(powers, form[within], rcond=None)[0]
+        np.testing.assert_allclose(form[within], nearest, rtol=0, atol=1e-12)
+        heights = here[f"surface{end}"].values[within]
+        assert abs(heights.mean()) < 1e-15
+        rms = float(here[f"roughness_rms{end}"])
+        assert np.sqrt((heights**2).mean()) == pytest.approx(rms, rel=1e-9)
     assert {"surface_map", "surface_strip_map"} <= quantities(found).keys()
     assert "roughness" in roughness_of(history, [1])
     smooth = history.drop_vars([name for name in map(str, history.variables) if name.startswith("topography")])
-    assert with_surfaces(smooth).equals(smooth)
+    assert with_surfaces(smooth, [last]).equals(smooth)
     assert not roughness_of(smooth, [1])

@@ -15,6 +15,7 @@ from fenwear.report.shapes import worn_range
 from fenwear.report.stick_course import THROUGH_MIDDLE, line_along
 from fenwear.report.style import by_powers, direction_words, from_zero, legend_beside, panels, run_style, strip_moves
 from fenwear.report.surface import along_contact, centre_of_wear, model_of, surface_of
+from fenwear.results.cycles import cycle_at
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -126,8 +127,8 @@ def _cuts(history: xarray.Dataset, body: str, values: Array, title: str, up: str
 
 def _cycle(history: xarray.Dataset) -> Iterator[Drawn]:
     """Yield the loop of the last cycle of a run with stick, and what there is along its contact."""
-    last, line, solid = history.isel(cycle=-1), line_along(history), model_of(history) == "solid"
-    closed = np.arange(history.sizes["step"] + 1) % history.sizes["step"]
+    last, line, solid = cycle_at(history, -1), line_along(history), model_of(history) == "solid"
+    closed = np.arange(last.sizes["step"] + 1) % last.sizes["step"]
     turns = history.displacement.units == "rad"
     moved = "turn of the strip (rad)" if turns else "displacement of the strip (µm)"
     pulled = f"{'torque' if turns else 'tangential force'} ({history.tangential_force.units})"

@@ -21,6 +21,7 @@ from fenwear.report.stick_course import (
 )
 from fenwear.report.style import BLUE, RED, STANDARD, Style, from_zero, legend_beside, level_line, panels, shades
 from fenwear.report.surface import model_of
+from fenwear.results.cycles import cycle_at
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,13 +41,13 @@ def loops(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     figure, (whole, beyond) = panels(2, 3.0, share_x=False, look=look)
     turns = history.displacement.units == "rad"
     factor, unit, of = (1.0, "rad", "turn") if turns else (1e3, "µm", "displacement")
-    first = history.isel(cycle=0)
+    first = cycle_at(history, 0)
     slopes = np.diff(first.tangential_force) / np.where(
         np.diff(first.displacement) == 0, np.inf, np.diff(first.displacement)
     )
     stiffness = float(slopes.max(initial=0.0)) or np.inf
     for colour, place in shades(chosen(history)):
-        cycle = history.isel(cycle=place)
+        cycle = cycle_at(history, place)
         closed = np.arange(cycle.sizes["step"] + 1) % cycle.sizes["step"]
         x, y = cycle.displacement.values[closed], cycle.tangential_force.values[closed]
         whole.plot(factor * x, y, color=colour, label=cycle_name(history, place, look))
@@ -82,7 +83,7 @@ def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     figure, axes = panels(len(places), 2.4, look=look)
     colours, x = ListedColormap(("white", RED, BLUE)), history.x.values
     for ax, place in zip(axes, places, strict=True):
-        cycle = history.isel(cycle=place)
+        cycle = cycle_at(history, place)
         state = np.where(cycle.stick.values == 1, 2, np.where(cycle.pressure.values > 0, 1, 0))
         steps = np.arange(1, cycle.sizes["step"] + 1)
         at, states = parted(x, state, gaps_of(history))
@@ -101,8 +102,8 @@ def tractions(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     figure, axes = panels(len(places), 2.8, look=look)
     mu = float(history.attrs["friction"])
     for ax, place in zip(axes, places, strict=True):
-        cycle = history.isel(cycle=place)
-        for colour, step in shades([*shown_steps(history), history.sizes["step"] - 1]):
+        cycle = cycle_at(history, place)
+        for colour, step in shades([*shown_steps(cycle), cycle.sizes["step"] - 1]):
             now = cycle.isel(step=step)
             ax.plot(*line(now.traction.values), color=colour, label=f"{float(now.fraction):.3g}")
         x, bound = line(mu * cycle.pressure.max("step").values)
@@ -117,7 +118,7 @@ def stresses(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the stress along x in the strip's surface, its range over the cycle."""
     figure, (ax,) = panels(1, 3.0, look=look)
     for colour, place in shades(chosen(history, 3)):
-        cycle = history.isel(cycle=place)
+        cycle = cycle_at(history, place)
         low, high = cycle.surface_stress.min("step"), cycle.surface_stress.max("step")
         ax.plot(history.x, high, color=colour, label=cycle_name(history, place, look))
         ax.plot(history.x, low, color=colour, linestyle=":")
@@ -131,7 +132,7 @@ def sliding_map(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw where each node slips: its slip in a cycle and its share of friction's work."""
     figure, (slip, work) = panels(2, 2.2, look=look)
     for colour, place in shades(chosen(history, 3)):
-        cycle = history.isel(cycle=place)
+        cycle = cycle_at(history, place)
         slid, label = np.abs(cycle.slip), cycle_name(history, place, look)
         slip.plot(history.x, 1e3 * slid.where(cycle.pressure > 0, 0).sum("step"), color=colour, label=label)
         work.plot(history.x, 1e3 * (np.abs(cycle.traction) * slid).sum("step"), color=colour, label=label)

@@ -13,6 +13,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
 from fenwear.report.style import Style, by_powers, contact_axis
 from fenwear.report.surface import along_contact, model_of, surface_of
+from fenwear.results.cycles import cycle_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +37,7 @@ def course(history: xarray.Dataset, look: Style) -> Array:
     if look.axis == "distance":
         if history.displacement.attrs.get("units") != "mm":
             raise CaseError(InputError("--axis", "the strip turns; expected cycles or time"))
-        there = history.displacement.isel(cycle=-1).values
+        there = cycle_at(history, -1).displacement.values
         return cycles * 1e-3 * float(np.abs(there - np.roll(there, 1)).sum())
     return cycles
 
@@ -69,9 +70,9 @@ def first_and_last(history: xarray.Dataset) -> list[int]:
     return sorted({0, history.sizes["cycle"] - 1})
 
 
-def shown_steps(history: xarray.Dataset) -> list[int]:
-    """Return the time steps that end at the quarters of the first half-cycle."""
-    half = int((history.half_cycle_of_step == 1).sum())
+def shown_steps(cycle: xarray.Dataset) -> list[int]:
+    """Return the time steps of a cycle that end at the quarters of its first half-cycle."""
+    half = int((cycle.half_cycle_of_step == 1).sum())
     return [max(round(share * half) - 1, 0) for share in SHARES]
 
 

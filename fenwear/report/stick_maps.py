@@ -13,6 +13,7 @@ from fenwear.arrays import Array
 from fenwear.report.stick_course import first_and_last, shown_steps, title, touched
 from fenwear.report.style import BLUE, RED, STANDARD, Style, colour_bar, name_panel, panels_of_maps
 from fenwear.report.surface import Surface, surface_of
+from fenwear.results.cycles import cycle_at
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,13 +42,12 @@ def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch
 
-    surface, steps = surface_of(history), shown_steps(history)
-    places = first_and_last(history)
-    figure, axes = _maps(history, surface, places, steps, look)
+    surface, chosen = surface_of(history), _shown(history)
+    figure, axes = _maps(history, surface, chosen, look)
     polygons, owner = node_cells(surface)
-    for row, place in enumerate(places):
-        for ax, step in zip(axes[row], steps, strict=True):
-            now = history.isel(cycle=place, step=step)
+    for row, cycle in enumerate(chosen):
+        for column, ax in enumerate(axes[row]):
+            now = cycle.isel(step=column)
             state = np.where(now.stick.values == 1, STICK, np.where(now.pressure.values > 0, SLIP, OPEN))[owner]
             for kind, colour in COLOURS.items():
                 ax.add_collection(PolyCollection(polygons[state == kind], facecolors=colour, edgecolors=colour, lw=0.2))
@@ -62,20 +62,18 @@ def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
 
 def tractions(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw size and direction of the tangential traction at the same times."""
-    surface, steps = surface_of(history), shown_steps(history)
-    places = first_and_last(history)
-    figure, axes = _maps(history, surface, places, steps, look)
-    chosen = history.isel(cycle=places, step=steps)
-    size = np.hypot(chosen.traction, chosen.traction_across).values
+    surface, chosen = surface_of(history), _shown(history)
+    figure, axes = _maps(history, surface, chosen, look)
+    size = np.array([np.hypot(cycle.traction, cycle.traction_across).values for cycle in chosen])
     top = float(size.max()) or 1.0
     shown = _few(surface, history)
     along, across = (history[f"sliding_{name}"].values[:, list(surface.seen)] for name in ("along", "across"))
     drawn: Any = None
-    for row in range(len(places)):
+    for row, cycle in enumerate(chosen):
         for column, ax in enumerate(axes[row]):
             triangles, values = surface.drawn(size[row, column])
             drawn = ax.tripcolor(triangles, values, shading="gouraud", cmap="YlGnBu", vmin=0, vmax=top, rasterized=True)
-            now = chosen.isel(cycle=row, step=column)
+            now = cycle.isel(step=column)
             arrows = now.traction.values[:, None] * along + now.traction_across.values[:, None] * across
             strong = shown[np.linalg.norm(arrows[shown], axis=1) > WEAK * top]
             length = 1.6 * _extent(surface, history).max() / ARROWS
@@ -136,14 +134,20 @@ def _few(surface: Surface, history: xarray.Dataset) -> Array:
     return nodes[order[np.unique(which.ravel()[order], return_index=True)[1]]]
 
 
+def _shown(history: xarray.Dataset) -> list[xarray.Dataset]:
+    """Return the time steps of the first and the last cycle of which maps are drawn."""
+    cycles = [cycle_at(history, place) for place in first_and_last(history)]
+    return [cycle.isel(step=shown_steps(cycle)) for cycle in cycles]
+
+
 def _maps(
-    history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int], look: Style
+    history: xarray.Dataset, surface: Surface, chosen: Sequence[xarray.Dataset], look: Style
 ) -> tuple[Figure, Any]:
-    """Return a figure with a row of maps for each cycle, one for each time step."""
-    figure, axes = _contact_maps(history, surface, len(places), len(steps), look)
-    for row, place in enumerate(places):
-        for ax, step in zip(axes[row], steps, strict=True):
-            name_panel(ax, f"{title(history, place, look)}\npart {float(history.fraction[step]):.3g}")
+    """Return a figure with a row of maps for each of both cycles, one for each time step."""
+    figure, axes = _contact_maps(history, surface, len(chosen), chosen[0].sizes["step"], look)
+    for row, (place, cycle) in enumerate(zip(first_and_last(history), chosen, strict=True)):
+        for ax, fraction in zip(axes[row], cycle.fraction.values, strict=True):
+            name_panel(ax, f"{title(history, place, look)}\npart {fraction:.3g}")
     return figure, axes
 
 

@@ -28,8 +28,9 @@ def resolves(history: xarray.Dataset) -> bool:
 def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
     """Return the whole cycles of a history with time steps, each with all of its steps one after the other.
 
-    Dimensions are `cycle`, whose coordinate is the number of cycles done, `step` and those of the nodes. Worn depths
-    are those at the end of the cycle, `dissipated_energy` is the work of friction in it, mJ.
+    Dimensions are `cycle`, whose coordinate is the number of cycles done, `step` and those of the nodes; cycles of
+    fewer steps than others end in NaN (`cycle_at`). Worn depths are those at the end of the cycle, `dissipated_energy`
+    is the work of friction in it, mJ.
     """
     numbers = history.half_cycle.values.astype(int)
     strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
@@ -37,8 +38,15 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
     last = last[last >= strokes - 1]
     last = last[numbers[last] - numbers[last - strokes + 1] == strokes - 1]
     rows = last[:, None] + np.arange(-strokes + 1, 1)  # (cycles, strokes)
-    there = np.isfinite(history.step_fraction.values[rows[0]]).ravel()  # (strokes * steps,)
+    there = np.isfinite(history.step_fraction.values[rows]).reshape(len(rows), -1)  # (cycles, strokes * steps)
+    order = np.argsort(~there, axis=1, kind="stable")[:, : there.sum(axis=1).max(initial=0)]
     data: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]] = {}
+
+    def one_after_the_other(values: NDArray[Any]) -> NDArray[Any]:
+        inner = values.shape[3:]
+        return np.take_along_axis(
+            values.reshape(len(rows), -1, *inner), order.reshape(*order.shape, *[1] * len(inner)), 1
+        )
 
     def put(name: str, over: tuple[str, ...], values: NDArray[Any], of: str) -> None:
         kept = {key: value for key, value in history[of].attrs.items() if key not in ("coordinates",)}
@@ -46,10 +54,9 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
 
     for name, of in STEPS.items():
         if of in history:
-            found = history[of].values[rows]
-            found = found.reshape(len(rows), -1, *found.shape[3:])[:, there]
+            found = one_after_the_other(history[of].values[rows])
             put(name, ("cycle", STEP, *map(str, history[of].dims[2:])), found, of)
-    data["stick"] = (data["stick"][0], data["stick"][1].astype(np.int8), data["stick"][2])
+    data["stick"] = (data["stick"][0], np.nan_to_num(data["stick"][1]).astype(np.int8), data["stick"][2])
     for name in AT_END:
         if name in history:
             put(name, ("cycle", *map(str, history[name].dims[1:])), history[name].values[last], name)
@@ -69,16 +76,23 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
     for term in (*TERMS, *CROSSING) if "heat_friction" in history else ():
         put(f"heat_{term}", ("cycle",), history[f"heat_{term}"].values[rows].sum(axis=1), f"heat_{term}")
     if "temperature_punch" in data:
-        hottest = np.maximum(*(data[f"temperature_{body}"][1].max(axis=(1, 2)) for body in ("punch", "strip")))
+        hottest = np.maximum(*(np.nanmax(data[f"temperature_{body}"][1], axis=(1, 2)) for body in ("punch", "strip")))
         put("max_temperature", ("cycle",), hottest, "max_temperature")
     fixed = {name: one for name, one in history.variables.items() if "half_cycle" not in one.dims and name != STEP}
     weight = history.weight.isel(half_cycle=-1, drop=True)
-    half = np.repeat(np.arange(1, strokes + 1), history.sizes[STEP])[there]
+    half = np.where(there, np.repeat(np.arange(1, strokes + 1), history.sizes[STEP]), 0).reshape(*rows.shape, -1)
+    fractions = one_after_the_other(history.step_fraction.values[rows])
     coordinates = {
         "cycle": ("cycle", numbers[last] // strokes, {"units": "1", "long_name": "cycles done"}),
-        "fraction": (STEP, history.step_fraction.values[rows[0]].ravel()[there], history.step_fraction.attrs),
-        "half_cycle_of_step": (STEP, half, {"units": "1", "long_name": "half-cycle"}),
+        "fraction": (("cycle", STEP), fractions, history.step_fraction.attrs),
+        "half_cycle_of_step": (("cycle", STEP), one_after_the_other(half), {"units": "1", "long_name": "half-cycle"}),
         **{str(name): (one.dims, one.values, one.attrs) for name, one in fixed.items()},
         "weight": (weight.dims, weight.values, weight.attrs),
     }
     return xarray.Dataset(data, coordinates, history.attrs)
+
+
+def cycle_at(history: xarray.Dataset, place: int) -> xarray.Dataset:
+    """Return one cycle of `by_cycles` with all of its own time steps."""
+    cycle = history.isel(cycle=place)
+    return cycle.isel({STEP: np.isfinite(cycle.fraction.values)})

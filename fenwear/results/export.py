@@ -119,13 +119,11 @@ def _loops(history: xarray.Dataset, rows: Sequence[int]) -> list[Column]:
     strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
     wanted = {-(-int(history.half_cycle[row]) // strokes) for row in rows}
     cycles = cycles.isel(cycle=[k for k, number in enumerate(cycles.cycle.values) if int(number) in wanted])
-    count = cycles.sizes[STEPS]
-    columns: list[Column] = [("cycle", np.repeat(cycles.cycle.values, count).tolist())]
+    there = np.isfinite(cycles.fraction.values)
+    columns: list[Column] = [("cycle", np.repeat(cycles.cycle.values, there.sum(axis=1)).tolist())]
     for name in cycles.variables:
-        if cycles[name].dims == (STEPS,):
-            columns.append((_heading(cycles, name), np.tile(cycles[name].values, cycles.sizes["cycle"]).tolist()))
-        elif cycles[name].dims == ("cycle", STEPS):
-            columns.append((_heading(cycles, name), cycles[name].values.ravel().tolist()))
+        if cycles[name].dims == ("cycle", STEPS):
+            columns.append((_heading(cycles, name), cycles[name].values[there].tolist()))
     return columns
 
 

@@ -7,7 +7,7 @@ import math
 import os
 import shutil
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,8 @@ SHARE = 20  # of the time between two writes over that of copying the file, whic
 CHUNK = 256  # rows that a variable's storage grows by, at most
 CHUNK_VALUES = 2**18  # that it grows by at most
 INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
+
+Rows = dict[str, NDArray[Any]]  # of variables, by their names
 
 # name: (dimensions, units, long_name); a Block has an attribute of each name but the weights
 VARIABLES = {
@@ -308,6 +310,7 @@ class HistoryWriter:
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
         self._variables = variables_of(system)
         self._columns = columns_of(system)
+        self._system = system
         self._degrees = degrees_of(system.case)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
@@ -335,19 +338,44 @@ class HistoryWriter:
         Raises:
             OutputError: as `add`.
         """
+        old, columns = self._variables, columns_of(after)
+        if steps.STEP in columns:
+            columns[steps.STEP] = self._columns[steps.STEP]
+        self._system = after
+        self._begin_anew(columns, lambda rows: _on_grid(rows, old, before, after))
+
+    def _begin_anew(self, columns: dict[str, Column], changed: Callable[[Rows], Rows]) -> None:
+        """Go on in a file of other sizes, with what is written by now changed to them."""
         self.flush()
-        old, self._columns = self._variables, columns_of(after)
+        self._columns = columns
         with writing(self.path):
-            self._lay_out(after)
+            self._lay_out(self._system)
             with h5py.File(self.path, "r") as stored, h5py.File(self._twin, "r+") as twin:
-                known = {name: stored[name][: self.rows] for name in old}
-                for name, values in _on_grid(known, old, before, after).items():
+                known = {name: stored[name][: self.rows] for name in self._variables}
+                for name, values in changed(known).items():
                     twin[name].resize(self.rows, axis=0)
                     twin[name][...] = values
             self._twin.replace(self.path)
         self._twin_rows = 0
         if self._last is not None:
-            self._last = _on_grid(self._last, old, before, after)
+            self._last = changed(self._last)
+
+    def _over_steps(self, rows: Rows) -> Rows:
+        """Return rows whose half-cycles have as many time steps as the file has; it gets more where they have more."""
+        own = [rows[name].shape[1] for name, (over, _, _) in self._variables.items() if steps.STEP in over]
+        if own and max(own) > len(self._columns[steps.STEP].values):
+            column = self._columns[steps.STEP]._replace(values=np.arange(1, max(own) + 1))
+            self._begin_anew({**self._columns, steps.STEP: column}, self._padded)
+        return self._padded(rows)
+
+    def _padded(self, rows: Rows) -> Rows:
+        if steps.STEP not in self._columns:
+            return rows
+        count = len(self._columns[steps.STEP].values)
+        return {
+            name: steps.padded(values, count, axis=1) if steps.STEP in self._variables[name][0] else values
+            for name, values in rows.items()
+        }
 
     def _lay_out(self, system: Tribosystem) -> None:
         """Begin a file, without rows, in place of the twin."""
@@ -383,6 +411,9 @@ class HistoryWriter:
                 stored = file["half_cycle"][:]
                 if "max_temperature" in file:  # a run goes on in the degrees that it began with
                     self._degrees = degrees_in(str(file["max_temperature"].attrs["units"]))
+                if steps.STEP in self._columns:  # more than the case's where a step of its program had more
+                    column = self._columns[steps.STEP]._replace(values=file[steps.STEP][:])
+                    self._columns = {**self._columns, steps.STEP: column}
                 missing = [n for n, (d, _, _) in self._variables.items() if file[n].ndim != len(d)]
             if missing:
                 raise KeyError(missing[0])  # of an older version
@@ -407,6 +438,7 @@ class HistoryWriter:
         for name, (_, units, _) in self._variables.items():
             if units == KELVIN.unit:
                 rows[name] = self._degrees.of(rows[name])
+        rows = self._over_steps(rows)
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
         before = self._last or {name: values[:0] for name, values in rows.items()}

@@ -130,7 +130,7 @@ def values(block: Block) -> dict[str, NDArray[Any]]:
     system = block.system
     rows = [_row(system, steps) for steps in steps_of(block)]
     size = most(system)
-    return {name: np.array([_padded(row[name], size) for row in rows]) for name in rows[0]}
+    return {name: np.array([padded(np.asarray(row[name], dtype=float), size) for row in rows]) for name in rows[0]}
 
 
 def steps_of(block: Block) -> tuple[Steps, ...]:
@@ -139,12 +139,12 @@ def steps_of(block: Block) -> tuple[Steps, ...]:
     return found
 
 
-def _padded(value: Any, size: int) -> Array:
+def padded(values: Array, size: int, axis: int = 0) -> Array:
     """Return an array over time steps, with as many as others have; a number as it is."""
-    found = np.asarray(value, dtype=float)
-    if not found.ndim or len(found) == size:
-        return found
-    return np.concatenate([found, np.full((size - len(found), *found.shape[1:]), np.nan)])
+    if not values.ndim or values.shape[axis] == size:
+        return values
+    missing = [n if k != axis else size - n for k, n in enumerate(values.shape)]
+    return np.concatenate([values, np.full(missing, np.nan)], axis=axis)
 
 
 def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:

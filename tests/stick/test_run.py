@@ -19,7 +19,8 @@ from fenwear.cycle.totals import Totals
 from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
-from fenwear.results.cycles import by_cycles
+from fenwear.results.cycles import by_cycles, cycle_at
+from fenwear.results.export import export
 from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet_text
 from fenwear.run import run_case
@@ -216,3 +217,36 @@ def test_a_strip_that_passes_in_vain_is_told_of(asked: dict[str, object], tmp_pa
     told: list[str] = []
     run_case(case, "fretting", tmp_path / "out", told.append, progress="none")
     assert any("smeared" in text for text in told) == (len(asked) == 1)
+
+
+def test_steps_of_a_program_with_more_time_steps_than_the_first(tmp_path: Path) -> None:
+    """Cycles of two and of four time steps stand in one history, in one piece and in parts, each with its own work."""
+    columns = "columns=['time (s)', 'shift_x (um)', 'force_z (N)'], load={on='punch_top'}"
+    two = "[[0, -3, -120], [1, 3, -120], [2, -3, -120]]"
+    four = "[[0, -2, -100], [1, 0, -120], [2, 2, -140], [3, 0, -120], [4, -2, -100]]"
+    second = f"{{cycles=3, motion={{kind='cycle', {columns}, rows={four}}}}}"
+    settings = [
+        "unset=['punch.loads', 'run.half_cycles']",
+        "geometry.parameters.elements_along_contact=20",
+        f"motion={{kind='cycle', {columns}, rows={two}}}",
+        "stick={step_tolerance=1}",
+        f"program.steps=[{{cycles=4}}, {second}, {{cycles=2}}]",
+        "run.integration=explicit",
+        "output={report=false, uncertainty=false}",
+    ]
+    histories = {}
+    for name, stops in (("whole", (9,)), ("parts", (3, 6, 9))):
+        for stop in stops:
+            case = load_case("fretting-partial-slip", [*settings, f"run.half_cycles={stop}"])
+            run_case(case, "fretting", tmp_path / name, lambda _: None, resume=stop != stops[0], progress="none")
+        histories[name] = load_history(tmp_path / name)
+    xarray.testing.assert_allclose(histories["parts"], histories["whole"], rtol=1e-12)
+    history = by_cycles(histories["whole"])
+    np.testing.assert_array_equal(np.isfinite(history.fraction).sum("step"), [2] * 4 + [4] * 5)
+    work = (np.abs(history.traction * history.slip).sum("step") * history.weight).sum("x")
+    np.testing.assert_allclose(work, history.dissipated_energy, rtol=1e-9)
+    np.testing.assert_allclose(cycle_at(history, 0).displacement, [3e-3, -3e-3], rtol=1e-9)
+    np.testing.assert_allclose(cycle_at(history, -1).displacement, [0, 2e-3, 0, -2e-3], rtol=1e-9, atol=1e-15)
+    export(tmp_path / "whole", tmp_path / "tables", at="4,last")
+    assert len((tmp_path / "tables" / "loops.csv").read_text("utf-8").splitlines()) == 1 + 2 + 4
+    assert "loops.png" in {path.name for path in write_report(tmp_path / "whole")}

@@ -96,7 +96,7 @@ def shared(
     """
     cell = sides[0] * sides[1]
     both = first.bulk.per_power + second.bulk.per_power
-    precondition = _Inverse(first, second, heat.shape, sides, period)
+    precondition = _Inverse(first, second, touching, sides, period, resistance)
 
     def inside(values: Array) -> Array:
         return np.where(touching, values, 0.0).ravel()
@@ -118,19 +118,28 @@ def shared(
 
 
 class _Inverse:
-    """The inverse of both bodies at rest, on a grid without rims.
+    """The inverse of both bodies at rest and of the least resistance between them, on a grid without rims.
+
+    Where the resistance R is larger what a node answers to itself, s, falls as (s + R_0) / (s + R).
 
     Args:
         first, second: The bodies.
-        shape: Instants and nodes (t, m, n).
+        touching: Where they touch (t, m, n).
         sides: Of a cell, mm.
         period: s.
+        resistance: (t, m, n), mm s K/N; None for none.
     """
 
     def __init__(
-        self, first: HeatedSide, second: HeatedSide, shape: tuple[int, ...], sides: tuple[float, float], period: float
+        self,
+        first: HeatedSide,
+        second: HeatedSide,
+        touching: Mask,
+        sides: tuple[float, float],
+        period: float,
+        resistance: Array | None,
     ) -> None:
-        self.shape = shape
+        shape = self.shape = touching.shape
         x, y = scipy.fft.fftfreq(shape[1], sides[0]), scipy.fft.rfftfreq(shape[2], sides[1])
         square = (2 * np.pi) ** 2 * (x[:, None] ** 2 + y**2)
         square[0, 0] = square[square > 0].min() / 4
@@ -139,9 +148,13 @@ class _Inverse:
             1 / (side.conductivity * np.sqrt(square + 1j * rate[:, None, None] / side.diffusivity))
             for side in (first, second)
         )
+        self.share: Array | float = 1.0
+        if resistance is not None:
+            least, itself = float(resistance[touching].min()), float(np.mean(ease.real))
+            ease, self.share = ease + least, np.sqrt((itself + least) / (itself + resistance))
         self.symbol = 1 / ease
 
     def __call__(self, values: Array) -> Array:
-        waves = scipy.fft.fft(scipy.fft.rfftn(values, axes=(1, 2)), axis=0)
+        waves = scipy.fft.fft(scipy.fft.rfftn(self.share * values, axes=(1, 2)), axis=0)
         waves = scipy.fft.ifft(waves * self.symbol, axis=0)
-        return np.asarray(scipy.fft.irfftn(waves, self.shape[1:], axes=(1, 2)))
+        return np.asarray(self.share * scipy.fft.irfftn(waves, self.shape[1:], axes=(1, 2)))

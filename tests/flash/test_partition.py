@@ -7,7 +7,7 @@ import pytest
 
 from fenwear.arrays import Array
 from fenwear.flash.kernels import cell_integrals
-from fenwear.flash.partition import Bulk, HeatedSide, mean_power, shared
+from fenwear.flash.partition import Bulk, HeatedSide, shared
 from fenwear.flash.response import Instants, Periodic
 
 A, FOREVER = 0.1, np.inf
@@ -52,11 +52,12 @@ def test_to_and_fro_shares_meet() -> None:
     one, two = first.rise(own, cell), second.rise(heat - own, cell)
     assert np.abs(one - two)[touching].max() < 1e-7 * one.max()
     assert not own[~touching].any()
-    resistance = np.full(heat.shape, 2e-4)
-    own = shared(first, second, heat, touching, sides, period, resistance=resistance, given=0.3)
-    one, two = first.rise(own, cell), second.rise(heat - own, cell)
-    assert np.allclose((0.3 * heat - own)[touching], ((one - two) / resistance)[touching], atol=1e-6 * heat.max())
-    assert mean_power(own, cell) < mean_power(heat, cell)
+    even, as_pressures = np.full(heat.shape, 1.0), np.broadcast_to(1 / (spot + 1e-5), heat.shape)
+    for resistance in (2e-4 * even, 2e-4 * as_pressures, 1e3 * even, 1e-9 * as_pressures):
+        own = shared(first, second, heat, touching, sides, period, resistance=resistance, given=0.3)
+        one, two = first.rise(own, cell), second.rise(heat - own, cell)
+        jump = (resistance * (0.3 * heat - own) - (one - two))[touching]
+        assert np.abs(jump).max() < 1e-7 * max(one.max(), 0.3 * (resistance * heat).max())
 
 
 @pytest.mark.parametrize("peclet", [0.01, 1.0, 5.0, 20.0, 100.0])

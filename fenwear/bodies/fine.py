@@ -22,6 +22,7 @@ from fenwear.arrays import Array, Nodes
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.correction import Correction, Ground, below, cell_constants, coefficients, correct, interpolation
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.factor import entries
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.half_space import HalfSpace, extent_along
@@ -37,6 +38,7 @@ RESOLVED, TRUSTED = 1e-3, 1e-2  # of the half-space's mean over the grid: what p
 FALLS = 0.7  # of what polynomials leave out: by how much two more points along an axis have to lessen it
 UNEVEN = 0.05  # of the correction: what may not be symmetric of it, by coarse elements or a strongly curved surface
 OF_SQUARE, OF_LINE = 2.97, 1.5  # mean of s / r, and of ln(s / r), over two points of a square or line of side s
+LARGE = 2**25  # entries of a factor, a quarter of a GiB, above which it is not kept beside the contact
 SAME = 1e-9  # of a material's constants: one material
 
 
@@ -196,7 +198,8 @@ def fine(request: Request) -> FineBody:
         correction, unresolved = _resolved(elastic, ground, direction.T, key)
         guided = _guided(request, correction, at_nodes(correction, ground.grid, half.places, x, grid.spacing))
         found = _held(replace(correction, guided=guided), direction), unresolved, ground.grid
-        elastic.free_factor()
+        if entries(elastic.size, elastic.dim) > LARGE:  # else it waits for the fields of the end
+            elastic.free_factor()
         elastic.known[direction.tobytes()] = found  # it stays on other grids
     correction, unresolved, over = found
     weights = at_nodes(correction, over, half.places, x, grid.spacing)

@@ -17,6 +17,7 @@ from ufl.algorithms import extract_coefficients
 from fenwear import Case, CaseError, assemble, load_case, march, vary
 from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, elastic, grids, make_sliding, place, relaid
+from fenwear.bodies import fine as fine_bodies
 from fenwear.bodies import operators
 from fenwear.bodies.correction import Ground
 from fenwear.bodies.fine import RESOLVED, FineBody, fine
@@ -415,3 +416,16 @@ def test_loads_that_vary() -> None:
     block = next(iter(march(assemble(case), 1)))
     assert block.equilibrium_error.max() < 1e-9
     assert 25 < (block.pressure[-1] @ block.system.pair.weights) < 40
+
+
+def test_factors_wait_for_the_fields_of_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of large bodies are freed beside the contact, and made again: what loads move is the same."""
+    case = load_case("ball-on-flat", [*BALL, "grid.nodes=25"])
+    kept = assemble(case).bodies.strip
+    monkeypatch.setattr(fine_bodies, "LARGE", 0)
+    freed = assemble(case).bodies.strip
+    assert kept._factors
+    assert not freed._factors
+    right = np.random.default_rng(0).standard_normal(kept.load.size)
+    right[kept.supported] = 0.0
+    np.testing.assert_allclose(freed.solve(right), kept.solve(right), rtol=1e-12, atol=0)

@@ -263,7 +263,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
         measure: Of the surface by that of the mesh, in UFL: 2 pi r for axisymmetric bodies.
 
     Raises:
-        CaseError: two named contacts meet.
+        CaseError: two named contacts meet, or an element has next to no area.
     """
     mesh, fdim = body.mesh, body.mesh.topology.dim - 1
     degree, dim = space.ufl_element().degree, mesh.geometry.dim
@@ -290,6 +290,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     else:
         weights, outward = _integrals(body, space, measure, blocks)
         nodes = np.flatnonzero(weights > NO_WEIGHT * weights.max(initial=0.0))
+        _check_sizes(body, np.asarray(np.isin(facets, nodes).any(axis=1)))
         spread = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(trace), len(nodes)))
         surface = ContactSurface(body.name, trace, facets, cell, degree, nodes, weights[nodes], outward[nodes], spread)
         surface = replace(surface, arc=None if arc is None else arc[order])
@@ -346,6 +347,14 @@ def _contact_numbers(body: BodyMesh) -> NDArray[np.int64]:
     for k, named in enumerate(body.contacts.values()):
         number[np.isin(facets, named)] = k
     return number
+
+
+def _check_sizes(body: BodyMesh, carries: Mask) -> None:
+    """Raise where a facet, of those that carry pressure or not (f,), has none of the contact's area."""
+    if not carries.all():
+        name, count = f"{body.name}_contact", int(np.count_nonzero(~carries))
+        text = f"{name} has {count} elements so much smaller than others that they carry nothing"
+        raise CaseError(InputError("geometry", text))
 
 
 def _check_apart(body: BodyMesh, nodes: Sequence[NDArray[np.int64]]) -> None:

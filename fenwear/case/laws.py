@@ -355,7 +355,9 @@ class WearLaw(Part):
             raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
         if self.per_area is not None and (self.pressure_cap is not None or self.pressure_threshold > 0):
             raise ValueError("per_area: expected without pressure_cap and pressure_threshold")
-        if self.per_area is None and self.touching_from != WearLaw.model_fields["touching_from"].default:
+        if self.per_area is None and not math.isclose(
+            self.touching_from, WearLaw.model_fields["touching_from"].default
+        ):
             raise ValueError("touching_from: expected with per_area")
         for key in ("coefficient", "beta"):
             value = getattr(self, key)

@@ -237,8 +237,8 @@ class SteadyInequality:
 
     @property
     def _may_follow(self) -> bool:
-        """Whether a first solution of several phases is looked for, of wear that no cap holds."""
-        return self.m > 1 and not self._solved and self.wear.cap == np.inf
+        """Whether a first solution of several phases is looked for, of wear that something makes and no cap holds."""
+        return self.m > 1 and not self._solved and self.wear.cap == np.inf and self.wear_scale > 0
 
     @property
     def _far(self) -> bool:

@@ -264,6 +264,11 @@ def _check_covered(parts: Sequence[Patch], placement: Placement) -> None:
     bare = next((part for part in parts if not part.common.covered.all()), None)
     if bare is None:
         return
+    if len(parts) > 1 and placement == HERE:  # as seen from the middle, whose coordinates are none of the case
+        _not_facing(
+            "a part of punch_contact has nothing of strip_contact opposite: it reaches farther, or elements are too "
+            "long for the curve that they follow"
+        )
     first, second = (used.s[np.unique(used.facets)] for used in (bare.first, bare.second))
     spans = [
         " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.min(axis=0), c.max(axis=0), strict=True))

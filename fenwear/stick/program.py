@@ -190,7 +190,11 @@ def _bulk_strain(case: Case) -> float:
         raise CaseError(InputError("stick.bulk_stress", "expected a strip of one material"))
     material = case.materials[names.pop()]
     stiffer = 1 - material.poisson**2 if case.model.law == "strain" else 1.0
-    return stress * stiffer / material.young
+    strain = stress * stiffer / material.young
+    if abs(strain) >= 1:
+        message = f"expected a stress below Young's modulus: the strip would be strained by {strain:.3g}"
+        raise CaseError(InputError("stick.bulk_stress", message))
+    return strain
 
 
 def far_enough(case: Case, surface: ContactSurface) -> bool:

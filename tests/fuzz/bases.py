@@ -67,6 +67,73 @@ GRID = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=4",
 ROUGH = """
 punch.topography = {rms = "0.05 um", longest = "0.2 mm", seed = 1}
 """
+GROWING = (*GRID[:-3], "grid={across=8, size=['0.4 mm', '0.4 mm']}", "motion.positions=2", "run.half_cycles=2")
+CREEP = """
+punch.creep = {terms = [{compliance = 0.2, time = "0.2 s"}, {compliance = 0.1, time = "5 s"}]}
+strip.creep = {per_decade = 0.1, onset = "0.01 s"}
+"""
+LINEAR = """
+contact.layer.kind = "linear"
+contact.layer.stiffness = {expression = "1e5 * (1 + x**2)", unit = "MPa/mm"}
+contact.layer.creep = {terms = [{compliance = 0.5, time = "0.3 s"}]}
+"""
+POWER = """
+contact.layer = {kind = "power", reference = "1 um", pressure = "10 MPa", exponent = 0.5}
+contact.third_body = {share = 0.8, life = {expression = "3 / (1 + 1e3 * debris)", unit = "mm"}, edge_life = "0.3 mm", edge_length = "2 mm"}
+wear.punch.coefficient = {expression = "1e-8 * (0.2 + 0.8 * exp(-debris / 1e-3))", unit = "MPa^-1"}
+"""  # noqa: E501
+ASPERITIES = """
+contact.layer = {kind = "rough", roughness = "0.5 um", asperity_radius = "50 um", asperity_density = "3000 1/mm^2"}
+heat.conductance = "layer"
+heat.partition = 0.5
+heat.convection = "20 W/(m^2 K)"
+heat.steps = 2
+"""
+LUBRICATED = """
+contact.hardness = "2 GPa"
+contact.lubrication = {film = {expression = "1e-5 * v**0.7", unit = "mm"}, roughness = "0.3 um", share_over_lambda = [[0, 1], [1, 0.5], [3, 0.05]], fluid_friction = 0.01}
+[wear.punch]
+coefficient = "1e-8 MPa^-1"
+pressure_threshold = "5 MPa"
+pressure_cap = "500 MPa"
+coating = {thickness = "1 nm", coefficient = "1e-8 MPa^-1", friction = 0.1, modulus = "500 MPa"}
+"""  # noqa: E501
+CARRIED = """
+contact.third_body = {share = 0.6, life = "0.3 mm", carried_by = "strip", initial = "0.1 um"}
+wear.strip = {coefficient = "1e-8 MPa^-1"}
+"""
+BY_TEMPERATURE = """
+motion = {kind = "one-way", direction = "leftward", speed = "200 mm/s", duration = "0.1 s"}
+heat.property_tolerance = 0.001
+materials.steel.conductivity = {table = [[0, 50], [100, 30]], of = "T"}
+materials.steel.young = {expression = "2e5 - 100 * T", unit = "MPa"}
+"""
+CLOSED_TRACK = """
+motion = {kind = "one-way", direction = "rightward", speed = "200 mm/s", duration = "0.1 s"}
+heat.track = {heat_capacity = "1 J/K", loss = "0.1 W/K"}
+strip.temperatures = []
+"""
+PROFILE = """
+punch.profile.points = [[-0.3, 1e-4], [0, 0], [0.3, 1e-4]]
+strip.profile.points = [[-0.4, 0], [0.4, 1e-5]]
+"""
+FRETTING_CYCLE = """
+punch.loads = []
+motion = {kind = "cycle", columns = ["time (s)", "shift_x (um)", "force_z (N)"], load = {on = "punch_top"}, rows = [[0, -3, -120], [2e-4, 3, -118], [1e-3, -3, -120]]}
+contact.friction = {expression = "0.7 + 1e-4 * pm + cs"}
+wear.punch = {per_area = "1e-9"}
+"""  # noqa: E501
+BLOCKS = """
+program = {steps = [{cycles = 1, load_factor = [0.5, 1], ambient = [0, 5]}, {distance = "4 mm", amplitude = [1, 2]}, {time = "0.5 s", load = ["100 N"]}]}
+"""  # noqa: E501
+FULL = (*TINY[:-2], "run.half_cycles=1", "output.figures_at=[]", "contact.solver=full")
+PAD = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=2", "geometry.parameters.along=2",
+       "geometry.parameters.pad_layers=1", "geometry.parameters.disc_layers=1", "run.half_cycles=2",
+       "run.integration=explicit")  # fmt: skip
+TWO_PADS = (*PAD, "geometry.parameters.disc_layers=2", "geometry.parameters.around=24")
+SHAFT = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.fine_elements=8", "geometry.parameters.along=2",
+         "run.half_cycles=2", "run.integration=explicit")  # fmt: skip
+GROOVE = ("geometry.degree=1", "geometry.parameters.across=3", "run.half_cycles=32", "run.integration=explicit")
 # By name: a built-in case, settings, and tables laid over it.
 BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "example1": ("example1", TINY, ""),
@@ -102,6 +169,28 @@ BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "table": ("ball-on-flat", SOLID, CYCLE),
     "grid": ("ball-on-flat", GRID, ""),
     "rough": ("ball-on-flat", GRID, ROUGH),
+    "growing": ("ball-on-flat", GROWING, ""),
+    "growing creep": ("ball-on-flat", GROWING, CREEP),
+    "growing stick": ("fretting-sphere", (*GROWING, "motion.positions=1", *STICK[-3:]), ""),
+    "creep": ("example1", TINY, CREEP),
+    "stick creep": ("fretting-partial-slip", STICK, CREEP),
+    "linear layer": ("example1", TINY, LINEAR),
+    "power layer": ("example1", TINY, POWER),
+    "asperities": ("example1-heat", WITH_HEAT, ASPERITIES),
+    "lubricated": ("rounded-punch", ROUNDED, LUBRICATED),
+    "carried": ("fretting", (*TINY, "motion.positions=3"), CARRIED),
+    "stick carried": ("fretting-partial-slip", (*STICK, "motion.positions=3"), CARRIED),
+    "by temperature": ("example1-heat", WITH_HEAT, BY_TEMPERATURE),
+    "closed track": ("example1-heat", WITH_HEAT, CLOSED_TRACK),
+    "profile": ("fretting", (*TINY, "motion.positions=3"), PROFILE),
+    "stick cycle": ("fretting-partial-slip", STICK, FRETTING_CYCLE),
+    "blocks": ("example2-heat", (*WITH_HEAT, "run.half_cycles=4"), BLOCKS),
+    "all displacements": ("example2", FULL, ""),
+    "warm pad": ("brake-pad", (*PAD, "heat.steps=2"), ""),
+    "two pads": ("disc-brake-two-pads", TWO_PADS, ""),
+    "two bushings": ("two-bushings", SHAFT, ""),
+    "misaligned": ("bushing-misaligned", (*SHAFT, "geometry.parameters.along=6"), ""),
+    "groove": ("ring-in-groove", GROOVE, ""),
 }
 
 # What would leave a trace in the current folder if an expression could do more than compute.
@@ -183,11 +272,57 @@ LAW_TABLES: tuple[Any, ...] = (
 )
 
 
+def laid_over(tables: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
+    """Return tables with the keys of others, of tables of materials too."""
+    return {**tables, **{key: {**tables[key], **value} if key == "steel" else value for key, value in others.items()}}
+
+
+GRIDS = ({"nodes": 9}, {"across": 8}, {"across": 3}, {"nodes": 17, "size": ["0.1 mm"]}, {"across": 8, "nodes": 9}, {})
+CREEPS: tuple[Any, ...] = (
+    *({"terms": [{"compliance": 1, "time": "1 s"}]}, {"terms": [{"compliance": 0, "time": 1e-300}]}, {}),
+    *({"terms": [{"compliance": 1e300, "time": 1}]}, {"per_decade": 0.1}, {"per_decade": 0.1, "onset": "1 ms"}),
+    *({"per_decade": 1e300, "onset": 1e-300}, {"terms": [{"compliance": 0.1, "time": 10.0**k} for k in range(-9, 9)]}),
+)
+LAYERS: tuple[Any, ...] = (
+    *({"kind": "linear", "stiffness": "1 MPa/mm"}, {"kind": "linear", "stiffness": 1e-300}, {"kind": "linear"}, {}),
+    *({"kind": "linear", "stiffness": 1e12}, {"kind": "linear", "stiffness": 1e3, "creep": CREEPS[0]}),
+    *({"kind": "power", "reference": 1e-3, "pressure": 10, "exponent": e} for e in (1, 0.5, 1e-3, 0, 2)),
+    *({"kind": "exponential", "length": d, "pressure": 10} for d in ("1 um", 1e-12, 1e300, 0)),
+    *({"kind": "rough", "roughness": 1e-4, "asperity_radius": 0.05, "asperity_density": n} for n in (1e3, 1e-300, 0)),
+    {"kind": "rough", "roughness": "1 nm", "asperity_radius": "1 m", "asperity_density": "1 1/mm^2", "modulus": 1e-9},
+)
+DEBRIS: tuple[Any, ...] = (
+    *({"share": s, "life": d} for s, d in ((1, 1), (0.5, 1e-9), (1, 1e300), (0, 1), (2, 1), (0.5, 0))),
+    *({"share": 1, "life": 1, "carried_by": body} for body in ("punch", "strip", "x")),
+    *({"share": 1, "life": 1, "initial": t} for t in (1e-3, 1, 1e300, -1)),
+    *({"share": 1, "life": 1, "edge_life": 0.1}, {"share": 1, "life": 1, "edge_life": 1e-9, "edge_length": 1e9}),
+)
+COATINGS: tuple[Any, ...] = (
+    *({"thickness": t, "coefficient": 1e-8} for t in ("1 um", 1e-12, 1e300, 0, -1)),
+    *({"thickness": 1e-6, "coefficient": 1e-8, "friction": mu} for mu in (0, 0.1, 10, -1)),
+    *({"thickness": 1e-4, "coefficient": 1e-9, "modulus": m} for m in (1, 1e9, 1e-9, 0)),
+    *({"thickness": 1e-6, "per_area": 1e-9}, {"thickness": 1e-6, "archard": 1e-4}, {"thickness": 1e-6}),
+    {"thickness": {"expression": "1e-6 * (1 + x)", "unit": "mm"}, "coefficient": 1e-8},
+)
+TOPOGRAPHIES: tuple[Any, ...] = (
+    *({"rms": h, "longest": "0.1 mm"} for h in ("0.1 um", 0, 1, -1, 1e300)),
+    *({"rms": 1e-4, "longest": w, "shortest": s} for w, s in ((0.1, 0.2), (0.1, 1e-9), (1e300, 1), (0.1, 0.1))),
+    *({"rms": 1e-4, "longest": 0.1, "hurst": h} for h in (0.1, 0, 1, 5)),
+    *({"amplitude": 1e-4, "wavelength": w} for w in ([0.1], [0.1, 0.1], [0], [1e-9, 1e9], [])),
+    *({"file": "none.npz"}, {"file": "/dev/zero"}, {}, {"amplitude": 1e-4}, {"rms": 1e-4, "amplitude": 1e-4}),
+)
+PROFILES: tuple[Any, ...] = (
+    *([[-30, 0.001], [30, 0]], [[-1e3, 0], [1e3, 0]], [[-1e3, 1], [0, 0], [1e3, 1]], [[0, 0]], [], [[0, 0], [0, 1]]),
+    *([[-1e300, 1e300], [1e300, 0]], [[-1, -1, 0], [1, -1, 0], [0, 1, 0.1]], [[30, 0], [-30, 0]]),
+    [[x, y, 1e-6 * x * y] for x in (-99, 0, 99) for y in (-99, 0, 99)],
+)
+
+
 @cache
 def base(name: str) -> dict[str, Any]:
     """Return the tables of one of the bases, with every key that has a default."""
     case, settings, text = BASES[name]
     tables = tomllib.loads(load_case(case, settings).to_toml())
     for key, table in tomllib.loads(text).items():
-        tables[key] = {**tables.get(key, {}), **table} if key in ("contact", "wear", "punch") else table
+        tables[key] = table if key in ("motion", "program") else laid_over(tables.get(key, {}), table)
     return tomllib.loads(make_case(tables).to_toml())

@@ -33,9 +33,10 @@ from bases import base
 from pool import Verdict, verdicts
 
 from fenwear import Case, assemble, load_case, make_case
+from fenwear.accuracy import uncertainty
 from fenwear.bodies.mesh import write_msh
 from fenwear.case import plausibility_warnings
-from fenwear.cycle import evolve
+from fenwear.cycle import evolve, steady
 from fenwear.errors import FenwearError, MeshQualityError
 
 SECONDS = 60.0  # of processor time
@@ -206,6 +207,27 @@ KEYS: tuple[Any, ...] = (
     lambda r: (("geometry", "parameters", "overlap"), r.choice((0, 0.05, 3, -3, 1e9, "3 s"))),
     lambda r: (("run", "integration"), r.choice(("explicit", "implicit", "jump"))),
     lambda r: (("punch", "pivot"), r.choice(([0, 0], [0], ["1 mm", "1 s"], [1e300, 0]))),
+    lambda r: (
+        ("grid",),
+        r.choice(({"nodes": 9}, {"across": 8}, {"across": 3}, {"nodes": 17, "size": ["0.1 mm"]}, {})),
+    ),
+    lambda r: ((r.choice(("punch", "strip")), "operator"), r.choice(("auto", "condensed", "half-space", "fine", "x"))),
+    lambda r: ((r.choice(("punch", "strip")), "creep"), r.choice(bases.CREEPS)),
+    lambda r: (("contact", "layer"), r.choice(bases.LAYERS)),
+    lambda r: (("contact", "layer", "stiffness"), dependence(r)),
+    lambda r: (("contact", "third_body"), r.choice(bases.DEBRIS)),
+    lambda r: (("contact", "third_body", "life"), dependence(r)),
+    lambda r: (("contact", "lubrication"), {"asperity_share": dependence(r), "fluid_friction": r.choice((0, 0.1, -1))}),
+    lambda r: (("contact", "hardness"), r.choice(("1 GPa", "1 Pa", 0, 1e300, dependence(r)))),
+    lambda r: (("contact", "law"), r.choice(("gross-sliding", "coulomb", "auto"))),
+    lambda r: (("wear", r.choice(("punch", "strip")), "coating"), r.choice(bases.COATINGS)),
+    lambda r: (("wear", r.choice(("punch", "strip")), "pressure_threshold"), r.choice((1, 1e300, -1, "5 MPa"))),
+    lambda r: ((r.choice(("punch", "strip")), "topography"), r.choice(bases.TOPOGRAPHIES)),
+    lambda r: ((r.choice(("punch", "strip")), "profile"), {"points": r.choice(bases.PROFILES)}),
+    lambda r: ((r.choice(("punch", "strip")), "no_turning_about"), r.choice((["y"], ["x", "z"], [], ["q"]))),
+    lambda r: (("heat", "track"), r.choice(({"heat_capacity": "1 J/K"}, {"heat_capacity": 0}, {"loss": 1}))),
+    lambda r: (("materials", "steel", r.choice(("young", "conductivity", "expansion"))), dependence(r)),
+    lambda r: (("run", "periodic_within"), r.choice((1e-3, 0, 1, -1, 1e300))),
 )
 
 
@@ -250,8 +272,12 @@ def quantity(text: str) -> tuple[float, str] | None:
         return None
 
 
-def compute(case: Case) -> None:
+def compute(case: Case, end: bool = False) -> None:
     """Assemble and compute two half-cycles, of cycle jumps two cycles; the meshes follow the wear.
+
+    Args:
+        case: The problem.
+        end: Whether it is asked for the uncertainty of its numbers and for its steady state, too.
 
     Raises:
         FenwearError: fenwear does not want to.
@@ -262,7 +288,8 @@ def compute(case: Case) -> None:
     for text in plausibility_warnings(case):
         if PYTHON.search(own_words(text)):
             raise NoResultError(f"a warning speaks Python: {text}")
-    for block in evolve(assemble(case), min(case.run.half_cycles, 2 if case.motion.kind != "cycle" else 32)):
+    system = assemble(case)
+    for block in evolve(system, min(case.run.half_cycles, 2 if case.motion.kind != "cycle" else 32)):
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")
@@ -272,11 +299,17 @@ def compute(case: Case) -> None:
             raise NoResultError("negative pressure or wear")
         if block.equilibrium_error.max() > 1e-6:
             raise NoResultError(f"not in equilibrium: {block.equilibrium_error.max():g}")
+    if end:
+        if not np.isfinite(list(uncertainty(block.system.case, block).total.values())).all():
+            raise NoResultError("an uncertainty is not finite")
+        state = steady(system)
+        if not np.isfinite(state.pressure).all() or np.min(state.pressure) < 0:
+            raise NoResultError("no pressure of a steady state")
 
 
 # Words of Python and its libraries: nobody who writes a case file has to know them.
 PYTHON = re.compile(
-    r"Traceback|functools|\blambda\b|<class|NoneType|\bNone\b|\b(?:True|False)\b|object at 0x|np\.\w+\("
+    r"Traceback|functools|<lambda>|\blambda \w*:|<class|NoneType|\bNone\b|\b(?:True|False)\b|object at 0x|np\.\w+\("
     r"|\barray\(|dtype|numpy|pydantic|validat(?:or|ion)|validate|instance of|\bdictionary\b|\b[tT]uple\b|\bstr\b"
     r"|\bfloat\b|\bdict\b"
     r"|function-|\w+Error\b|keyword|argument of type|__\w+__|discriminator|\btag\b"
@@ -284,8 +317,8 @@ PYTHON = re.compile(
 
 
 def own_words(text: str) -> str:
-    """Return a message without what it quotes of the case."""
-    return re.sub(r"'(?:[^'\\]|\\.)*'|\"[^\"]*\"|'.*", "''", text)
+    """Return a message without what it quotes of the case and of gmsh."""
+    return re.sub(r"gmsh on .*|'(?:[^'\\]|\\.)*'|\"[^\"]*\"|'.*", "''", text)
 
 
 def said(error: FenwearError) -> str:
@@ -332,12 +365,12 @@ def _try_case(seed: int) -> tuple[str, str]:
             if expected is None:
                 return "wrong", f"{path} accepted a unit of another kind: {at(tables, path)}"
             if path[-1] == "unit":
-                number = getattr(case.wear, path[1]).scale
+                number = scale_of(case, path)
             else:
                 number, _ = quantity(at(case.resolved(), path)) or (math.nan, "")
             if not math.isclose(number, expected, rel_tol=1e-12):
                 return "wrong", f"{path}: {at(tables, path)} became {number!r}, expected {expected}"
-        compute(case)
+        compute(case, end=unit is None and random_.random() < 0.25)
     except FenwearError as error:
         text = said(error)
         if unit is not None and unit[1] is not None and not isinstance(error, MeshQualityError):
@@ -346,6 +379,16 @@ def _try_case(seed: int) -> tuple[str, str]:
     except NoResultError as error:
         return "wrong", str(error)
     return "ok", ""
+
+
+def scale_of(case: Case, path: tuple[Any, ...]) -> float:
+    """Return by how much the values of the law are taken whose unit stands at a path."""
+    if path[0] == "wear":  # in a unit that its exponents make
+        return float(getattr(case.wear, path[1]).scale)
+    law: Any = case
+    for step in path[:-1]:
+        law = law[step] if isinstance(law, dict) else getattr(law, step)
+    return float(law.scale(next(kind for kind in UNITS if law.unit in UNITS[kind])))
 
 
 def _made(tables: dict[str, Any], random_: random.Random) -> Case:

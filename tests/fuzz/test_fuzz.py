@@ -203,13 +203,17 @@ def test_friction_has_no_unit() -> None:
             make_case(changed(contact={"friction": law}))
 
 
-# What it did before: an error of numpy, of SciPy or of MUMPS without a word of ours.
+# What it did before: an error of numpy, of SciPy or of MUMPS without a word of ours, or a result that is none.
 BEYOND = {
     "fast": ("hardness", ("motion", "amplitude"), "1e300 mm", "its speed to the power of 1 is beyond all numbers"),
     "dense": ("followed", ("materials", "composite", "density"), 1e300, "has no factor"),
     "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "equal to 1000000000000"),
     "hot": ("example2-heat", ("heat", "initial"), 1e300, "are beyond all numbers"),
     "far pivot": ("bushing", ("punch", "pivot"), ["1e300 mm", 0], "the gap between the bodies is beyond all numbers"),
+    "strained": ("stick carried", ("stick", "bulk_stress"), 1e25, "the strip would be strained by"),
+    "above all pressures": ("cap", ("wear", "punch", "pressure_threshold"), 2**63, "so that nothing wears"),
+    "next to no elements": ("solid", ("geometry", "parameters", "core"), 1e-9, "that they carry nothing"),
+    "coarse bore": ("misaligned", ("geometry", "parameters", "beyond_elements"), 2, "too long for the curve"),
     "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.0000001"),
 }
 
@@ -221,7 +225,14 @@ def test_numbers_beyond_what_can_be_computed(name: str) -> None:
     tables = copy.deepcopy(cases.base(base))
     cases.at(tables, path[:-1])[path[-1]] = value
     with pytest.raises(FenwearError, match=expected):
-        cases.compute(make_case(tables))
+        cases.compute(make_case(tables), end=True)
+
+
+def test_a_default_in_another_unit() -> None:
+    """A pressure that only wear per area has was refused as 1e5 N/m^2, and went as 0.1 MPa, its default."""
+    tables = copy.deepcopy(cases.base("example1"))
+    tables["wear"]["punch"]["touching_from"] = "100000 N/m^2"
+    assert make_case(tables).wear.punch.touching_from == pytest.approx(0.1)
 
 
 def test_a_stroke_faster_than_numbers_are_large() -> None:

@@ -29,7 +29,8 @@ from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
 
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
-ORDER, OF_PRESSURE = 1.5, 1.0  # of what is integrated, and of pressures and what lies at an edge
+AT_EDGE, INSIDE, OF_VOLUME = 1.0, 1.5, 2.0  # orders in the distance of nodes, see `order_of`
+NOTICED = 0.1  # of the wear from which on meshes follow: before, what it would do is not asked for
 ROUNDING = 1e-12
 NOTHING_BELOW = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
 
@@ -119,8 +120,17 @@ def of_mesh(values: Values, coarse: Values, ratio: float) -> Contribution:
 
 
 def order_of(quantity: Quantity, value: Value) -> float:
-    """Return the order at which a number is taken to approach its limit."""
-    return OF_PRESSURE if quantity.name == "pressure" or value.at_edge else ORDER
+    """Return the order at which a number is taken to approach its limit, in the distance of nodes.
+
+    At the end of a contact displacements go as r^(3/2) and pressures as r^(1/2). In the mean square over the contact
+    pressures are off by order 1, nearly all of it beside its ends; what is inside feels the ends by weak norms, by
+    order 3/2. A volume is an energy (the work of friction, times a wear coefficient) and has twice the order of
+    displacements in the energy norm: 2 of elements of degree 1, with which those of degree 2 are compared, and at
+    closed sharp corners, r^(1/2) at worst, whose order in the degree is twice that in the size of elements; else more.
+    """
+    if quantity.name == "volume":
+        return OF_VOLUME
+    return AT_EDGE if value.at_edge else INSIDE
 
 
 def _steps(
@@ -150,8 +160,12 @@ def _steps(
         other, factor = again.otherwise(motion={"positions": fewer}).values(), fewer / (positions - fewer)
         # By the fields, too: combs of unlike teeth may be as deep.
         yield "positions", {quantity: factor * value.apart(other[quantity]) for quantity, value in before.items()}
-    if last.system.bodies.followed is not None and follow is not None:
+    if follow is None:
+        return
+    if last.system.bodies.followed is not None:
         yield "following", _apart(before, again.otherwise(geometry={"follow_wear": 2 * follow}).values(), 1.0)
+    elif (worn := last.system.wear_on_meshes(last.end.worn)) > NOTICED:  # not yet: with meshes that do half-way
+        yield "following", _apart(before, again.otherwise(geometry={"follow_wear": follow * worn / 2}).values(), 2.0)
 
 
 def _apart(one: Values, other: Values, factor: float) -> Contribution:

@@ -402,15 +402,17 @@ class ContactSetup:
 
     def mesh_update_due(self, worn: WornDepths) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""
+        return self.wear_on_meshes(worn) > 1
+
+    def wear_on_meshes(self, worn: WornDepths) -> float:
+        """Return the largest wear since the meshes were moved over that from which on they follow; 0 where none do."""
         limit = None if self.made_from is None else self.made_from.geometry.follow_wear
         if limit is None or self.pair.punch.grid is not None:  # nothing of a grid's wear is the mesh's
-            return False
-        followed = self.bodies.followed
+            return 0.0
+        followed, heights = self.bodies.followed, self.element_heights
         rest = worn if followed is None else worn - followed
-        heights = self.element_heights
-        return bool(
-            (np.abs(rest.punch) > limit * heights.punch).any() or (np.abs(rest.strip) > limit * heights.strip).any()
-        )
+        pairs = ((rest.punch, heights.punch), (rest.strip, heights.strip))
+        return max(float((np.abs(own) / (limit * height)).max(initial=0.0)) for own, height in pairs)
 
     @cached_property
     def element_heights(self) -> WornDepths:

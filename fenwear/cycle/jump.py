@@ -10,12 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
+from math import ceil
 
 from fenwear.assembly import Tribosystem
-from fenwear.cycle.block import Block
+from fenwear.cycle.block import Block, HalfCycle
 from fenwear.cycle.driver import BLOCK, Jumps, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, InputError
+
+LATE = 1.5  # times the wear from which on meshes follow, at most at the end of a jump of several cycles
 
 
 def jump(
@@ -66,4 +70,17 @@ def jump(
         state = replace(state, finer=state)
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
     course = RunLimits(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)
-    yield from run_steps(step.system, step, state, course)
+    system.wear_on_meshes(state.worn)  # before rank 0 leads: the elements' heights take all ranks
+    yield from run_steps(step.system, partial(_on_meshes, system, step), state, course)
+
+
+def _on_meshes(system: Tribosystem, step: Jumps, state: RunState, until: int) -> tuple[RunState, list[HalfCycle]]:
+    """Return what a jump does; one that wears far more than meshes are to follow ends about where they are to."""
+    after, recorded = step(state, until)
+    before, worn = (system.team.lead(partial(system.wear_on_meshes, one.worn)) for one in (state, after))
+    strokes = system.motion.half_cycles
+    cycles = (after.half_cycle - state.half_cycle) // strokes
+    if worn <= LATE or before > 1 or cycles == 1:  # beyond it already: nobody has them follow
+        return after, recorded
+    fewer = ceil(cycles * max((1 + LATE) / 2 - before, 0.0) / (worn - before))
+    return step(state, state.half_cycle + strokes * max(fewer, 1)) if fewer < cycles else (after, recorded)

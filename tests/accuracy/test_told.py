@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -140,6 +141,9 @@ def test_equal_largest_values_of_other_fields_are_apart() -> None:
     assert fine.apart(coarse) == 0.0  # they differ only where there is nothing
     assert fine.apart(other) == pytest.approx(0.1)
     assert of_mesh({DEPTH: fine}, {DEPTH: other}, 2)[DEPTH] == pytest.approx(1.25 * 0.1 / (2**1.5 - 1))
+    at_edge = replace(fine, at_edge=True)
+    assert of_mesh({DEPTH: at_edge}, {DEPTH: other}, 2)[DEPTH] == pytest.approx(1.25 * 0.1)
+    assert of_mesh({VOLUME: Value(1.0)}, {VOLUME: Value(0.7)}, 2)[VOLUME] == pytest.approx(1.25 * 0.3 / (2**2 - 1))
 
 
 def test_steady_state_within_what_is_told(assembled: Assembled) -> None:

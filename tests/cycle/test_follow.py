@@ -9,10 +9,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, jump, make_case, march
+from fenwear import Tribosystem, assemble, evolve, jump, make_case, march
 from fenwear.case.templates import fill_in, find_template
 from fenwear.cycle import Block, follow
 from fenwear.cycle.follow import _in_place
+from fenwear.cycle.jump import LATE
 from fenwear.cycle.state import RunState
 from fenwear.sliding.wear import WornDepths
 
@@ -38,6 +39,19 @@ def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem
     np.testing.assert_allclose(other.wear_strip[-1], one.wear_strip[-1], atol=2e-3 * one.wear_strip[-1].max())
     np.testing.assert_allclose(other.wear[-1], one.wear[-1], atol=2e-3 * one.wear[-1].max())
     np.testing.assert_allclose(other.pressure[-1], one.pressure[-1], atol=0.01 * one.pressure[-1].max())
+
+
+@pytest.mark.mpi
+def test_jumps_end_where_meshes_follow(assembled: Callable[..., Tribosystem]) -> None:
+    """Friction's lever falls as a punch wears: one jump had passed ten meshes, pressures 1 % off."""
+    settings = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2", "geometry.follow_wear=0.05")
+    system = assembled("monotonic-lz40", *settings)
+    ends = [list(evolve(system, 300, integration=how)) for how in ("jump", "implicit")]
+    for block in ends[0]:
+        assert block.system.wear_on_meshes(block.end.worn) <= LATE
+    jumped, marched = ends[0][-1], ends[1][-1]
+    np.testing.assert_allclose(jumped.pressure[-1], marched.pressure[-1], atol=1e-3 * marched.pressure[-1].max())
+    assert len(ends[0]) > 10
 
 
 def test_meshes_of_solids_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:

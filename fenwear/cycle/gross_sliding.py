@@ -54,10 +54,6 @@ from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
-MANY, TREND = (
-    32,
-    1.2,
-)  # nodes that come into contact in a jump, from which on its estimate says how the next will change
 
 
 class HalfCycles:
@@ -127,7 +123,6 @@ class Jumps:
         stepper, tolerance = self.stepper, self.tolerance
         strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
         length, left = state.jump_length, (until - state.half_cycle) // strokes
-        allowed = state.jump_allowed
         while True:
             tried = min(length, left)
             try:
@@ -149,16 +144,11 @@ class Jumps:
             # A half is half made already.
             length = max(1, int(tried * min(0.5, max(LEAST, factor))))
         if tried == length or factor < 1:  # a step cut short by an end says little of the next length
-            before, allowed = allowed, tried * min(MOST, factor)
-            if before > 0 and estimate.comes >= MANY:
-                # It changes on as it has (K. Gustafsson, ACM Trans. Math. Softw. 20, 1994); nodes that come one by one
-                # have it go up and down.
-                factor *= min(TREND, max(1 / TREND, allowed / before))
             length = max(1, int(tried * min(MOST, max(LEAST, factor))))
             if factor > 1 and tried < 4:
                 length = max(length, tried + 1)
         number = state.half_cycle + tried * strokes
-        after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length, allowed)
+        after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
         if state.finer is not None:
             after = replace(after, finer=stepper.finer(state, state.finer, after, tried))
         return after, recorded

@@ -27,14 +27,12 @@ class Estimate:
         temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
         state: Of the states that laws remember, and of the thickness of debris, over the largest they are in the jump,
             both integrated.
-        comes: Nodes that come into contact in the jump, in a phase in the mean.
     """
 
     depth: float
     pressure: float
     temperature: float
     state: float = 0.0
-    comes: float = 0.0
 
     @property
     def largest(self) -> float:

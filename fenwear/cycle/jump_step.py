@@ -201,7 +201,7 @@ class Stepper:
             recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
             if whole is None:
                 whole = self.step(state, cycles, near=trend.copy())
-            estimate, bent = replace(estimated(self.system, state, whole, halves), comes=_count(state, halves)), None
+            estimate, bent = estimated(self.system, state, whole, halves), None
             if comes:
                 first, second = half.worn - state.worn, whole.worn - half.worn
                 # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
@@ -557,11 +557,3 @@ def _comes(before: RunState, half: RunState, end: RunState) -> bool:
             before.contacts, map(present, half.contacts), map(present, end.contacts), strict=True
         )
     )
-
-
-def _count(before: RunState, end: RunState) -> float:
-    """Return how many nodes come into contact in a jump, in a phase in the mean."""
-    pairs = [
-        (early, present(late)) for early, late in zip(before.contacts, end.contacts, strict=True) if early is not None
-    ]
-    return float(np.mean([((late.pressure > 0) & (early.pressure == 0)).sum() for early, late in pairs] or [0.0]))

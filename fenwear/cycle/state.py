@@ -27,7 +27,6 @@ class RunState:
         temperature: Of both bodies; None without heat.
         totals: What all half-cycles so far add up to.
         jump_length: Cycles that the next jump tries.
-        jump_allowed: Those that would have been safe by the error of the last one; 0 before one.
         periodic_phases: Half-cycles in a row that repeated.
         memory: What the law of contact must remember besides; a data class of arrays, numbers and such classes.
         finer: Where jumps of next to no length would have led, to the next order, see `fenwear.cycle.jump`; None where
@@ -40,7 +39,6 @@ class RunState:
     temperature: HeatState | None
     totals: Totals
     jump_length: int = 1
-    jump_allowed: float = 0.0
     periodic_phases: int = 0
     memory: Any = None
     finer: RunState | None = None

@@ -41,7 +41,7 @@ from fenwear.sliding.wear import WornDepths
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS, EXTREMES = "case.toml", "state.npz", "extremes.json"
 NUMBERS, WEAR, STATES = (
-    ("half_cycle", "jump_length", "jump_allowed", "periodic_phases"),
+    ("half_cycle", "jump_length", "periodic_phases"),
     ("wear", "wear_strip"),
     ("pressure", "gap", "rigid"),
 )
@@ -331,8 +331,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
     totals = Totals(*(arrays[name] for name in TOTALS))
     memory = _memory(folder, system, arrays)
-    done, allowed = int(arrays["half_cycle"]), float(arrays["jump_allowed"])
-    return RunState(done, worn, contacts, temperature, totals, length, allowed, periodic, memory)
+    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)
 
 
 def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:

@@ -14,7 +14,6 @@ from fenwear.assembly import Tribosystem
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.gridded import GriddedPhases
 from fenwear.contact.krylov import flexible
-from fenwear.cycle import jump
 from fenwear.cycle.block import Block
 from fenwear.interface import compliance
 from fenwear.interface.convolution import Box, OnBox
@@ -163,23 +162,6 @@ def test_boxes_of_nodes_in_any_order() -> None:
     np.testing.assert_array_equal(cut, looked_for)
     cut *= 2.0
     assert (values[:, touched] == boxes[0].values(looked_for)[:, np.isin(boxes[0].nodes, touched)]).all()
-
-
-def test_jumps_where_many_nodes_come() -> None:
-    """Each is about as long as its error lets it be, none is made twice, and depths are within the tolerance."""
-    wear = {"punch": {"coefficient": "1e-7 1/MPa"}, "strip": {"coefficient": "2e-7 1/MPa"}}
-    system, tolerance = assemble(ball(FORCE, grid={"nodes": 48, "size": [2.0, 1.8]}, wear=wear)), 3e-3
-    ends = [block.end for block in jump(system, 400, tolerance=tolerance, block=1)]
-    done = np.array([0, *(end.half_cycle for end in ends)])
-    shares = np.diff(done) / system.motion.half_cycles / [end.jump_allowed for end in ends]
-    in_between = shares[4:-1]  # nor the first ones, which are short, nor the last
-    assert len(in_between) >= 5
-    assert in_between.min() > 0.9
-    assert in_between.max() < 1.05
-    (*_, last) = jump(system, 400, tolerance=tolerance / 6)
-    for body in ("punch", "strip"):
-        ours, near = getattr(ends[-1].worn, body), getattr(last.end.worn, body)
-        assert np.abs(ours - near).sum() < 0.2 * tolerance * near.sum()
 
 
 @pytest.mark.parametrize("restart", [3, 40])

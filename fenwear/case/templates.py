@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from fenwear.case.reading import make_case
+from fenwear.case.reading import builtin_cases, make_case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 
@@ -72,6 +72,9 @@ def find_template(name: str) -> Template:
         CaseError: there is none; names the nearest.
     """
     names = template_names()
+    if name in builtin_cases() and name not in names:
+        start = f"{name!r} is a built-in case: a file with base = {name!r} and what is other than there starts from it"
+        raise CaseError(InputError("new", f"{start}. There are templates of {', '.join(names)}"))
     if name not in names:
         close = difflib.get_close_matches(name, names, 1, 0.5) or [n for n in names if name and name in n][:1]
         hint = f"did you mean {close[0]!r}? " if close else ""

@@ -84,9 +84,11 @@ def test_usual_dimensions_make_the_built_in_case(name: str, case: str) -> None:
 
 
 def test_what_is_wrong(tmp_path: Path) -> None:
-    """Names the nearest template and dimension, what was expected of a value, and a file that is there."""
+    """Names the nearest template and dimension, or a built-in case, what was expected of a value, and a file there."""
     with pytest.raises(CaseError, match="did you mean 'block-on-ring'"):
         find_template("blok-on-ring")
+    with pytest.raises(CaseError, match="'drum-brake' is a built-in case: a file with base = 'drum-brake'"):
+        find_template("drum-brake")
     with pytest.raises(CaseError, match=r"There are ball-on-disc, .*pin-on-disc"):
         find_template("")
     template = find_template("fretting")

@@ -12,14 +12,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
+import basix.ufl
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fenwear.arrays import Array
 from fenwear.assembly.strokes import Sliding, make_sliding
-from fenwear.bodies.contact_surface import ContactSurface, profile_at
+from fenwear.bodies.contact_surface import ContactSurface, contact_surface, profile_at
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
@@ -142,12 +144,15 @@ def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> Non
 def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurface, csr_array]:
     """Return the contact surface of a body on a grid, and what takes values at the trace nodes of its mesh to it.
 
+    Collective.
+
     Raises:
         CaseError: the grid reaches beyond the surface.
     """
-    meshed, (axis, outward) = body.meshed, facet_side(body.meshed)
-    reading = _reading(body, grid)
-    depth = sag = outward * (grid.level - reading @ meshed.trace[:, axis])
+    meshed, (axis, outward) = _curved(body), facet_side(body.meshed)
+    reading = _reading(body, body.meshed, grid)
+    shape = reading if meshed is body.meshed else _reading(body, meshed, grid)
+    depth = sag = outward * (grid.level - shape @ meshed.trace[:, axis])
     description, heights = case.bodies[body.body.name], None
     if description.profile is not None:
         depth = depth + profile_at(body.body.name, np.array(description.profile.points), grid.flat)
@@ -221,23 +226,32 @@ def _mortar(body: ElasticBody, grid: RegularGrid) -> csr_array:
     every = np.arange(len(grid.flat))
     cell = "interval" if grid.flat.shape[1] == 1 else "quadrilateral"
     first = ChartedSurface(grid.flat, grid.facets, cell, 1, every)
-    return dual_transfer([Patch.of(first, _charted(body, grid))])
+    return dual_transfer([Patch.of(first, _charted(body.meshed, grid))])
 
 
-def _charted(body: ElasticBody, grid: RegularGrid) -> ChartedSurface:
-    """Return the contact surface of a body's mesh in the plane of a grid."""
-    surface = body.meshed
+def _curved(body: ElasticBody) -> ContactSurface:
+    """Return the surface of a body's mesh with all nodes that its shape has, though its displacement has fewer."""
+    mesh = body.body.mesh
+    degree = mesh.geometry.cmap.degree
+    if body.meshed.degree >= degree:
+        return body.meshed
+    element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(mesh.geometry.dim,))
+    return contact_surface(body.body, fem.functionspace(mesh, element))[0]
+
+
+def _charted(surface: ContactSurface, grid: RegularGrid) -> ChartedSurface:
+    """Return the contact surface of a mesh in the plane of a grid."""
     s = np.delete(surface.trace, grid.normal, axis=1)
     return ChartedSurface(s, surface.facets, surface.cell, surface.degree, surface.nodes)
 
 
-def _reading(body: ElasticBody, grid: RegularGrid) -> csr_array:
-    """Return what takes values at the trace nodes of a body's mesh to its grid (n, N).
+def _reading(body: ElasticBody, surface: ContactSurface, grid: RegularGrid) -> csr_array:
+    """Return what takes values at the trace nodes of a surface of a body's mesh to its grid (n, N).
 
     Raises:
         CaseError: the grid reaches beyond the surface.
     """
-    charted = _charted(body, grid)
+    charted = _charted(surface, grid)
     first, last, spacing = np.array(grid.corner), np.array(grid.corner) + grid.sides, np.array(grid.spacing)
     low, high = charted.s.min(axis=0), charted.s.max(axis=0)
     far = (first < low - spacing).any() or (last > high + spacing).any()  # where its nodes might not fit the memory

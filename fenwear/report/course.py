@@ -200,9 +200,12 @@ def bores_of(history: xarray.Dataset) -> dict[str, str]:
 def friction_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw normal and friction force and the work of friction."""
     figure, axes = panels(2, 2.4, look=look)
-    x = look.course(history)
+    x, strokes = look.course(history), round(float(history.half_cycle[-1] / history.cycles[-1]))
     for number, (name, text) in enumerate((("normal_force", "normal"), ("friction_force", "friction"))):
-        axes[0].plot(x, history[name], label=text, **run_style(number), **mark_few(x))
+        for stroke in range(strokes):  # a line for each half-cycle of the cycle: their loads may be others
+            of = (history.half_cycle.values - 1) % strokes == stroke
+            label = text if stroke == 0 else None
+            axes[0].plot(x[of], history[name].values[of], label=label, **run_style(number), **mark_few(x[of]))
     axes[0].set_ylabel("force (N)")
     axes[1].plot(x, 1e-3 * history.friction_work, color="0", **mark_few(x))
     axes[1].set_ylabel("work of friction (J)")

@@ -113,7 +113,7 @@ def worn_range(history: xarray.Dataset) -> tuple[float, float]:
 
 def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw what is worn off the bodies at the chosen half-cycles; the strip's depth downwards."""
-    surfaces = surfaces_of(history)
+    surfaces = _that_wear(history)
     figure, axes = panels(len(surfaces), 3.0, look=look)
     for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
         for colour, n in shades(half_cycles):
@@ -131,7 +131,7 @@ def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Styl
 
 def wear_map_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the worn depth over place and run, a panel for each body that wears."""
-    surfaces = surfaces_of(history)
+    surfaces = _that_wear(history)
     figure, axes = panels(len(surfaces), 3.0, look=look)
     course = look.course(history)
     for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
@@ -145,6 +145,12 @@ def wear_map_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     axes[-1].set_xlim(left, right)
     contact_axis(axes[-1])
     return figure
+
+
+def _that_wear(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
+    """Return the surfaces that something is worn off; all where nothing is."""
+    surfaces = surfaces_of(history)
+    return {body: one for body, one in surfaces.items() if float(one[1].max()) > 0} or surfaces
 
 
 def _told_apart(course: Array) -> NDArray[np.int64]:

@@ -20,6 +20,7 @@ from fenwear.assembly import Tribosystem, grows, kept_volume, node_maps, on_node
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case
+from fenwear.case.program import stages_of
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import CROSSING, TERMS
@@ -148,8 +149,20 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
-    told = system.names.meant
-    return {name: one._replace(attributes=told(one.attributes)) for name, one in _columns(system).items()}
+    told, found = system.names.meant, {**_columns(system), **_of_program(system.made_from or system.case)}
+    return {name: one._replace(attributes=told(one.attributes)) for name, one in found.items()}
+
+
+def _of_program(case: Case) -> dict[str, Column]:
+    """Return when the stages of a program begin and end, and what its loads are then; nothing without a program."""
+    stages, over = stages_of(case), ("stage", "end")
+    if not stages:
+        return {}
+    ends = np.array([(stage.begin, stage.end) for stage in stages])
+    loads = np.array([stage.load or stage.load_factor for stage in stages])
+    about = {"stage_ends": (ends, "half-cycles before each stage of the program, and at its end"),
+             "stage_loads": (loads, "loads at both ends of a stage, in N or over those of the case")}  # fmt: skip
+    return {name: Column(over, values, {"units": "1", "long_name": text}) for name, (values, text) in about.items()}
 
 
 def _columns(system: Tribosystem) -> dict[str, Column]:

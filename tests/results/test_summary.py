@@ -79,3 +79,17 @@ def test_of_a_stop(tmp_path: Path, integration: str) -> None:
         assert "largest temperature over the run" in shown
         assert "largest temperature at the end" in shown
         assert f"{peak:,.5g}" in shown
+
+
+@pytest.mark.parametrize("integration", ["jump", "implicit"])
+def test_loads_are_drawn_as_they_leap_and_rise(tmp_path: Path, integration: str) -> None:
+    """Not as straight lines from one recorded half-cycle to another; a run that stops within a ramp ends there."""
+    steps = "[{cycles=10}, {cycles=10, load_factor=2}, {cycles=20, load=['5 kN', '15 kN']}]"
+    settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8", f"program.steps={steps}",
+                f"run={{integration='{integration}', half_cycles=60}}", "output.report=false",
+                "output.uncertainty=false", "output.fields_at=[]"]  # fmt: skip
+    run_case(load_case("example1", settings), "leaps", tmp_path / "out", lambda _: None, progress="none")
+    (ax,) = program_figure(load_history(tmp_path / "out")).axes
+    expected = [[0, 10], [10, 10], [10, 20], [20, 20], [20, 5], [30, 10]]  # cycles, kN
+    half = 0.25 if integration == "implicit" else 0  # kN in half a half-cycle, whose middle counts
+    np.testing.assert_allclose(ax.lines[0].get_xydata() / [1, 1e3], expected, atol=half)

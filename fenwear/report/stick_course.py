@@ -13,7 +13,6 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
 from fenwear.report.style import Style, by_powers, contact_axis
 from fenwear.report.surface import along_contact, model_of, surface_of
-from fenwear.results.cycles import cycle_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,22 +23,18 @@ MANY = 20  # cycles from which on a logarithmic axis shows more
 
 
 def course(history: xarray.Dataset, look: Style) -> Array:
-    """Return where each recorded cycle begins on the axis that was chosen (k,).
+    """Return where each recorded cycle ends on the axis that was chosen (k,).
 
     Raises:
         CaseError: the run has no such axis.
     """
-    cycles = history.cycle.values.astype(float)
     if look.axis == "time":
-        if "period" not in history.attrs:
-            raise CaseError(InputError("--axis", "this run does not tell its period; expected cycles"))
-        return cycles * float(history.attrs["period"])
+        return np.asarray(history.time.values, dtype=np.float64)
     if look.axis == "distance":
         if history.displacement.attrs.get("units") != "mm":
             raise CaseError(InputError("--axis", "the strip turns; expected cycles or time"))
-        there = cycle_at(history, -1).displacement.values
-        return cycles * 1e-3 * float(np.abs(there - np.roll(there, 1)).sum())
-    return cycles
+        return np.asarray(1e-3 * history.sliding_distance.values, dtype=np.float64)
+    return np.asarray(history.cycle.values, dtype=np.float64)
 
 
 def course_axis(ax: Axes, history: xarray.Dataset, look: Style) -> Array:

@@ -15,7 +15,16 @@ STEPS = {"displacement": "displacement", "tangential_force": "tangential_force",
          "traction": "traction", "traction_across": "traction_across", "slip": "slip", "slip_across": "slip_across",
          "stick": "stick", "surface_stress": "surface_stress", "temperature_punch": "step_temperature_punch",
          "temperature_strip": "step_temperature_strip"}  # fmt: skip
-AT_END = ("wear", "wear_strip", "stick_width", "stick_area", "stick_width_within", "stick_area_within")
+AT_END = (
+    "time",
+    "sliding_distance",
+    "wear",
+    "wear_strip",
+    "stick_width",
+    "stick_area",
+    "stick_width_within",
+    "stick_area_within",
+)
 SUMMED = ("worn_area_increment", "worn_area_increment_strip", "worn_volume_increment", "worn_volume_increment_strip")
 LARGEST = ("complementarity_error", "energy_balance_error", "jump_error", "heat_balance_error")
 

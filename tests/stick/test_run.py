@@ -19,6 +19,8 @@ from fenwear.cycle.totals import Totals
 from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
+from fenwear.report.stick_course import course
+from fenwear.report.style import Style
 from fenwear.results.cycles import by_cycles, cycle_at
 from fenwear.results.export import export
 from fenwear.results.reading import load_history
@@ -247,6 +249,9 @@ def test_steps_of_a_program_with_more_time_steps_than_the_first(tmp_path: Path) 
     np.testing.assert_allclose(work, history.dissipated_energy, rtol=1e-9)
     np.testing.assert_allclose(cycle_at(history, 0).displacement, [3e-3, -3e-3], rtol=1e-9)
     np.testing.assert_allclose(cycle_at(history, -1).displacement, [0, 2e-3, 0, -2e-3], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(course(history, Style(axis="time")), [2, 4, 6, 8, 12, 16, 20, 24, 28], rtol=1e-12)
+    slid = histories["whole"].sliding_distance  # of each cycle, which a table counts as a half-cycle
+    np.testing.assert_allclose(course(history, Style(axis="distance")), slid / 1e3, rtol=1e-12)
     export(tmp_path / "whole", tmp_path / "tables", at="4,last")
     assert len((tmp_path / "tables" / "loops.csv").read_text("utf-8").splitlines()) == 1 + 2 + 4
     assert "loops.png" in {path.name for path in write_report(tmp_path / "whole")}

@@ -288,7 +288,7 @@ def compute(case: Case, end: bool = False) -> None:
     for text in plausibility_warnings(case):
         if PYTHON.search(own_words(text)):
             raise NoResultError(f"a warning speaks Python: {text}")
-    system = assemble(case)
+    system, block = assemble(case), None
     for block in evolve(system, min(case.run.half_cycles, 2 if case.motion.kind != "cycle" else 32)):
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
@@ -299,7 +299,7 @@ def compute(case: Case, end: bool = False) -> None:
             raise NoResultError("negative pressure or wear")
         if block.equilibrium_error.max() > 1e-6:
             raise NoResultError(f"not in equilibrium: {block.equilibrium_error.max():g}")
-    if end:
+    if end and block is not None:  # of a jump there is none before a whole cycle
         if not np.isfinite(list(uncertainty(block.system.case, block).total.values())).all():
             raise NoResultError("an uncertainty is not finite")
         state = steady(system)

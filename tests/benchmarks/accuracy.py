@@ -1,4 +1,4 @@
-"""How good the told uncertainty is: small cases, each again on fine meshes in small steps; others that no choice saw.
+"""How good the told uncertainty is: small cases, each again on fine meshes in small steps; the others chose no order.
 
     docker/fenwear python3 tests/benchmarks/accuracy.py [NAME...]
 

@@ -273,7 +273,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "case/units.py": ("a string with a unit",),
     "contact/complementarity.py": ("breaks its own conditions",),
     "bodies/shape.py": ("has used up the elements",),
-    "cycle/coupled.py": ("did not come together",),
+    "cycle/coupled.py": ("did not come together", "what each step of the heat in a cycle does"),
     "cycle/stability.py": ("beyond all numbers", "did not come together"),
     "cycle/steady_inequality.py": ("the steady state with heat of {} contact nodes",),
     "cycle/uniqueness.py": ("is heated presses more",),

@@ -91,7 +91,9 @@ def check_command(
     """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
     from fenwear.assembly import elastic, law_named, place_case, resources_of, resources_text, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
+    from fenwear.heat.periodic import cycle_memory
     from fenwear.law_choice import choose_law, with_law
+    from fenwear.memory import memory_size
     from fenwear.plausibility import fineness_text, fineness_warnings, initial_warnings
     from fenwear.run import position_warnings
 
@@ -132,6 +134,8 @@ def check_command(
         print_case(loaded)
     if warm.exchange is not None:
         log(fineness_text(warm))
+        if loaded.run.integration == "jump":
+            log(f"heat: jumps keep what its steps in a cycle do, about {memory_size(cycle_memory(warm.exchange))}")
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip

@@ -14,10 +14,12 @@ from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
-from fenwear.errors import ConvergenceError
-from fenwear.heat.periodic import CycleHeat, CycleJump
+from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory
 from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
+from fenwear.memory import GIB, free_memory, memory_size
+from fenwear.parallel import agreed
 from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
@@ -42,6 +44,26 @@ def cycle_heat(system: Tribosystem) -> CycleHeat | None:
     """Return the heat of whole cycles; None without heat."""
     exchange = with_reduced_heat(system).exchange
     return None if exchange is None else CycleHeat(exchange)
+
+
+def check_cycle_memory(system: Tribosystem) -> None:
+    """Make sure that the maps of the heat's steps in a cycle fit into the memory; collective.
+
+    Raises:
+        CaseError: they do not.
+    """
+    exchange = with_reduced_heat(system).exchange
+    free = agreed(system.comm, free_memory())
+    if exchange is None or free is None or (taken := cycle_memory(exchange)) <= max(free, GIB):
+        return
+    raise CaseError(
+        InputError(
+            "heat",
+            f"jumps and steady states keep what each step of the heat in a cycle does to all of it: "
+            f"{memory_size(taken)}, but {memory_size(free)} are free; expected fewer motion.positions or heat.steps, "
+            'larger elements at the contact, or run.integration = "implicit"',
+        )
+    )
 
 
 @dataclass(frozen=True)

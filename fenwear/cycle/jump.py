@@ -50,7 +50,7 @@ def jump(
         finer: Whether to follow where jumps of next to no length would lead; from a start that has it, it is followed.
 
     Raises:
-        CaseError: `start` lies within a cycle.
+        CaseError: `start` lies within a cycle, or the maps of the heat do not fit into the memory.
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
         InterruptedRunError: as `watch`.
     """

@@ -41,7 +41,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
-from fenwear.cycle.coupled import Coupled, DepthEvolution
+from fenwear.cycle.coupled import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import ORDER, Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
@@ -150,6 +150,7 @@ class Stepper:
         self, system: Tribosystem, tolerance: float, watch: Watch = unwatched, loading: Loading = as_given
     ) -> None:
         self.system = system = with_reduced_heat(system)
+        check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         if isinstance(self.contact, CondensedContact):

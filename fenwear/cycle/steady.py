@@ -38,7 +38,7 @@ from fenwear.case.names import told_by_name
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.block import Block
-from fenwear.cycle.coupled import Coupled, Solved
+from fenwear.cycle.coupled import Coupled, Solved, check_cycle_memory
 from fenwear.cycle.jump import jump
 from fenwear.cycle.own_properties import with_own_properties
 from fenwear.cycle.program import at_step
@@ -187,6 +187,7 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
     prepared = with_reduced_heat(system)
     _check_sinks(prepared)
     check_memory(system)
+    check_cycle_memory(prepared)
 
     def found() -> SteadyState:
         problem = SteadyInequality(prepared)

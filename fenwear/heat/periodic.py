@@ -22,6 +22,14 @@ from fenwear.heat.step_map import StepMap
 KEPT, MEMORY = 8, 10**9  # cycles of different conducting nodes that are kept, and bytes that they may take
 
 
+def cycle_memory(exchange: HeatExchange) -> float:
+    """Return the bytes that the maps of a cycle's steps take, and what they are made of, for one set of nodes."""
+    dim, n, phases = sum(len(basis) for basis in exchange.bases), len(exchange.weights), len(exchange.plans)
+    kinds = [{(plan.punch, plan.strip) for plan in plans} for plans in exchange.plans]
+    maps, prepared = sum(map(len, kinds)), len(set[tuple[int, int]]().union(*kinds))
+    return 8.0 * dim * (maps * (dim + n) + prepared * (dim + 2 * n) + (2 * phases + 1) * dim)
+
+
 class PhaseMap:
     """One phase: s' = propagator s + source + response p.
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, jump, march, steady
+from fenwear.assembly import with_reduced_heat
 from fenwear.cycle import cycles_to_reach
+from fenwear.heat.periodic import CycleHeat, cycle_memory
 
 A, MEAN = 30.0, 1e4 / 600
 COEFFICIENT = 1.25e-8 * np.pi
@@ -232,6 +234,25 @@ def test_heat_of_too_many_nodes_is_refused(
     with pytest.raises(CaseError, match=r"geometry.*with heat of \d+ contact nodes in 2 phases takes .* are free"):
         steady(assembled("example1-heat", "geometry.degree=2"))
     steady(assembled("example1", "geometry.degree=2"))
+
+
+def test_maps_of_heat_that_do_not_fit_are_refused(
+    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before they are made; told are the bytes of the maps and of what they are made of, about as much."""
+    system = with_reduced_heat(assembled("example1-heat", "geometry.degree=2"))
+    assert system.exchange is not None
+    heat = CycleHeat(system.exchange)
+    phases, n = len(system.motion.phases), len(system.pair.weights)
+    maps = {id(one): one for phase in heat.cycle(np.ones((phases, n))).maps for one, _ in phase.steps}
+    made = sum(one.propagator.nbytes + one.response.nbytes for one in maps.values())
+    assert 0.4 * cycle_memory(heat.exchange) < made < 0.7 * cycle_memory(heat.exchange)
+    monkeypatch.setattr("fenwear.cycle.coupled.free_memory", lambda: 1e3)
+    monkeypatch.setattr("fenwear.cycle.coupled.GIB", 0)
+    for solved in (steady, lambda own: next(jump(own, 100, tolerance=0.1))):
+        with pytest.raises(CaseError, match=r"heat: jumps and steady states keep .* are free"):
+            solved(system)
+    next(march(system, 1))
 
 
 CAPPED = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12")

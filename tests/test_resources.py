@@ -294,3 +294,12 @@ def test_a_contact_too_large_is_refused_before_the_bodies_are_meshed() -> None:
     case = load_case("ball-on-flat", ["geometry.parameters.across=200", "geometry.parameters.core=0"])
     with pytest.raises(CaseError, match=r"geometry: about 160,000 contact nodes take [56]\d\d\.\d GiB at least, but"):
         assemble(case)
+
+
+def test_a_line_too_fine_is_refused_before_the_bodies_are_meshed() -> None:
+    """The nodes of the strip, too: elements of 0.15 nm under an overlap of 50 µm had used up the memory."""
+    case = load_case(
+        "fretting", ["geometry.parameters.contact_width='0.6 nm'", "geometry.parameters.elements_along_contact=4"]
+    )
+    with pytest.raises(CaseError, match=r"geometry: about [\d,]{7,} contact nodes take .* GiB at least, but"):
+        assemble(case)

@@ -40,7 +40,9 @@ from fenwear.stack import importing
 BODIES = ROLES
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 TRIANGLE = 2  # gmsh's number of the cell
-MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, forces of three directions
+MATRICES = (
+    3  # of n by n contact nodes, that a contact holds at least: of forces along three axes; in a plane it is four
+)
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
@@ -290,11 +292,12 @@ def _load(
         _merge(gmsh, path)
         _by_roles(gmsh, path, names)
         if path.suffix == ".geo":
-            if kind == "solid":
-                gmsh.model.mesh.generate(2)
-                contact_nodes = _contact_nodes(gmsh, geometry)
-                _check_size(contact_nodes)
-            gmsh.model.mesh.generate(_dim(kind))
+            dim = _dim(kind)
+            gmsh.model.mesh.generate(dim - 1)
+            most = max(_contact_nodes(gmsh, geometry, body, dim - 1) for body in BODIES[: 1 if kind == "solid" else 2])
+            _check_size(most, dim - 1)
+            contact_nodes = most if kind == "solid" else 0.0
+            gmsh.model.mesh.generate(dim)
             gmsh.model.mesh.setOrder(geometry.order)
             factor = gmsh.option.getNumber(SCALING)  # gmsh itself would apply it to files alone
             gmsh.model.mesh.affineTransform([factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0])
@@ -329,18 +332,18 @@ def _name_groups(gmsh: Any, change: Callable[[str], str]) -> None:
                 gmsh.model.setPhysicalName(dim, tag, new)
 
 
-def _contact_nodes(gmsh: Any, geometry: Geometry) -> float:
-    """Return about how many contact nodes the meshed surfaces have."""
+def _contact_nodes(gmsh: Any, geometry: Geometry, body: str, dim: int) -> float:
+    """Return about how many contact nodes a body has on its meshed surfaces, or lines."""
     nodes = 0.0
-    tags = [tag for name, tag in _groups(gmsh, 2).items() if name == "punch_contact" or _contact_name("punch", name)]
-    for entity in (entity for tag in tags for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag)):
-        for cell, cells in zip(*gmsh.model.mesh.getElements(2, entity)[:2], strict=True):
-            nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**2)
+    tags = [tag for name, tag in _groups(gmsh, dim).items() if name == f"{body}_contact" or _contact_name(body, name)]
+    for entity in (entity for tag in tags for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)):
+        for cell, cells in zip(*gmsh.model.mesh.getElements(dim, entity)[:2], strict=True):
+            nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**dim)
     return nodes
 
 
-def _check_size(contact_nodes: float) -> None:
-    """Refuse what would not fit into memory with its contact alone, before bodies are meshed.
+def _check_size(contact_nodes: float, dim: int = 2) -> None:
+    """Refuse what would not fit into memory with its contact alone, a line or a surface, before bodies are meshed.
 
     Raises:
         CaseError: it has too many contact nodes.
@@ -351,7 +354,7 @@ def _check_size(contact_nodes: float) -> None:
         return
     message = (
         f"about {contact_nodes:,.0f} contact nodes take {memory_size(least)} at least, but {memory_size(free)} are "
-        f"free; elements {(least / free) ** 0.25:.2g} times as large at the contact might fit"
+        f"free; elements {(least / free) ** (0.5 / dim):.2g} times as large at the contact might fit"
     )
     raise CaseError(InputError("geometry", message))
 

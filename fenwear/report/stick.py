@@ -31,7 +31,8 @@ GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
     """Return the places of recorded cycles at even shares of the wear, the first and the last among them."""
-    depth = (history.wear.max(history.wear.dims[1:]) + history.wear_strip.max(history.wear_strip.dims[1:])).values
+    worn = [history[name] for name in ("wear", "wear_strip") if name in history]
+    depth = np.sum([depths.max(depths.dims[1:]).values for depths in worn], axis=0)
     course = depth if depth[-1] > depth[0] else np.arange(len(depth), dtype=float)
     return sorted({int(np.abs(course - target).argmin()) for target in np.linspace(course[0], course[-1], count)})
 

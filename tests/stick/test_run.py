@@ -19,6 +19,7 @@ from fenwear.cycle.totals import Totals
 from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
+from fenwear.report.stick import chosen, stick_figures
 from fenwear.report.stick_course import course
 from fenwear.report.style import Style
 from fenwear.results.cycles import by_cycles, cycle_at
@@ -75,6 +76,19 @@ def test_report_is_drawn_and_drawn_again(ran: tuple[dict, Path]) -> None:
     page = (folder / "report.html").read_text("utf-8")
     assert page.count("<img") == sum(name.endswith(".png") for name in names)
     assert "energy ratio" in page
+
+
+@pytest.mark.parametrize("body", ["punch", "strip"])
+def test_figures_of_one_body_that_wears(tmp_path: Path, body: str) -> None:
+    """Where the other body does not wear every figure of the time steps is drawn, its cycles spread over the wear."""
+    coarse = ["geometry.degree=1", "geometry.parameters.elements_along_contact=8", "stick.steps=4", "run.half_cycles=8"]
+    silent = ["output.report=false", "output.uncertainty=false", "run.integration='explicit'", f"unset=wear.{body}"]
+    case = load_case("fretting-partial-slip", [*coarse, *silent, "motion.positions=1", "output.every=1"])
+    _, folder = run_case(case, "fretting", tmp_path / "out", lambda _: None, progress="none")
+    history = by_cycles(load_history(folder))
+    places = chosen(history, 3)
+    assert (places[0], places[-1]) == (0, history.sizes["cycle"] - 1)
+    assert {"loops", "zones", "sliding", "stress_range"} <= set(stick_figures(history))
 
 
 def test_gross_sliding_is_told(tmp_path: Path) -> None:

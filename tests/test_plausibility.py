@@ -275,7 +275,7 @@ def test_shakedown(name: str, factor: float, assembled: Assembled) -> None:
         assert bool(texts) == told
         if told:
             assert f"{factor:g} k by materials.{material}.yield_stress" in texts[0]
-            capped = with_case(again, changed_case(again.case, f"contact.hardness={10 * float(pressure)!r}"))
+            capped = with_case(again, changed_case(again.case, f"contact.hardness='{10 * float(pressure)!r} MPa'"))
             assert not [text for text in initial_warnings(capped) if "shakedown" in text]
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, WrapValidator, model_validator
 from fenwear.case.laws import Dependence, WearLaw, constant_or_dependence
 from fenwear.case.layers import Layers, ThirdBody
 from fenwear.case.lubrication import Lubrication
-from fenwear.case.quantities import Number, Part, Stress
+from fenwear.case.quantities import Hardness, Number, Part
 
 CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
 
@@ -44,7 +44,7 @@ class Contact(Part):
     third_body: ThirdBody | None = Field(
         default=None, description="debris that stays between the surfaces; without this table none does"
     )
-    hardness: Annotated[Stress, Field(gt=0)] | None = Field(
+    hardness: Hardness | None = Field(
         default=None,
         description="H: no pressure is beyond it; what would be flows, to a plastic depth that stays, apart from wear",
     )

@@ -13,7 +13,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from fenwear.arrays import Array
 from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression, variables_of
 from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
-from fenwear.case.quantities import Force, Length, Number, Part, Stress, Unit, quantity
+from fenwear.case.quantities import Force, Hardness, Length, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
 
@@ -230,7 +230,7 @@ class Coating(OfPlace):
         default=None, description="beta~ of the coating, in the unit of that of the base, whose exponents it has"
     )
     archard: Annotated[Number, Field(gt=0)] | None = Field(default=None, description="K of the coating")
-    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H of the coating, with archard")
+    hardness: Hardness | None = Field(default=None, description="H of the coating, with archard")
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(gt=0)] | None = Field(
         default=None, description="volume of the coating worn over the energy of friction"
     )
@@ -286,7 +286,7 @@ class WearLaw(Part):
     )
     beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")
     archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
-    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
+    hardness: Hardness | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )

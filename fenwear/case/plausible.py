@@ -58,7 +58,7 @@ RANGES = (
     Range("materials.*.expansion", "thermal expansion", -1e-5, 5e-4, "1/K", 1, "invar 1e-6, rubber 3e-4"),
     Range("contact.friction", "friction coefficient", 0.0005, 2.0, "", 1,
           "superlubricity 0.001, clean metals and rubber 1 to 2"),
-    Range("wear.*.hardness", "hardness", 5e-3, 150, "GPa", 1e3, "polymers 0.02, diamond 100", bare_low=0.1),
+    Range("*.hardness", "hardness", 5e-3, 150, "GPa", 1e3, "polymers 0.02, diamond 100"),
     Range("wear.*.archard", "Archard's K", 1e-11, 0.2, "", 1, "boundary lubrication 1e-9, seizing metals 0.1"),
     Range("wear.*.energy", "energy wear coefficient", 1e-14, 1e-3, "1/MPa", 1, "diamond-like carbon 1e-11, as beta~"),
     Range("wear.*.coefficient", "wear coefficient", 1e-14, 1e-3, "1/MPa", 1,

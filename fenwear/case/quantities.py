@@ -12,20 +12,26 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 from pydantic.fields import FieldInfo
 
-from fenwear.case.units import convert, quantity_text
+from fenwear.case.units import convert, hardness, quantity_text
 
 UNIT = "x-unit"  # where the JSON schema made by pydantic has the unit of a number
 
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit of a key's bare numbers; in the JSON schema a text with a unit may stand for the number."""
+    """The unit of a key's bare numbers; in the JSON schema a text with a unit may stand for the number.
+
+    Attributes:
+        symbol: The unit.
+        bare: Whether numbers without a unit are allowed.
+    """
 
     symbol: str
+    bare: bool = True
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         """Return the schema of a number with this unit."""
-        return {"anyOf": [handler(core), {"type": "string"}], UNIT: self.symbol}
+        return {"anyOf": [*([handler(core)] if self.bare else []), {"type": "string"}], UNIT: self.symbol}
 
 
 def quantity(unit: str) -> Any:
@@ -51,6 +57,13 @@ def _metadata(annotation: Any) -> Iterator[Any]:
 Length = Annotated[float, *quantity("mm")]
 Force = Annotated[float, *quantity("N")]
 Stress = Annotated[float, *quantity("MPa")]
+Hardness = Annotated[
+    float,
+    Unit("MPa", bare=False),
+    BeforeValidator(hardness),
+    PlainSerializer(lambda value: quantity_text(value, "MPa")),
+    Field(gt=0),
+]
 Speed = Annotated[float, *quantity("mm/s")]
 Time = Annotated[float, *quantity("s")]
 AngularFrequency = Annotated[float, *quantity("rad/s")]

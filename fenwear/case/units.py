@@ -8,18 +8,30 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
     import pint
 
-_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
-EXPONENT = re.compile(r"([A-Za-zµμ])(-?\d)(?!\d)")  # of units as in history.nc: mm3, mm s-1
+_TIMES_TEN = r"(?:\s*[x×*·]\s*10\^?(?P<ten>[+-]?\d{1,3}))?"  # as printed: 3.9 x 10^-8, 3.9·10⁻⁸
+_NUMBER_AND_UNIT = re.compile(
+    rf"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{{1,3}})?){_TIMES_TEN}\s*(?P<unit>.*?)\s*", re.DOTALL
+)
+_EXPONENT = re.compile(r"([A-Za-zµ])(-?\d)(?!\d)")  # of units as in history.nc: mm3, mm s-1
 POWERS = {"": 0, "µ": -6, "u": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}  # of ten, of the usual prefixes
 _METRIC = re.compile(f"(1/)?({'|'.join(filter(None, POWERS))}|)(m|g|s|N|Pa|J|W|K)(\\^-1)?")
-_HARMLESS_UNIT = re.compile(r"[A-Za-zµμ°²³\d\s*/().^-]{1,64}")
+_HARMLESS_UNIT = re.compile(r"[A-Za-zÅµ°\d\s*/().^-]{1,64}")
+_SIGNS = str.maketrans({"º": "°", "˚": "°", "−": "-", "–": "-", "·": "*", "⋅": "*", "∙": "*", "•": "*", "μ": "µ"})
+_NAMES = {"%": "percent", "C": "degC", "mil": "thou", "U": "turn", "r": "turn", "tr": "turn"}
+_TOGETHER = re.compile(r"(?<![A-Za-zµ])(?:([kMGmµ]?(?:N|Pa|J|W)|kg)([kcmµ]?m|s|K)|(m)(K))(?![A-Za-zµ])")
+_HARDNESS = re.compile(r"\s*([\d.eE+-]+)\s*H(?:V|K|B[SW]?)[\d\s./]*")
+_SCALES = re.compile(r"\bHR[A-Z]|\bHV|\bHB|\bHK|[Ss]hore")
+PASCALS_OF_VICKERS = 9.80665  # MPa: one kgf/mm², by which HV, HB and HK are defined
 
 
 # Those that most case files keep to: pint's whole list takes a fifth of a second to read.
@@ -35,11 +47,20 @@ gram = [mass] = g
 second = [time] = s
 kelvin = [temperature]; offset: 0 = K
 degree_Celsius = kelvin; offset: 273.15 = °C = degC = degreeC
-radian = [] = rad
 newton = kilogram * meter / second ** 2 = N
 pascal = newton / meter ** 2 = Pa
 joule = newton * meter = J
 watt = joule / second = W
+minute = 60 * second = min
+"""
+# Angles are no pure numbers here, so that frequencies are not speeds of rotation, nor turns numbers of cycles.
+FIELD_UNITS = """
+radian = [angle] = rad
+turn = 6.283185307179586 * radian = _ = revolution = rev = cycle
+revolutions_per_minute = turn / minute = rpm
+revolutions_per_second = turn / second = rps
+kilopond = 9.80665 * newton = kp = kgf
+pond = 9.80665e-3 * newton
 """
 
 
@@ -48,10 +69,10 @@ def registry(*, usual: bool) -> pint.UnitRegistry:
     """Return the usual units, or all that pint knows."""
     import pint
 
-    found = pint.UnitRegistry(None if usual else "", cache_folder=None)
-    if usual:
-        found.load_definitions(USUAL_UNITS.splitlines())
-    return found
+    known = pint.UnitRegistry(None, cache_folder=None, on_redefinition="ignore")
+    known.load_definitions(USUAL_UNITS.splitlines() if usual else Path(pint.__file__).with_name("default_en.txt"))
+    known.load_definitions(FIELD_UNITS.splitlines())
+    return known
 
 
 def convert(value: object, unit: str) -> float:
@@ -78,30 +99,100 @@ def convert(value: object, unit: str) -> float:
 
 @lru_cache(maxsize=500)
 def _convert_text(text: str, unit: str, expected: str) -> float:
-    match = _NUMBER_AND_UNIT.fullmatch(text)
+    match = _NUMBER_AND_UNIT.fullmatch(_plain(text))
     if match is None:
-        raise ValueError(f"{expected}, got {text!r}")
-    number, given = float(match[1]), EXPONENT.sub(r"\1^\2", match[2])
+        comma = ": write the decimal point as '.'" if re.search(r"\d,\d", text) else ""
+        raise ValueError(f"{expected}, got {text!r}{comma}")
+    number, given = float(f"{match['number']}e{match['ten']}" if match["ten"] else match["number"]), match["unit"]
     if not given:
         return number
+    given = f"1{given}" if given.startswith("/") else given
     power = _power_of_ten(given, unit)
     if power is not None:
         return number * 10.0**power if power >= 0 else number / 10.0**-power
-    import pint
-
-    if not _HARMLESS_UNIT.fullmatch(given) or re.search(r"\d{3}|\*\*|\^\s*\^", given):
+    if not _HARMLESS_UNIT.fullmatch(given) or re.search(r"\d{3}|\^\s*\^", given):
         raise ValueError(f"{expected}, got {text!r}")
-    if "rad" in unit and re.search(r"[Hh](?:z|ertz)", given):
-        raise ValueError(f"{expected}, got {text!r}: multiply the frequency by 2 pi")
-    try:
-        try:
-            return _in_unit(number, given, unit, registry(usual=True))
-        except pint.UndefinedUnitError:
-            return _in_unit(number, given, unit, registry(usual=False))
-    except pint.DimensionalityError as error:
-        raise ValueError(f"{expected}, got {text!r}, which is of another kind") from error
-    except Exception as error:  # pint's parser raises many types on nonsense
-        raise ValueError(f"{expected}, got {text!r}, whose unit is not known") from error
+    units = list(_units(given))
+    values = [value for value in (_in_unit(number, one, unit) for one in units) if value is not None]
+    if any(not math.isclose(value, values[0], rel_tol=1e-12) for value in values):
+        raise ValueError(f"{expected}, got {text!r}, which may be read in several ways: write parentheses")
+    if not values:
+        raise ValueError(f"{expected}, got {text!r}{_reason(given, units, unit)}")
+    return values[0]
+
+
+def hardness(value: object) -> float:
+    """Return a hardness (MPa) from a number with a unit of pressure, or with HV, HB, HBW or HK (kgf/mm²).
+
+    Raises:
+        ValueError: without a unit, as a bare number may be either; or as `convert`.
+    """
+    if isinstance(value, str) and (match := _HARDNESS.fullmatch(value)):
+        return convert(match[1], "") * PASCALS_OF_VICKERS
+    number = convert(value, "MPa")
+    if not isinstance(value, str) or _NUMBER_AND_UNIT.fullmatch(value)["unit"] == "":  # type: ignore[index]
+        raise ValueError(f"expected a unit, as {value} may be HV or MPa: write '{value} HV' or '{value} MPa'")
+    return number
+
+
+def _plain(text: str) -> str:
+    """Return a quantity in plain letters: exponents and signs as in case files, the field's short names as pint's."""
+    found = unicodedata.normalize("NFKC", text.translate(_SIGNS)).translate(_SIGNS).replace("**", "^")
+    found = re.sub(r"(?<=[A-Za-zµ°])[-.](?=[A-Za-zµ°])", "*", found)  # N-m, N.m
+    return re.sub(r"(?<![A-Za-zµ°])(?:%|(?:C|mil|U|r|tr)(?![A-Za-zµ°]))", lambda match: _NAMES[match[0]], found)
+
+
+def _units(given: str) -> Iterator[str]:
+    """Yield the ways in which people mean a unit: W/mK as W/(m*K), where its kind lets only one of them be."""
+    given = _EXPONENT.sub(r"\1^\2 ", given)
+    for one in dict.fromkeys((given, _TOGETHER.sub(lambda match: " ".join(filter(None, match.groups())), given))):
+        yield one
+        above, slash, below = one.partition("/")
+        if slash and not re.search(r"[/()]", below):
+            yield f"{above}/({below})"
+
+
+def _in_unit(number: float, given: str, unit: str) -> float | None:
+    """Return the number in a unit; None where it is of another kind or not known."""
+    parsed = _parsed(given)
+    if parsed is None or not parsed.is_compatible_with(unit or "dimensionless"):
+        return None
+    known = parsed._REGISTRY
+    return float(known.Quantity(number, parsed).to(unit or "dimensionless").magnitude)
+
+
+def _parsed(given: str) -> pint.Unit | None:
+
+    for usual in (True, False):
+        with suppress(Exception):  # pint's parser raises many types on nonsense
+            return cast("pint.Unit", registry(usual=usual).parse_units(given))
+    return None
+
+
+def _reason(given: str, units: Sequence[str], unit: str) -> str:
+    """Return what is wrong with a unit, and how it is written."""
+    if _SCALES.search(given):
+        return ", a hardness: 1 HV is 9.81 MPa, other scales have tables (ASTM E140)"
+    known = [parsed for one in units if (parsed := _parsed(one)) is not None]
+    if not known:
+        other = next((way for way in _other_capitals(units) if _in_unit(1.0, way, unit) is not None), "")
+        return ", whose unit is not known" + (f": write {other!r} if you mean that" if other else "")
+    hints = (
+        ("rad", ": it may count turns or radians, 2 pi apart; write 'rpm', 'rev/s' or 'rad/s'"),
+        ("1/rad" if unit == "" else "rad", ": a number of cycles has no unit, an angle is no pure number"),
+        ("m/s^2", ": a mass is no force: write 'kgf', 'gf' or 'lbf' for its weight"),
+    )
+    for factor, hint in hints:
+        if any((one * one._REGISTRY.parse_units(factor)).is_compatible_with(unit or "dimensionless") for one in known):
+            return f", which is of another kind{hint}"
+    return ", which is of another kind"
+
+
+def _other_capitals(units: Sequence[str]) -> Iterator[str]:
+    """Yield a unit in other capitals: MPa for Mpa."""
+    for one in units:
+        for way in ("MPa", "GPa", "kPa", "Pa", "kN", "MN", "N", "mm", "m", "s", "h", "K", "W", "J"):
+            yield re.sub(rf"(?<![A-Za-zµ°]){way}(?![A-Za-zµ°])", way, one, flags=re.IGNORECASE)
 
 
 def _power_of_ten(given: str, unit: str) -> int | None:
@@ -116,10 +207,6 @@ def _power_of_ten(given: str, unit: str) -> int | None:
         return None
     signs = [-1 if bool(match[1]) != bool(match[4]) else 1 for match in (one, other)]
     return signs[0] * (POWERS[one[2]] - POWERS[other[2]]) if signs[0] == signs[1] else None
-
-
-def _in_unit(number: float, given: str, unit: str, known: pint.UnitRegistry) -> float:
-    return float(known.Quantity(number, known.parse_units(given)).to(unit or "dimensionless").magnitude)
 
 
 def shown(value: object) -> str:  # noqa: PLR0911

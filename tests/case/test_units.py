@@ -5,7 +5,18 @@ import math
 
 import pytest
 
-from fenwear.case.units import POWERS, USUAL_UNITS, _power_of_ten, convert, quantity_text, registry
+from fenwear.case import load_case
+from fenwear.case.units import (
+    FIELD_UNITS,
+    POWERS,
+    USUAL_UNITS,
+    _power_of_ten,
+    convert,
+    hardness,
+    quantity_text,
+    registry,
+)
+from fenwear.errors import CaseError
 
 
 @pytest.mark.parametrize(
@@ -23,6 +34,32 @@ from fenwear.case.units import POWERS, USUAL_UNITS, _power_of_ten, convert, quan
         ("600 rpm", "rad/s", 20 * math.pi),
         ("3.9e-8 1/MPa", "MPa^-1", 3.9e-8),
         ("3.9e-14 1/Pa", "MPa^-1", 3.9e-8),
+        *(
+            (f"2 {one}", "mm^3/(N*mm)", 2e-3)
+            for one in (
+                "mm^3/Nm",
+                "mm³/Nm",
+                "mm³/(N·m)",
+                "mm**3/(N*m)",
+                "mm³/N·m",
+                "mm3/N-m",
+                "mm³ N⁻¹ m⁻¹",
+                "mm^3/N/m",
+                "µm²/mN",
+            )
+        ),
+        *((f"2 {one}", "rad/s", 4 * math.pi) for one in ("rev/s", "turns/s", "rps", "cycles/s", "r/s")),
+        *((f"60 {one}", "rad/s", 2 * math.pi) for one in ("rev/min", "U/min", "tr/min", "r/min", "rpm")),
+        *((f"2 {one}", "N/(s*K)", 2.0) for one in ("W/mK", "W/m·K", "W/m K", "W/(m °C)", "W m⁻¹ K⁻¹")),
+        *((f"2 {one}", "N/(mm*s*K)", 2e-3) for one in ("W/m2K", "W/m²K", "W/(m²·K)")),
+        *((f"2 {one}", "N*mm", 2e3) for one in ("Nm", "N·m", "N-m", "N.m", "J")),
+        ("2 mK", "K", 2e-3),
+        ("2 mPas", "MPa*s", 2e-9),
+        ("2 kp", "N", 19.6133),
+        ("2 kp/mm²", "MPa", 19.6133),
+        ("3.9·10⁻⁸ /MPa", "MPa^-1", 3.9e-8),
+        ("−2 x 10^3 N", "N", -2e3),
+        ("50 %", "", 0.5),
         (" 7 ", "mm", 7.0),
         (3, "mm", 3.0),
     ],
@@ -44,6 +81,16 @@ def test_conversion(text: object, unit: str, number: float) -> None:
         ("1 mm; import os", "mm"),
         ("1 mm**999999", "mm"),
         ("10 Hz", "rad/s"),
+        ("5 cps", "rad/s"),
+        ("300 1/min", "rad/s"),
+        ("5 turns", ""),
+        ("5 deg", ""),
+        ("5 kg", "N"),
+        ("25 kg/mm2", "MPa"),
+        ("1 Mpa", "MPa"),
+        ("250 HV", "MPa"),
+        ("2 N/m deg", "N/m"),
+        ("1,5 mm", "mm"),
         ("nan", "mm"),
         ("1e999", "mm"),
         (math.inf, "mm"),
@@ -58,6 +105,22 @@ def test_refusal_says_what_was_expected(value: object, unit: str) -> None:
     with pytest.raises(ValueError, match=r"expected a number") as refused:
         convert(value, unit)
     assert unit in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["250 HV", "250 HV0.1", "250 HBW 10/3000", "250 kgf/mm²", "2.4516625 GPa"])
+def test_hardness(text: str) -> None:
+    """Vickers', Brinell's and Knoop's numbers are kgf/mm² (ISO 6507-1, 6506-1, 4545-1)."""
+    assert hardness(text) == pytest.approx(250 * 9.80665, rel=1e-14)
+    assert load_case("example1", [f"contact.hardness='{text}'"]).contact.hardness == hardness(text)
+
+
+@pytest.mark.parametrize("value", [250, 250.0, "250", "60 HRC"])
+def test_hardness_needs_a_unit(value: object) -> None:
+    """Bare numbers may be HV or MPa, ten times apart; other scales have no factor."""
+    with pytest.raises(ValueError, match="HV"):
+        hardness(value)
+    with pytest.raises(CaseError, match=r"contact\.hardness"):
+        load_case("example1", [f"contact.hardness={value!r}"])
 
 
 @pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, -2.5e17, 3.926990816987242e-8])
@@ -86,8 +149,8 @@ def test_units_as_results_have_them(written: str, unit: str, value: float) -> No
 
 def test_usual_units_are_those_of_the_whole_list() -> None:
     """Every prefix with every unit, so that none means another one there."""
-    lines = [line.split("=") for line in USUAL_UNITS.splitlines() if line]
-    names = [[part.strip() for part in (line[0], *line[2:])] for line in lines]
+    lines = [line.split("=") for line in (USUAL_UNITS + FIELD_UNITS).splitlines() if line]
+    names = [[part.strip() for part in (line[0], *line[2:]) if part.strip() != "_"] for line in lines]
     prefixes = [name.removesuffix("-") for group in names for name in group if name.endswith("-")]
     known = [name for group in names for name in group if not name.endswith("-")]
     usual, whole = registry(usual=True), registry(usual=False)

@@ -155,7 +155,7 @@ def test_no_pressure_is_beyond_the_hardness() -> None:
 
     It is metered apart from wear, never less than before, and nothing where no pressure comes near.
     """
-    system = assemble(case_of("gross-sliding", "run.half_cycles=6", f"contact.hardness={HARD}"))
+    system = assemble(case_of("gross-sliding", "run.half_cycles=6", f"contact.hardness='{HARD} MPa'"))
     bare = assemble(case_of("gross-sliding", "run.half_cycles=6"))
     block = end(system, "explicit")
     assert block.pressure.max() == pytest.approx(HARD, rel=1e-8)
@@ -170,20 +170,20 @@ def test_no_pressure_is_beyond_the_hardness() -> None:
     assert volumes[0] == pytest.approx(volumes[1], rel=1e-9)
     jumped = end(system, "jump").end.worn.between[0]
     assert np.abs(jumped - depths[-1]).max() < 1e-2 * depths[-1].max()  # all phases flow at once, not in turn
-    hard = end(assemble(case_of("gross-sliding", "run.half_cycles=6", "contact.hardness=900")), "explicit")
+    hard = end(assemble(case_of("gross-sliding", "run.half_cycles=6", "contact.hardness='900 MPa'")), "explicit")
     assert not hard.between.any()
 
 
 def test_a_hardness_that_carries_nothing_is_refused() -> None:
     """Below the mean pressure, and in an end whose pressures are beyond it."""
     with pytest.raises(CaseError, match=r"contact\.hardness: expected more than the mean pressure of"):
-        assemble(case_of("gross-sliding", "contact.hardness=100"))
+        assemble(case_of("gross-sliding", "contact.hardness='100 MPa'"))
     with pytest.raises(CaseError, match=r"contact\.hardness: expected more than the mean pressure of"):
-        assemble(case_of("coulomb", "contact.hardness=100"))
+        assemble(case_of("coulomb", "contact.hardness='100 MPa'"))
     with pytest.raises(ConvergenceError, match="without plastic flow"):
-        steady(assemble(case_of("gross-sliding", "contact.hardness=450")))
+        steady(assemble(case_of("gross-sliding", "contact.hardness='450 MPa'")))
     with pytest.raises(ConvergenceError, match="without plastic flow"):
-        steady(assemble(case_of("coulomb", "contact.hardness=450")))
+        steady(assemble(case_of("coulomb", "contact.hardness='450 MPa'")))
 
 
 def test_what_sticks_flows_beyond_the_hardness() -> None:
@@ -191,10 +191,12 @@ def test_what_sticks_flows_beyond_the_hardness() -> None:
 
     What flows takes its work from the loads, to rounding; march and jump have it as deep.
     """
-    smooth = assemble(case_of("coulomb", f"contact.hardness={HARD}", "contact.friction=1e-6"), heat="none")
+    smooth = assemble(case_of("coulomb", f"contact.hardness='{HARD} MPa'", "contact.friction=1e-6"), heat="none")
     problem = smooth.law_state.problem
     at = problem.driven(replace(problem.program, lead_in=())).beginning()
-    without = assemble(case_of("gross-sliding", f"contact.hardness={HARD}", "contact.friction=0", "run.half_cycles=1"))
+    without = assemble(
+        case_of("gross-sliding", f"contact.hardness='{HARD} MPa'", "contact.friction=0", "run.half_cycles=1")
+    )
     block = end(without, "explicit")
     frames = (
         5e-4  # areas seen along normals half-way between those of both bodies, and along the strip's, differ by 2e-4
@@ -203,7 +205,7 @@ def test_what_sticks_flows_beyond_the_hardness() -> None:
     assert np.abs(at.worn.between[0] - block.between[0, 0]).max() < frames * block.between.max()
     depths = {}
     for how in ("explicit", "implicit", "jump"):
-        system = assemble(case_of("coulomb", f"contact.hardness={HARD}", "run.half_cycles=8"))
+        system = assemble(case_of("coulomb", f"contact.hardness='{HARD} MPa'", "run.half_cycles=8"))
         depths[how] = end(system, how).end.worn.between[0]
     assert depths["explicit"].max() > 1e-4
     for how in ("implicit", "jump"):

@@ -112,7 +112,9 @@ history
 
 # %%
 last = history.isel(half_cycle=-1)
-print(f"half-cycle {int(last.half_cycle)}: largest pressure {float(last.max_pressure):.2f} {last.max_pressure.units}")
+print(
+    f"half-cycle {int(last.half_cycle)}: largest pressure {float(last.largest_pressure):.2f} {last.largest_pressure.units}"
+)
 print(f"width in contact {float(last.contact_width):.1f} {last.contact_width.units}")
 
 # %% [markdown]

@@ -146,9 +146,9 @@ def follow(varied):
     return {
         "n": np.concatenate([b.half_cycle for b in blocks]),
         "pressure": np.concatenate([b.pressure for b in blocks]),
-        "peak": np.concatenate([b.max_pressure for b in blocks]),
+        "peak": np.concatenate([b.largest_pressure for b in blocks]),
         "width": np.concatenate([b.contact_width for b in blocks]),
-        "temperature": np.concatenate([b.heat.max_temperature for b in blocks]),
+        "temperature": np.concatenate([b.heat.largest_temperature for b in blocks]),
     }
 
 

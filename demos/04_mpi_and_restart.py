@@ -127,7 +127,10 @@ for variable, scale in scales.items():
 # %%
 figure, axes = plt.subplots(2, 1, figsize=(7, 5.6), sharex=True, layout="constrained")
 for ax, variable, label in zip(
-    axes, ("max_pressure", "max_temperature"), ("largest pressure (MPa)", "largest temperature (K)"), strict=True
+    axes,
+    ("largest_pressure", "largest_temperature"),
+    ("largest pressure (MPa)", "largest temperature (K)"),
+    strict=True,
 ):
     rightward = {name: history.isel(half_cycle=slice(0, None, 2)) for name, history in histories.items()}
     ax.plot(rightward["one"].half_cycle, rightward["one"][variable], color="#56B4E9", linewidth=6, label=names["one"])

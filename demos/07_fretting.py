@@ -72,7 +72,7 @@ for cycles in CYCLES:
     lost = system.pair.weights @ block.wear[-1], strip.weights @ block.wear_strip[-1]
     exact = 1.9e-8 * load * distance, 2.9e-8 * load * distance
     print(f"after {cycles:6,} cycles: flat {1e3 * block.wear_strip[-1].max():.3f} µm deep, cylinder "
-          f"{1e3 * block.wear[-1].max():.3f} µm, largest pressure {block.max_pressure[-1]:.0f} MPa; "
+          f"{1e3 * block.wear[-1].max():.3f} µm, largest pressure {block.largest_pressure[-1]:.0f} MPa; "
           f"lost / known: {lost[0] / exact[0]:.12f}, {lost[1] / exact[1]:.12f}")  # fmt: skip
 
 # %%
@@ -116,7 +116,7 @@ for text, tolerance, varied in (
     begin = time.perf_counter()
     *_, block = jump(other, 2 * last, tolerance=tolerance)
     print(f"{text:14} after {last:,} cycles: flat {1e3 * block.wear_strip[-1].max():.4f} µm, "
-          f"{block.max_pressure[-1]:5.1f} MPa, {time.perf_counter() - begin:4.1f} s")  # fmt: skip
+          f"{block.largest_pressure[-1]:5.1f} MPa, {time.perf_counter() - begin:4.1f} s")  # fmt: skip
 
 # %% [markdown]
 # ## No steady state, and a stroke that is too long

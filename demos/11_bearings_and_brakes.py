@@ -77,7 +77,7 @@ slid = history.sliding_distance.values * load * wear / (10.0 * clearance)
 arcs = np.array([brentq(lambda a, s=s: a / np.cos(a) - np.sin(a) - s, 0, np.pi / 2 - 1e-6) for s in slid])
 
 fig, axes = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
-axes[0].loglog(history.half_cycle, 1e3 * history.max_wear, label="fenwear")
+axes[0].loglog(history.half_cycle, 1e3 * history.largest_depth, label="fenwear")
 axes[0].loglog(history.half_cycle, 1e3 * clearance * (1 / np.cos(arcs) - 1), "k:", label="rigid bodies")
 axes[0].set(xlabel="turns", ylabel="largest worn depth (µm)", ylim=(1e-2, None))
 axes[0].legend(frameon=False)

@@ -51,5 +51,5 @@ sliding = Sliding(motion, field, Friction(Contact(friction=0.2), field), (WearLa
 system = elastic(place(Bodies(pad, strip), sliding))
 *_, last = march(system, 200)
 state = steady(system)
-after, end = last.max_pressure[-1], state.pressure.max()
+after, end = last.largest_pressure[-1], state.pressure.max()
 print(f"largest pressure: {after:.2f} MPa after 200 half-cycles, {end:.2f} MPa in the end")

@@ -519,5 +519,5 @@ def _warnings(number: float, growth: float | None) -> list[str]:
 def _in_short(block: Block) -> str:
     """Return the state at the end of a block, in a line."""
     degrees = degrees_of(block.system.case)
-    hot = "" if block.heat is None else f", {block.heat.max_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
-    return f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
+    hot = "" if block.heat is None else f", {block.heat.largest_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
+    return f"p max {block.largest_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"

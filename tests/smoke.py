@@ -92,7 +92,7 @@ def heat_and_restart(folder: Path) -> None:
     run("example1-heat", folder / "two", *HEAT, "run.half_cycles=40", more=("--resume",))
     run("example1-heat", folder / "one", *HEAT, "run.half_cycles=40")
     two, one = (read_history(folder / name) for name in ("two", "one"))
-    for name in ("max_pressure", "max_temperature", "worn_area_increment"):
+    for name in ("largest_pressure", "largest_temperature", "worn_area_increment"):
         np.testing.assert_allclose(two[name], one[name], rtol=1e-9, err_msg=name)
 
 

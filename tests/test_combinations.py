@@ -126,7 +126,7 @@ def resumed(feature: str, law: str, folder: Path) -> None:
         "wear",
         "friction_work",
         "normal_force",
-        "max_temperature",
+        "largest_temperature",
         "debris_thickness",
         "state_film",
     ):

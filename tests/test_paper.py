@@ -126,7 +126,7 @@ def test_numbers_are_those_of_the_public_functions() -> None:
     np.testing.assert_allclose(run.pressure[:30], block.pressure, rtol=1e-6)
     np.testing.assert_allclose(run.temperature[:30], block.heat.temperature_punch, rtol=1e-6)
     np.testing.assert_allclose(run.wear[:30], block.wear, rtol=1e-6)
-    assert run.peak[5] == block.max_pressure[5]
+    assert run.peak[5] == block.largest_pressure[5]
     assert run.central_pressure[3] == pytest.approx(block.pressure[3:5, np.abs(run.x).argmin()].mean(), rel=1e-6)
     heat = steady(system).heat
     assert heat is not None

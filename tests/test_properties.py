@@ -282,7 +282,7 @@ def test_mirror_image(parameters: Parameters) -> None:
     np.testing.assert_allclose(other.pressure[:, ::-1], one.pressure, rtol=0, atol=1e-7 * one.pressure.max())
     np.testing.assert_allclose(other.wear[:, ::-1], one.wear, rtol=0, atol=1e-7 * one.wear.max())
     if one.heat is not None and other.heat is not None:
-        scale = 1e-7 * max(one.heat.max_temperature.max(), 1e-9)
+        scale = 1e-7 * max(one.heat.largest_temperature.max(), 1e-9)
         for name in ("temperature_punch", "temperature_strip"):
             np.testing.assert_allclose(getattr(other.heat, name)[:, ::-1], getattr(one.heat, name), rtol=0, atol=scale)
 

@@ -48,7 +48,7 @@ def _of(last: Block, values: Values, share: float) -> Contribution:
     assert last.heat is not None
     system = last.system
     begin = 0.0 if system.heat is None else system.heat.initial
-    rise = float(last.heat.max_temperature[-1]) - begin
+    rise = float(last.heat.largest_temperature[-1]) - begin
     pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
     found: Contribution = {}
     for quantity, value in values.items():

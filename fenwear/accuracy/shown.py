@@ -32,9 +32,9 @@ def _named(system: Tribosystem, numbers: Contribution) -> dict[str, Any]:
         if quantity.name in KEYS:
             named.setdefault(quantity.of, {})[KEYS[quantity.name]] = number
         elif quantity.name == "temperature":
-            named[f"max_temperature_{degrees_of(system.case).unit}"] = number
+            named[f"largest_temperature_{degrees_of(system.case).unit}"] = number
         elif quantity.of:
-            named.setdefault(_way(system, quantity), {})["max_pressure_MPa"] = number
+            named.setdefault(_way(system, quantity), {})["largest_pressure_MPa"] = number
         else:
             named["largest_pressure_in_cycle_MPa"] = number
     return named

@@ -91,7 +91,7 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
         "largest_depth_between_mm": found.deepest,
         names[1]: float(weights @ found.depth),
         names[1].replace("_mm", "_between_mm"): found.volume,
-        "max_pressure_MPa": float(found.pressure.max()),
+        "largest_pressure_MPa": float(found.pressure.max()),
         **places,
         "pressure": found.pressure.tolist(),
         "depth": found.depth.tolist(),
@@ -121,8 +121,8 @@ def final_text(numbers: dict[str, Any]) -> str:
         f"  the stick zone, {stick}, carries all of the load in the end\n"
         f"  {scar}, {depth} µm deep in both bodies together, {worn} {'mm³' if solid else 'mm²'}:\n"
         "  as far as the nodes tell where the stick zone ends\n"
-        f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
-        "are near to them" + _warm_text(numbers)
+        f"  largest pressure {numbers['largest_pressure_MPa']:.4g} MPa, at the edges of the stick zone: "
+        "as high as nodes are near to them" + _warm_text(numbers)
     )
 
 

@@ -43,7 +43,7 @@ class BlockHeat:
     temperature_bulk: Array
 
     @property
-    def max_temperature(self) -> Array:
+    def largest_temperature(self) -> Array:
         """Largest temperature of the contact surfaces (k,), K."""
         return np.maximum(self.temperature_punch.max(axis=1), self.temperature_strip.max(axis=1))
 
@@ -173,7 +173,7 @@ class Block:
         return np.full(len(self), 0.0 if heat is None else heat.ambient)
 
     @property
-    def max_pressure(self) -> Array:
+    def largest_pressure(self) -> Array:
         """Largest pressure of each half-cycle (k,), MPa."""
         return self.pressure.max(axis=1)
 

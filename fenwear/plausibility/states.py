@@ -74,9 +74,9 @@ class StateMonitor:
         when = f"in half-cycle {int(block.half_cycle[worst]):,}"
         found["broken"] = broken_text(float(block.complementarity_error[worst]), when)
         if block.heat is not None:
-            hottest = int(np.argmax(block.heat.max_temperature))
+            hottest = int(np.argmax(block.heat.largest_temperature))
             when = f"in half-cycle {int(block.half_cycle[hottest]):,}"
-            found["hot"] = hot(float(block.heat.max_temperature[hottest]), when)
+            found["hot"] = hot(float(block.heat.largest_temperature[hottest]), when)
         said = {kind: text for kind, text in found.items() if text}
         new = [text for kind, text in said.items() if kind not in self._texts]
         # The width that is needed grows with the scar; of the others the first time is what counts.

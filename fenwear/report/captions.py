@@ -103,7 +103,7 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
         panels=panels,
         size="width" if "contact_width" in history else "area",
         axis=axis,
-        hot=" and largest temperature of the contact surfaces" if "max_temperature" in history else "",
+        hot=" and largest temperature of the contact surfaces" if "largest_temperature" in history else "",
         back=f"{moves.removeprefix('strip ')} {words[-1]}",
         last=f"{int(history.half_cycle[-1]):,}",
         between=lies_between(history).get(name.removesuffix("_map"), "").partition(" (")[0],

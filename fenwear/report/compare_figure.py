@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 COURSES = {
     "half_cycle": {
-        "max_pressure": ("Largest contact pressure", "pressure (MPa)"),
-        "max_wear": ("Largest worn depth of the punch", "depth (mm)"),
-        "max_temperature": ("Largest temperature", "temperature (K)"),
+        "largest_pressure": ("Largest contact pressure", "pressure (MPa)"),
+        "largest_depth": ("Largest worn depth of the punch", "depth (mm)"),
+        "largest_temperature": ("Largest temperature", "temperature (K)"),
     },
     "cycle": {
         "dissipated_energy": ("Work of friction in a cycle", "work (mJ)"),
-        "max_temperature": ("Largest temperature in a cycle", "temperature (K)"),
+        "largest_temperature": ("Largest temperature in a cycle", "temperature (K)"),
     },
 }
 

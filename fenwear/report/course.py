@@ -42,10 +42,10 @@ SHORT = 0.01  # of cycles, m or s: an end whose labels are long, so that few of 
 def peak_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw largest pressure, width or area in contact and, with heat, largest temperature."""
     over = {
-        "max_pressure": "largest pressure (MPa)",
+        "largest_pressure": "largest pressure (MPa)",
         "contact_width": "width in contact (mm)",
         "contact_area": "area in contact (mm²)",
-        "max_temperature": f"largest temperature ({temperature_unit(history)})",
+        "largest_temperature": f"largest temperature ({temperature_unit(history)})",
     }
     over = {name: label for name, label in over.items() if name in history}
     figure, axes = panels(len(over), 2.5, look=look)
@@ -114,7 +114,7 @@ def creep_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     for body, end in {**BODIES, "layer": "_layer"}.items():
         colour = BODY_COLOURS.get(body, "0.4")
         for text, dashes, depth, volume in (
-            ("worn off", "-", f"max_wear{end}", f"worn_volume{end}"),
+            ("worn off", "-", f"largest_depth{end}", f"worn_volume{end}"),
             ("crept", "--", f"creep_depth{end}", f"creep_volume{end}"),
         ):
             if depth not in history:
@@ -138,10 +138,10 @@ def scar_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     figure, axes = panels(1 + len(sizes), 2.5, look=look)
     x = look.course(history)
     for body, end in BODIES.items():
-        if f"max_wear{end}" not in history:
+        if f"largest_depth{end}" not in history:
             continue
         colour = BODY_COLOURS[body]
-        axes[0].plot(x, 1e3 * history[f"max_wear{end}"], color=colour, label=body, **mark_few(x))
+        axes[0].plot(x, 1e3 * history[f"largest_depth{end}"], color=colour, label=body, **mark_few(x))
         for ax, name in zip(axes[1:], sizes, strict=True):
             for share, dashes in (("", "-"), ("_5", "--")):
                 if f"{name}{share}{end}" in history:
@@ -294,8 +294,8 @@ def shown_unit(unit: str) -> str:
 
 def temperature_unit(history: xarray.Dataset) -> str:
     """Return the unit of the temperatures of a history as figures show it."""
-    known = "max_temperature" in history
-    return shown_unit(str(history.max_temperature.attrs.get("units", "K"))) if known else "K"
+    known = "largest_temperature" in history
+    return shown_unit(str(history.largest_temperature.attrs.get("units", "K"))) if known else "K"
 
 
 def mark_few(points: Sized) -> dict[str, Any]:
@@ -316,7 +316,7 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: boo
     """Label the axis of the run: logarithmic where wear alone slows down, linear with heat's own pace."""
     x = look.course(history)
     first, last = float(x[0]), float(x[-1])
-    slows_down = int(history.half_cycle[-1]) > 10_000 or "max_temperature" not in history
+    slows_down = int(history.half_cycle[-1]) > 10_000 or "largest_temperature" not in history
     if logarithmic and slows_down and first > 0 and last > MANY * first:
         by_powers(ax)
         ax.set_xlim(first, last)

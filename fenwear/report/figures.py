@@ -166,7 +166,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
         drawn["pressure"] = pressure_figure(history, chosen, look)
         if cycle_means(history, chosen):
             drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
-        if "max_temperature" in history:
+        if "largest_temperature" in history:
             drawn["temperature"] = temperature_figure(history, chosen, look)
         if lies_between(history):
             drawn["between"] = between_figure(history, chosen, look)
@@ -183,7 +183,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
     if "load_factor" in history:
         drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)
-    if "max_temperature" in history:
+    if "largest_temperature" in history:
         drawn["heat_balance"] = heat_balance_figure(history, look)
     if resolves(history):
         drawn |= stick_figures(by_cycles(history), look)

@@ -12,6 +12,7 @@ from typing import Any
 from fenwear.case.names import Names
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
+from fenwear.results.reading import in_current_names
 
 UNITS = {
     "_per_s": "1/s",
@@ -31,18 +32,18 @@ LABELS = {
     "stop": "how the run stopped",
     "setup_seconds": "time for meshes and operators",
     "half_cycles_seconds": "time for the half-cycles",
-    "max_pressure_MPa": "largest pressure",
-    **{f"max_pressure_at_{axis}_mm": f"where the pressure is largest, {axis}" for axis in "rxyz"},
-    "pressure_beside_max_MPa": "mean pressure of the nodes beside it",
+    "largest_pressure_MPa": "largest pressure",
+    **{f"largest_pressure_at_{axis}_mm": f"where the pressure is largest, {axis}" for axis in "rxyz"},
+    "pressure_beside_largest_MPa": "mean pressure of the nodes beside it",
     "nodes_across_contact": "nodes across the contact",
     "nodes_along_sliding": "nodes across the contact, along the sliding",
     "nodes_across_sliding": "nodes across the contact, across the sliding",
     "contact_width_mm": "width in contact",
-    "max_temperature_degC": "largest temperature of the contact surfaces at the end",
-    "largest_temperature_degC": "largest temperature of the contact surfaces over the run",
-    "max_temperature_K": "largest temperature of the contact surfaces at the end",
-    "largest_temperature_K": "largest temperature of the contact surfaces over the run",
-    "largest_temperature_half_cycle": "half-cycle in which it was largest",
+    "largest_temperature_degC": "largest temperature of the contact surfaces at the end",
+    "largest_temperature_of_run_degC": "largest temperature of the contact surfaces over the run",
+    "largest_temperature_K": "largest temperature of the contact surfaces at the end",
+    "largest_temperature_of_run_K": "largest temperature of the contact surfaces over the run",
+    "largest_temperature_of_run_half_cycle": "half-cycle in which it was largest",
     "wear_mm": "worn depth of the punch",
     "pressure_MPa": "contact pressure",
     "mean_pressure_MPa": "mean pressure",
@@ -83,7 +84,7 @@ def read_summary(directory: Path) -> dict[str, Any]:
         raise CaseError(InputError(str(path), f"no readable summary of a run: {error}")) from None
     if not isinstance(summary, dict):
         raise CaseError(InputError(str(path), "no summary of a run"))
-    return summary
+    return in_current_names(summary)
 
 
 def names_in(directory: Path) -> Names:

@@ -195,7 +195,7 @@ def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
 
 def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
     if not summary:
-        units = {"max_pressure": "_MPa", "contact_width": "_mm", "contact_area": "_mm2", "periodicity": ""}
+        units = {"largest_pressure": "_MPa", "contact_width": "_mm", "contact_area": "_mm2", "periodicity": ""}
         last = {name + unit: float(history[name][-1]) for name, unit in units.items() if name in history}
         return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
@@ -248,7 +248,7 @@ def _heat(summary: dict[str, Any]) -> Table:
 def _stability(summary: dict[str, Any], history: xarray.Dataset) -> str:
     rate = summary.get("growth_rate_per_s")
     if rate is None or not math.isfinite(rate):
-        if "max_temperature" not in history:
+        if "largest_temperature" not in history:
             return "Computed with heat only."
         reason = summary.get("no_growth_rate")
         return f"No growth rate: {reason}." if reason else "Not computed for this run."

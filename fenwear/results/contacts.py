@@ -30,16 +30,21 @@ LINES = {
     **{f"force_{axis}_N": sheet.Line(f"force on the punch, {axis}", "N") for axis in "xyz"},
     "pressure_integral_N": sheet.LINES["pressure_integral_N"],
     **{key: sheet.LINES[key] for key in ("eccentricity_mm", "attitude_angle_deg")},
-    "max_pressure_MPa": sheet.OF_CONTACT["max_pressure_MPa"],
-    **{f"max_pressure_at_{axis}_mm": sheet.OF_CONTACT[f"max_pressure_at_{axis}_mm"] for axis in "rxyz"},
+    "largest_pressure_MPa": sheet.OF_CONTACT["largest_pressure_MPa"],
+    **{f"largest_pressure_at_{axis}_mm": sheet.OF_CONTACT[f"largest_pressure_at_{axis}_mm"] for axis in "rxyz"},
     "contact_area_mm2": sheet.OF_CONTACT["contact_area_mm2"],
     "friction_work_mJ": sheet.LINES["friction_work_mJ"],
     "largest_energy_mJ_per_mm2": sheet.LINES["largest_energy_mJ_per_mm2"],
-    **{f"max_temperature_{unit}": sheet.LINES[f"max_temperature_{unit}"] for unit in ("K", "degC")},
+    **{f"largest_temperature_{unit}": sheet.LINES[f"largest_temperature_{unit}"] for unit in ("K", "degC")},
     **{
         f"{body}.{key}": sheet.LINES[key]._replace(label=f"{body}: {sheet.LINES[key].label}")
         for body in sheet.BODIES
-        for key in ("worn_volume_mm3", "largest_depth_mm", *(f"at_{axis}_mm" for axis in sheet.PLACES), *SCARS)
+        for key in (
+            "worn_volume_mm3",
+            "largest_depth_mm",
+            *(f"largest_depth_at_{axis}_mm" for axis in sheet.PLACES),
+            *SCARS,
+        )
     },
 }
 
@@ -74,8 +79,8 @@ def _carried(last: Block, name: str) -> dict[str, Any]:
     found = {
         **_force(last, own),
         "pressure_integral_N": float((pressure @ area).mean()),
-        "max_pressure_MPa": float(largest.max()),
-        **{f"max_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), where, strict=False)},
+        "largest_pressure_MPa": float(largest.max()),
+        **{f"largest_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), where, strict=False)},
         "contact_area_mm2": float(area @ (pressure[-1] > 0)),
         "friction_work_mJ": float(area @ energy),
         "largest_energy_mJ_per_mm2": float(energy.max()),
@@ -84,7 +89,7 @@ def _carried(last: Block, name: str) -> dict[str, Any]:
     if last.heat is not None:
         degrees = degrees_of(system.case)
         warmest = max(float(side[-1][own].max()) for side in (last.heat.temperature_punch, last.heat.temperature_strip))
-        found[f"max_temperature_{degrees.unit}"] = warmest - degrees.zero
+        found[f"largest_temperature_{degrees.unit}"] = warmest - degrees.zero
     return found
 
 
@@ -106,10 +111,13 @@ def _worn(placed: ContactSetup, surface: ContactSurface, own: Mask, depth: Array
     return {
         "worn_volume_mm3": volume * float(surface.weights[own] @ depth[own]) / whole if whole else 0.0,
         "largest_depth_mm": float(depth[deepest]),
-        **{f"at_{axis}_mm": float(x[deepest]) for axis, x in sheet.places(placed, surface, geometry).items()},
         **{
-            f"scar_{name}_{100 * share:g}_percent_mm": float(extent[0])
-            for share in sheet.SHARES.values()
+            f"largest_depth_at_{axis}_mm": float(x[deepest])
+            for axis, x in sheet.places(placed, surface, geometry).items()
+        },
+        **{
+            f"scar_{name}{end}_mm": float(extent[0])
+            for end, share in sheet.SHARES.items()
             for name, extent in geometry.extents(np.where(own, depth, 0.0)[None], share).items()
         },
     }

@@ -86,7 +86,7 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
         put(f"heat_{term}", ("cycle",), history[f"heat_{term}"].values[rows].sum(axis=1), f"heat_{term}")
     if "temperature_punch" in data:
         hottest = np.maximum(*(np.nanmax(data[f"temperature_{body}"][1], axis=(1, 2)) for body in ("punch", "strip")))
-        put("max_temperature", ("cycle",), hottest, "max_temperature")
+        put("largest_temperature", ("cycle",), hottest, "largest_temperature")
     fixed = {name: one for name, one in history.variables.items() if "half_cycle" not in one.dims and name != STEP}
     weight = history.weight.isel(half_cycle=-1, drop=True)
     half = np.where(there, np.repeat(np.arange(1, strokes + 1), history.sizes[STEP]), 0).reshape(*rows.shape, -1)

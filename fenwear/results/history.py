@@ -55,7 +55,7 @@ VARIABLES = {
     "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
     "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),
     "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
-    "max_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
+    "largest_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
     "contact_width": (("half_cycle",), "mm", "width in contact"),
     "worn_area_increment": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
     "optimum_distance": (
@@ -77,7 +77,7 @@ INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 HEAT_VARIABLES = {
     "temperature_punch": (("half_cycle", "x"), "K", "temperature of the punch's contact surface at the end"),
     "temperature_strip": (("half_cycle", "x"), "K", "temperature of the strip's contact surface at the end"),
-    "max_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces at the end"),
+    "largest_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces at the end"),
     "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
     "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
 }
@@ -422,8 +422,8 @@ class HistoryWriter:
         try:
             with h5py.File(self.path, "r") as file:
                 stored = file["half_cycle"][:]
-                if "max_temperature" in file:  # a run goes on in the degrees that it began with
-                    self._degrees = degrees_in(str(file["max_temperature"].attrs["units"]))
+                if "largest_temperature" in file:  # a run goes on in the degrees that it began with
+                    self._degrees = degrees_in(str(file["largest_temperature"].attrs["units"]))
                 if steps.STEP in self._columns:  # more than the case's where a step of its program had more
                     column = self._columns[steps.STEP]._replace(values=file[steps.STEP][:])
                     self._columns = {**self._columns, steps.STEP: column}

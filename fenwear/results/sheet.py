@@ -33,7 +33,7 @@ from fenwear.results.zone import without_noise
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
-SHARES = {"": 0.01, "_5": 0.05}  # of the largest depth, where widths are read, and how their names end
+SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end
 ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and width differ by a tenth at most
 PLACES = {**{axis: axis for axis in "rxyz"}, "across": "place across the sliding"}
 WEAR_RATE = "mm3/(N m)"
@@ -89,7 +89,7 @@ OF_A_BODY: dict[str, Variable] = {
         WEAR_RATE,
         "specific wear rate of the {body} from the start, over the sliding of the pressure: that of the law",
     ),
-    "max_wear": (("half_cycle",), "mm", "largest worn depth of the {body} at the end of the half-cycle"),
+    "largest_depth": (("half_cycle",), "mm", "largest worn depth of the {body} at the end of the half-cycle"),
 }
 
 
@@ -113,8 +113,9 @@ def variables(placed: ContactSetup) -> dict[str, Variable]:
 def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, Variable]:
     """Return the variables of a scar: where it is deepest, and its extents by their names."""
     found: dict[str, Variable] = {
-        f"max_wear_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {PLACES[axis]}")
-        for axis in along
+        f"largest_depth_at_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {place}")
+        for axis, place in PLACES.items()
+        if axis in along
     }
     way = "along the contact" if along == ("x",) else "across the sliding"
     texts = {"length": "along the sliding", "width": way}
@@ -176,8 +177,8 @@ def values(block: Block) -> dict[str, Array]:
             "mean_wear_rate": 1e3 * _over(volume, totals.of("load_distance")),
             "law_wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
             "mean_law_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
-            "max_wear": depth.max(axis=1),
-            **{f"max_wear_{axis}": x[deepest] for axis, x in places(system, surface, geometry).items()},
+            "largest_depth": depth.max(axis=1),
+            **{f"largest_depth_at_{axis}": x[deepest] for axis, x in places(system, surface, geometry).items()},
             **{
                 f"scar_{name}{at}": extent
                 for at, share in SHARES.items()
@@ -236,9 +237,9 @@ LINES = {
     **{
         f"{name}_{unit}": Line(f"largest temperature {when}", shown)
         for unit, shown in (("K", "K"), ("degC", "°C"))
-        for name, when in (("max_temperature", "at the end"), ("largest_temperature", "over the run"))
+        for name, when in (("largest_temperature", "at the end"), ("largest_temperature_of_run", "over the run"))
     },
-    "largest_temperature_half_cycle": Line("... in half-cycle", ""),
+    "largest_temperature_of_run_half_cycle": Line("... in half-cycle", ""),
     "heat_mJ.friction": Line("heat of friction in the last half-cycle", "J", 1e-3),
     "heat_mJ.debris": Line("... carried off by debris", "J", 1e-3),
     "heat_mJ.stored": Line("... gained by the bodies", "J", 1e-3),
@@ -278,7 +279,6 @@ LINES = {
     "largest_debris_thickness_mm": Line("... thickness, largest", "µm", 1e3),
     "mean_way_of_cycle_mm": Line("way slid in a cycle, mean", "mm"),
     "largest_way_of_cycle_mm": Line("... largest", "mm"),
-    "largest_pressure_of_cycle_MPa": Line("largest pressure in the last cycle", "MPa"),
     "worn_area_mm2": Line("worn area", "mm²"),
     "worn_volume_mm3": Line("worn volume", "mm³"),
     "worn_mass_mg": Line("worn mass", "mg"),
@@ -303,17 +303,17 @@ LINES = {
     "layer_creep_volume_mm3": Line("crept volume of the layer", "mm³"),
     "largest_layer_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
-    **{f"at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
+    **{f"largest_depth_at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
     **{
-        f"scar_{name}_{100 * share:g}_percent_mm": Line(f"scar {words} at {100 * share:g} % of the depth", "mm")
+        f"scar_{name}{end}_mm": Line(f"scar {words} at {100 * share:g} % of the depth", "mm")
         for name, words in (("length", "length (along the sliding)"), ("width", "width"), (ROUND, "diameter"))
-        for share in SHARES.values()
+        for end, share in SHARES.items()
     },
 }
 OF_CONTACT = {
-    "max_pressure_MPa": Line("largest pressure", "MPa"),
-    **{f"max_pressure_at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
-    "pressure_beside_max_MPa": Line("mean of the nodes beside it", "MPa"),
+    "largest_pressure_MPa": Line("largest pressure", "MPa"),
+    **{f"largest_pressure_at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
+    "pressure_beside_largest_MPa": Line("mean of the nodes beside it", "MPa"),
     "contact_width_mm": Line("width in contact", "mm"),
     "contact_area_mm2": Line("area in contact", "mm²"),
     "nodes_across_contact": Line("nodes across the contact", ""),
@@ -328,13 +328,9 @@ OF_SUMMARY = {
     "wear_rate_mm3_per_N_m": "wear_rate",
     "mean_law_wear_rate_mm3_per_N_m": "mean_law_wear_rate",
     "law_wear_rate_mm3_per_N_m": "law_wear_rate",
-    "largest_depth_mm": "max_wear",
-    **{f"at_{axis}_mm": f"max_wear_{axis}" for axis in PLACES},
-    **{
-        f"scar_{name}_{100 * share:g}_percent_mm": f"scar_{name}{end}"
-        for name in ("length", "width")
-        for end, share in SHARES.items()
-    },
+    "largest_depth_mm": "largest_depth",
+    **{f"largest_depth_at_{axis}_mm": f"largest_depth_at_{axis}" for axis in PLACES},
+    **{f"scar_{name}{end}_mm": f"scar_{name}{end}" for name in ("length", "width") for end in SHARES},
 }
 
 
@@ -371,7 +367,7 @@ def sheet(last: Block) -> dict[str, Any]:
 
 def _diameters(own: Mapping[str, float]) -> dict[str, float]:
     """Return the diameters of a scar that is as long as it is wide, within a tenth: the means of both, mm."""
-    keys = [f"scar_{{}}_{100 * share:g}_percent_mm" for share in SHARES.values()]
+    keys = [f"scar_{{}}{end}_mm" for end in SHARES]
     both = {key.format(ROUND): [own.get(key.format(name), 0.0) for name in ("length", "width")] for key in keys}
     return {key: sum(one) / 2 for key, one in both.items() if 0 < max(one) <= NEARLY * min(one)}
 
@@ -421,7 +417,7 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     """Return the sheet of a summary as lines for people."""
     rows, names = sheet_rows(summary), Names(**summary.get("names", {}))
     bodies = [names.by_roles[body] for body in BODIES if body in summary]
-    ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "max_pressure_MPa" in one]
+    ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "largest_pressure_MPa" in one]
     uncertain = [summary.get(UNCERTAINTY, {}).get(way, {}) for way in ways]
     contact = []
     for key, line in OF_CONTACT.items():

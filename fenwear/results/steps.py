@@ -252,5 +252,5 @@ def extremes(block: Block) -> dict[str, float]:
 def hottest(block: Block, heat: BlockHeat) -> Array:
     """Return the largest temperature of each half-cycle of a block (k,), K: of its time steps, or at its end."""
     if not block.system.sticks:
-        return heat.max_temperature
+        return heat.largest_temperature
     return np.array([one.records.temperature.max() for one in steps_of(block)])

@@ -18,8 +18,8 @@ from fenwear.results.shakedown import shakedown_limit
 from fenwear.results.zone import ContactNet, contact_net, without_noise
 from fenwear.versions import versions
 
-# Over a run, and when; at its end it is max_temperature.
-HOTTEST, HOTTEST_AT = "largest_temperature", "largest_temperature_half_cycle"
+# Over a run, and when; at its end it is largest_temperature.
+HOTTEST, HOTTEST_AT = "largest_temperature_of_run", "largest_temperature_of_run_half_cycle"
 
 
 def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
         **{
             system.direction_words[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
-                "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
+                "largest_pressure_MPa": float(last.largest_pressure[-phases:][i]),
                 "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
                 **net.numbers(last.pressure[-phases:][i]),
                 "contact_width_mm": float(last.contact_width[-phases:][i]),
@@ -103,7 +103,7 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
         **{
             system.direction_words[int(d)]: {
                 "half_cycle": int(number),
-                "max_pressure_MPa": float(pressure.max()),
+                "largest_pressure_MPa": float(pressure.max()),
                 "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),
                 **net.numbers(np.asarray(pressure)),
                 "contact_area_mm2": float(area),
@@ -123,7 +123,7 @@ def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str,
             f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
         }
     return {
-        f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
+        f"largest_temperature_{degrees.unit}": float(heat.largest_temperature[-1]) - degrees.zero,
         f"{HOTTEST}_{degrees.unit}": hottest - degrees.zero,
         **along,
         "heat_mJ": dict(zip((*TERMS, *CROSSING), heat.terms[-1].tolist(), strict=True)),

@@ -98,8 +98,8 @@ class ContactNet:
         weights = self.surface.weights[near]
         place = without_noise(self.surface.x[node], self.surface.extent())
         return {
-            **{f"max_pressure_at_{axis}_mm": float(x) for axis, x in zip(self.axes, place, strict=False)},
-            "pressure_beside_max_MPa": float(weights @ pressure[near] / weights.sum()),
+            **{f"largest_pressure_at_{axis}_mm": float(x) for axis, x in zip(self.axes, place, strict=False)},
+            "pressure_beside_largest_MPa": float(weights @ pressure[near] / weights.sum()),
             **(
                 {}
                 if found is None

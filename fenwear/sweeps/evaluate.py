@@ -58,8 +58,8 @@ MEANINGS = {
     "shape": Meaning(("node",), "mm", "worn shape without the rigid motion of the punch"),
     "wear_per_cycle": Meaning(("node",), "mm", "depth worn off both bodies in a cycle"),
     "wear": Meaning(("node",), "mm", "worn depth of the punch"),
-    "largest_wear": Meaning((), "mm", "largest worn depth of the punch"),
-    "largest_wear_strip": Meaning((), "mm", "largest worn depth of the strip"),
+    "largest_depth": Meaning((), "mm", "largest worn depth of the punch"),
+    "largest_depth_strip": Meaning((), "mm", "largest worn depth of the strip"),
     "worn_volume": Meaning((), "mm3", "volume worn off the punch"),
     "worn_volume_strip": Meaning((), "mm3", "volume worn off the strip"),
     "stick_size": Meaning((), SIZE, "size that sticks all through the cycle"),
@@ -138,11 +138,11 @@ def _final_shape(system: Tribosystem) -> Values:
         "contact_size": (pressure > 0) @ system.pair.weights,
         "stick_size": np.array(found.size),
         "wear": found.worn.punch,
-        "largest_wear": np.array(found.worn.punch.max()),
+        "largest_depth": np.array(found.worn.punch.max()),
         "worn_volume": np.array(system.bodies.punch.thickness * float(system.pair.weights @ found.worn.punch)),
     }
     if system.strip_wears:
-        values["largest_wear_strip"] = np.array(found.worn.strip.max())
+        values["largest_depth_strip"] = np.array(found.worn.strip.max())
         volume = system.bodies.punch.thickness * float(system.pair.strip.weights @ found.worn.strip)
         values["worn_volume_strip"] = np.array(volume)
     if found.temperature is not None:
@@ -200,13 +200,13 @@ def _run(system: Tribosystem) -> Values:
         "mean_pressure": np.array(last.system.rigid.mean_pressure * last.load_factor[-1]),
         "contact_size": (pressure > 0) @ last.system.pair.weights,
         "wear": last.wear[-1],
-        "largest_wear": last.wear[-1].max(),
+        "largest_depth": last.wear[-1].max(),
         "worn_volume": last.totals.of("volume_punch")[-1],
         "half_cycles": np.array(float(last.half_cycle[-1])),
         "periodicity": last.periodicity[-1],
     }
     if system.strip_wears:
-        found["largest_wear_strip"] = last.wear_strip[-1].max()
+        found["largest_depth_strip"] = last.wear_strip[-1].max()
         found["worn_volume_strip"] = last.totals.of("volume_strip")[-1]
     if last.steps:
         told = numbers(last)

@@ -21,14 +21,14 @@ SHOWN = (
     "largest_pressure",
     "contact_size",
     "lambda_F",
-    "largest_wear",
-    "largest_wear_strip",
+    "largest_depth",
+    "largest_depth_strip",
     "largest_temperature",
 )
 LINES = 7  # that can be told apart; more become a map
 FACTORS = {"mm": (1e3, "µm"), "mm/cycle": (1e3, "µm/cycle")}
 FLAT = 1e-6  # of the largest value: what differs by less is the same
-MICROMETRES = ("lambda_F", "largest_wear", "largest_wear_strip")
+MICROMETRES = ("lambda_F", "largest_depth", "largest_depth_strip")
 
 
 def sweep_figure(dataset: xarray.Dataset) -> Figure:

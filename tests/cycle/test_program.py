@@ -155,7 +155,7 @@ def test_stop_braking_slides_and_heats_as_much_as_it_stops(edited: Edited) -> No
     assert of(blocks, "time")[-1] == pytest.approx(2.4)
     assert np.all(np.diff(of(blocks, "time")) > 0)
     assert (of(blocks, "speed")[[0, -1]] == [100.0, 5.0]).all()
-    hottest = np.concatenate([block.heat.max_temperature for block in blocks])
+    hottest = np.concatenate([block.heat.largest_temperature for block in blocks])
     assert 3 < hottest.argmax() < len(hottest) - 1  # it cools while it still slides
 
 

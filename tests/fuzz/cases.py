@@ -293,7 +293,7 @@ def compute(case: Case, end: bool = False) -> None:
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")
-        if block.heat is not None and not np.isfinite(block.heat.max_temperature).all():
+        if block.heat is not None and not np.isfinite(block.heat.largest_temperature).all():
             raise NoResultError("temperatures not finite")
         if min(block.pressure.min(), block.worn_area_increment.min(), block.worn_area_increment_strip.min()) < 0:
             raise NoResultError("negative pressure or wear")

@@ -90,7 +90,7 @@ def apart(one: xarray.Dataset, other: xarray.Dataset) -> str:
     """Return the variable in which two histories differ by more than rounding; "" where none does."""
     if one.sizes != other.sizes:
         return f"sizes {dict(one.sizes)} and {dict(other.sizes)}"
-    for name in ("pressure", "wear", "wear_strip", "friction_work", "max_temperature", "debris_thickness"):
+    for name in ("pressure", "wear", "wear_strip", "friction_work", "largest_temperature", "debris_thickness"):
         if name in one:
             scale = float(np.abs(one[name].values).max()) or 1.0
             if not np.abs(one[name].values - other[name].values).max() <= EXACT * scale:

@@ -80,7 +80,7 @@ def test_isolated_body_has_no_steady_state(assembled: Callable[..., Tribosystem]
     with pytest.raises(CaseError, match=r"heat\.convection: the punch loses heat nowhere"):
         steady_exchange(system, [9.5])
     (block,) = march(system, 4)
-    assert block.heat.max_temperature[-1] > 0
+    assert block.heat.largest_temperature[-1] > 0
 
 
 def test_the_convection_that_is_proposed_does(assembled: Callable[..., Tribosystem]) -> None:

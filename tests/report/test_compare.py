@@ -39,7 +39,7 @@ def test_numbers_are_the_summaries(folders: list[Path]) -> None:
     for k, folder in enumerate(folders):
         summary = json.loads((folder / "summary.json").read_text())
         column = {key: row[k] for key, row in found["numbers"].items()}
-        assert column["rightward.max_pressure_MPa"] == summary["rightward"]["max_pressure_MPa"]
+        assert column["rightward.largest_pressure_MPa"] == summary["rightward"]["largest_pressure_MPa"]
         assert column["wear_mm[1]"] == summary["wear_mm"][1]
         assert column["heat_mJ.friction"] == summary.get("heat_mJ", {}).get("friction")
         assert column["stop"] == summary["stop"]
@@ -67,8 +67,8 @@ def test_curves_are_the_histories(folders: list[Path], tmp_path: Path) -> None:
         np.testing.assert_allclose(shape.lines[k].get_ydata(), 1e3 * history.wear[-1], rtol=1e-12)
         np.testing.assert_array_equal(rightward.lines[k].get_ydata(), history.pressure[-2])
         np.testing.assert_array_equal(leftward.lines[k].get_ydata(), history.pressure[-1])
-        assert peak.lines[k].get_ydata()[-1] == history.max_pressure[-2:].max()
-        assert depth.lines[k].get_ydata()[-1] == history.max_wear[-1]
+        assert peak.lines[k].get_ydata()[-1] == history.largest_pressure[-2:].max()
+        assert depth.lines[k].get_ydata()[-1] == history.largest_depth[-1]
     assert [line.get_label() for line in temperature.lines] == ["hot"]
     assert len({str(line.get_linestyle()) for line in shape.lines}) == 3
     assert draw_comparison(comparison, tmp_path / "runs.pdf").read_bytes().startswith(b"%PDF")
@@ -102,7 +102,7 @@ def test_names_and_places(folders: list[Path]) -> None:
     comparison = compare(folders[:2])
     text = comparison.text()
     assert "worn volume, punch (mm³)" in text
-    assert "max_pressure_MPa" not in text
+    assert "largest_pressure_MPa" not in text
     assert "wear_mm" not in text
     (row,) = [
         row for name, row in comparison.named()["at the same places"].items() if name.endswith("µm) at x = 15 mm")

@@ -46,7 +46,7 @@ def _lines(ax: Axes) -> dict[int, np.ndarray]:
 
 
 def _expected(history: xarray.Dataset) -> set[str]:
-    hot = {"temperature", "heat_balance"} if "max_temperature" in history else set()
+    hot = {"temperature", "heat_balance"} if "largest_temperature" in history else set()
     return SHOWN | {"mean_pressure"} | hot
 
 
@@ -85,10 +85,10 @@ def test_curves_along_the_contact_are_the_history(history: xarray.Dataset) -> No
 
 def test_curves_over_the_half_cycles_are_the_history(history: xarray.Dataset) -> None:
     """Each panel shows its variable, a line per direction."""
-    hot = ("max_temperature",) if "max_temperature" in history else ()
+    hot = ("largest_temperature",) if "largest_temperature" in history else ()
     directions = [d for d in (1, -1) if (history.direction == d).any()]
     for figure, names in (
-        (peak_figure(history), ("max_pressure", "contact_width", *hot)),
+        (peak_figure(history), ("largest_pressure", "contact_width", *hot)),
         (convergence_figure(history), ("periodicity", "optimum_distance")),
     ):
         assert len(figure.axes) == len(names)

@@ -339,7 +339,7 @@ def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], li
     assert len(figure.axes) == lines + 2
     assert all(len(ax.get_lines()) == 2 for ax in figure.axes if "strip" not in ax.get_title("left"))
     assert draw_comparison(found, tmp_path / "both.png").stat().st_size > 10_000
-    assert "counterclockwise.max_pressure_MPa" in found.numbers
+    assert "counterclockwise.largest_pressure_MPa" in found.numbers
 
 
 @pytest.mark.parametrize("sides", [(100.0, 40.0, 12.0), (4.0, 4.0, 1.6), (1.0, 1.0, 9.0)])

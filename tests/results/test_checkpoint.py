@@ -70,7 +70,7 @@ def test_another_number_of_ranks(fenwear: Run, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
     fenwear("run", "example1-heat", "-o", str(tmp_path / "one"), *options("run.half_cycles=50"))
     one, two = history(tmp_path / "one"), history(tmp_path / "two")
-    for name in ("max_pressure", "max_temperature", "worn_area_increment"):
+    for name in ("largest_pressure", "largest_temperature", "worn_area_increment"):
         np.testing.assert_allclose(two[name], one[name], rtol=1e-9)
 
 

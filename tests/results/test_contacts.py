@@ -57,8 +57,8 @@ def test_each_contact_has_its_own(tmp_path: Path) -> None:
     assert sum(volumes) == pytest.approx(summary["punch"]["worn_volume_mm3"], rel=1e-12)
     assert volumes[1] == pytest.approx(3 * volumes[0], rel=1e-9)  # k F s
     assert right["punch"]["largest_depth_mm"] == summary["punch"]["largest_depth_mm"]
-    assert [one["punch"]["scar_width_1_percent_mm"] for one in (left, right)] == pytest.approx([2, 2])
-    assert left["punch"]["at_x_mm"] <= 2 < 4 <= right["punch"]["at_x_mm"]
+    assert [one["punch"]["scar_width_mm"] for one in (left, right)] == pytest.approx([2, 2])
+    assert left["punch"]["largest_depth_at_x_mm"] <= 2 < 4 <= right["punch"]["largest_depth_at_x_mm"]
     with xarray.open_dataset(tmp_path / "run" / "history.nc", engine="h5netcdf") as history:
         np.testing.assert_array_equal(history.contact, history.x > 3)
         np.testing.assert_array_equal(history.part, history.x > 3)

@@ -107,7 +107,7 @@ def test_summary_and_case(tmp_path: Path) -> None:
     rightward = summary["rightward"]
     assert isinstance(rightward, dict)
     assert rightward["half_cycle"] == 5
-    assert rightward["max_pressure_MPa"] == history.max_pressure.values[-2] == history.pressure.values[-2].max()
+    assert rightward["largest_pressure_MPa"] == history.largest_pressure.values[-2] == history.pressure.values[-2].max()
     middle = int(np.abs(history.x.values).argmin())
     assert summary["wear_mm"][1] == pytest.approx(float(history.wear[-1, middle]), rel=1e-12)  # type: ignore[index]
     assert summary["x_mm"] == pytest.approx([-15, 0, 15])

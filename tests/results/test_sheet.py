@@ -64,8 +64,8 @@ def test_volume_is_k_f_s(assembled: Assemble, every: str) -> None:
     # beta~ p ds is worn where mu p ds is dissipated.
     np.testing.assert_allclose(found["dissipated_energy"], MU / K * block.wear[-1], rtol=1e-9)
     deepest = int(np.argmax(block.wear[-1]))
-    assert found["max_wear"] == block.wear[-1].max()
-    assert found["max_wear_x"] == pytest.approx(system.pair.x[deepest], abs=1e-9)
+    assert found["largest_depth"] == block.wear[-1].max()
+    assert found["largest_depth_at_x"] == pytest.approx(system.pair.x[deepest], abs=1e-9)
     assert found["scar_width"] == pytest.approx(60, rel=1e-12)
 
 
@@ -194,7 +194,7 @@ def test_turning_strip(assembled: Assemble) -> None:
     np.testing.assert_allclose(found["friction_torque"], mu * force @ radius, rtol=1e-9)
     assert found["friction_work"][-1] == pytest.approx(mu * path, rel=1e-12)
     assert "worn_area" not in variables(system)
-    assert {"scar_width", "scar_length_5", "max_wear_y"} <= set(variables(system))
+    assert {"scar_width", "scar_length_5_percent", "largest_depth_at_y"} <= set(variables(system))
 
 
 @pytest.mark.mpi

@@ -74,8 +74,8 @@ def test_history(tmp_path: Path, name: str) -> None:
     }[name]  # fmt: skip
     np.testing.assert_allclose(data.worn_volume_increment, slid, rtol=1e-9)
     assert summary["punch"]["worn_volume_mm3"] == pytest.approx(float(data.worn_volume_increment.sum()), rel=1e-9)
-    np.testing.assert_array_equal(data.max_wear, data.wear.max("node"))
-    assert summary["punch"]["largest_depth_mm"] == data.max_wear[-1]
+    np.testing.assert_array_equal(data.largest_depth, data.wear.max("node"))
+    assert summary["punch"]["largest_depth_mm"] == data.largest_depth[-1]
     worn = data.wear[-1] > EDGE * data.wear[-1].max()
     across = data.r if "r" in data else data.across
     reach = np.ptp(across.values[worn.values])

@@ -120,7 +120,7 @@ def test_partial_slip_is_swept_like_sliding() -> None:
         assert float(found["worn_volume"][k]) == pytest.approx(float(alone[-1].totals.of("volume_punch")[-1]), rel=1e-9)
     assert found["stick_size"][0] < found["stick_size"][1]
     ends = package.sweep(case, friction, of="steady")
-    assert ends["largest_wear"][0] > ends["largest_wear"][1] > 0
+    assert ends["largest_depth"][0] > ends["largest_depth"][1] > 0
     open_law = load_case("fretting-partial-slip", [small[0], *small[3:]])
     laws = package.sweep(open_law, {"contact.law": ["coulomb", "gross-sliding"]}, of="run")
     assert laws["worn_volume"][0] < 0.7 * laws["worn_volume"][1], "what sticks does not wear"

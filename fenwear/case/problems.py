@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from fenwear.case.keys import all_keys
 from fenwear.case.laws import Dependence
+from fenwear.case.removed import replacement
 from fenwear.case.schema import Case, part_models
 from fenwear.case.units import shown
 from fenwear.errors import InputError
@@ -34,6 +35,10 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noq
     key = _key(error["loc"], data, missing=error["type"] == "missing")
     message = str(error["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
     got = f", got {shown(error['input'])}"
+    if error["type"] in ("extra_forbidden", "literal_error"):
+        advice = replacement(key, error["input"])
+        if advice is not None:
+            return [InputError(key, f"removed. {advice}")]
     match error["type"]:
         case "extra_forbidden":
             return [InputError(key, f"unknown key{_suggestion(error['loc'])}")]

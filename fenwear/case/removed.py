@@ -1,0 +1,25 @@
+"""Keys and words that a case file no longer has, and what takes the place of each.
+
+One table for the whole package: a key as a case file writes it, with `*` for a name or number that the user chose, or
+`key = word` where the key stays and one of its words went.
+"""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+REMOVED: dict[str, str] = {}
+
+
+def replacement(key: str, word: object = None) -> str | None:
+    """Return what to do in place of a removed key, or of one of its words; None where neither was removed.
+
+    Args:
+        key: Its path in the case file.
+        word: The value that it was given.
+    """
+    for asked in (key, f"{key} = {word}"):
+        for pattern, advice in REMOVED.items():
+            if fnmatchcase(asked, pattern):
+                return advice
+    return None

@@ -33,7 +33,6 @@ class Foundation:
     directions: Array
     flexibility: Array
     by_temperature: None = None  # it does not expand
-    kept: None = None  # every rank has all of it
 
     @property
     def by_load(self) -> Array:

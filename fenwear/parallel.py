@@ -11,12 +11,10 @@ where `release` is called.
 from __future__ import annotations
 
 import io
-import math
 import pickle
 import time
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -90,38 +88,6 @@ def release(comm: MPI.Comm) -> None:
     all_together(comm)
     if comm.size > 1:
         PETSc.garbage_cleanup(lasting(comm))
-
-
-@dataclass(frozen=True)
-class Rows:
-    """A run of rows for each rank, of a matrix or of vectors that are too large for every rank to have them all.
-
-    Attributes:
-        comm: The ranks.
-        starts: First row of each rank, and the number of all (ranks + 1,).
-    """
-
-    comm: MPI.Comm
-    starts: NDArray[np.int64]
-
-    @classmethod
-    def equal(cls, comm: MPI.Comm, size: int) -> Rows:
-        """Return as many rows of `size` for each rank as for the others, or one less."""
-        return cls(comm, size * np.arange(comm.size + 1, dtype=np.int64) // comm.size)
-
-    @property
-    def own(self) -> slice:
-        """The rows of this rank."""
-        first, last = self.starts[self.comm.rank : self.comm.rank + 2]
-        return slice(int(first), int(last))
-
-    def gathered(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return all rows (size, ...) from this rank's own, the same on every rank; collective."""
-        all_together(self.comm)
-        whole = np.empty((int(self.starts[-1]), *part.shape[1:]))
-        counts: Any = np.diff(self.starts) * math.prod(part.shape[1:])
-        self.comm.Allgatherv(np.ascontiguousarray(part), (whole, counts))
-        return whole
 
 
 class Team:

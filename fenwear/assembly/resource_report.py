@@ -8,7 +8,6 @@ from dataclasses import replace
 from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.resources import BodyResources, Resources, duration
-from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.condensation import deal
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.schur import available
@@ -29,15 +28,7 @@ def resources_text(placed: ContactSetup, wanted: Resources) -> list[str]:
         placed: The bodies.
         wanted: What they need in all.
     """
-    lines = body_lines(placed.bodies, wanted)
-    rows = shared_rows(placed)
-    if rows is not None:
-        whole = wanted.contact
-        lines.append(
-            f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
-            f"{memory_size(whole / rows.comm.size)} each"
-        )
-    return lines
+    return body_lines(placed.bodies, wanted)
 
 
 def body_lines(bodies: Bodies, wanted: Resources) -> list[str]:

@@ -228,13 +228,12 @@ def _contact(nodes: float, interfaces: int, dim: int, phases: int) -> float:
     return NUMBER * (interfaces * dim + 2 * phases + 1) * nodes**2
 
 
-def needs(placed: ContactSetup, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Resources:
+def needs(placed: ContactSetup, frames: tuple[bool, bool, bool]) -> Resources:
     """Return what condensing the bodies and joining them will need; collective.
 
     Args:
         placed: The bodies opposite each other.
         frames: Whether the strip moves as a whole, whether the contact frame stays, and whether the strip is flat.
-        shared: Whether ranks share the rows of the contact.
     """
     moves, fixed, flat = frames
     bodies, pair = placed.bodies, placed.pair
@@ -243,7 +242,7 @@ def needs(placed: ContactSetup, frames: tuple[bool, bool, bool], *, shared: bool
     of_punch = body_resources(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
     of_strip = body_resources(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
-    copies, numbers = 1 if shared else placed.comm.size, condensed(bodies)
+    copies, numbers = placed.comm.size, condensed(bodies)
     return Resources(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), copies, numbers)
 
 

@@ -8,7 +8,6 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array, hstack
 
@@ -17,13 +16,12 @@ from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.creep import Creep, creep_of
 from fenwear.assembly.grids import check_felt
-from fenwear.assembly.resources import Resources, contact_memory, needs
+from fenwear.assembly.resources import Resources, needs
 from fenwear.assembly.solver_choice import choose_solvers, chosen, free_on_ranks
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import Relocatable, SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
-from fenwear.case import CONDENSED
 from fenwear.case.names import told_by_name
 from fenwear.case.program import speeds_of
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
@@ -32,15 +30,12 @@ from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
-from fenwear.interface import Interface, RigidEquilibrium, join
-from fenwear.memory import GIB
-from fenwear.parallel import Rows, all_together, lasting
+from fenwear.interface import Interface, RigidEquilibrium
+from fenwear.parallel import all_together
 from fenwear.sliding.wear import WornDepths
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
-SHARED = 2 * GIB  # of the whole contact, from which on ranks share the rows of its compliance
-COPIES = 4  # times as much as all ranks together may take for a contact that each has whole
 CARRIED = 1e-6  # of the loads: what the contact carries by rounding
 SAME = 1e-12  # of the largest load: what of another is rounding
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
@@ -54,7 +49,6 @@ class Condensed:
         punch: Onto the contact nodes.
         strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
         strip_moves: Which of the two.
-        rows: Of the contact nodes on each rank, where ranks share what both answer; None where every rank has all.
         passed: What each kelvin of this rank's nodes moves the strip's surface along its normal at the trace nodes of
             its passage (q, owned), mm/K, where it conducts and passes under the punch.
     """
@@ -62,13 +56,12 @@ class Condensed:
     punch: SurfaceOperator
     strip: SurfaceOperator
     strip_moves: bool
-    rows: Rows | None = None
     passed: Array | None = None
 
     def join(self, rigid: RigidEquilibrium, layer: Array | None = None) -> Interface:
-        """Return both joined at the place of a pair, with a linear layer; collective where ranks share the rows."""
+        """Return both joined at the place of a pair, with a linear layer."""
         strip, moves = self.facing(rigid)
-        return join(rigid, self.punch, strip, strip_moves=moves, rows=self.rows, layer=layer)
+        return Interface(rigid, self.punch, strip, moves, layer=layer)
 
     def facing(self, rigid: RigidEquilibrium) -> tuple[SurfaceOperator, bool]:
         """Return how the strip answers at the place of a pair, and whether it moves as a whole: not on a grid."""
@@ -119,14 +112,6 @@ class Tribosystem(ContactSetup):
             Exception: what `function` raised, on every rank.
         """
         return self.team.lead(function) if self.replicated else function()
-
-    def led_whole(self, function: Callable[[], T]) -> T:
-        """Call what takes the whole compliance, on rank 0 for all, but where ranks share its rows; collective.
-
-        Raises:
-            Exception: what `function` raised, on every rank.
-        """
-        return function() if self.condensed.rows else self.team.lead(function)
 
     def contact(self, directions: Sequence[int]) -> ContactSolver:
         """Return the contact in the middle position under the mean loads.
@@ -228,7 +213,7 @@ def resources_of(placed: ContactSetup, free: float | None = None) -> Resources:
 
 
 def _needs_as_is(placed: ContactSetup) -> Resources:
-    return needs(placed, _frame(placed), shared=shared_rows(placed) is not None)
+    return needs(placed, _frame(placed))
 
 
 def elastic(placed: ContactSetup, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
@@ -271,16 +256,14 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False, free: float | 
         ]
     # In one frame, forces and displacements along its normals are all that is ever asked for.
     moves, fixed, flat = _frame(placed)
-    rows = shared_rows(placed)
-    of_punch, of_strip = _kept(placed, rows, moves=moves)
-    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0], of_punch)
+    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
     if moves:
         trace = middle.strip.trace
         along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
-        onto_strip = Request(bodies.strip, identity(len(trace)), along, couplings[1], of_strip)
+        onto_strip = Request(bodies.strip, identity(len(trace)), along, couplings[1])
     else:
         opposite = csr_array(middle.transfer.T)
-        onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1], of_strip)
+        onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1])
     if placed.passage is not None:
         onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
     punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
@@ -289,9 +272,9 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False, free: float | 
         if coupling is not None:
             coupling.destroy()
     if placed.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
-        return Condensed(punch, strip, moves, rows)
+        return Condensed(punch, strip, moves)
     n = len(middle.weights)
-    return Condensed(punch, strip.first(n), moves, rows, strip.by_temperature[n:])
+    return Condensed(punch, strip.first(n), moves, strip.by_temperature[n:])
 
 
 def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> Request:
@@ -302,34 +285,6 @@ def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> 
     picked = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(strip.trace), len(nodes)))
     patterns = csr_array(hstack([request.patterns, picked]))
     return replace(request, patterns=patterns, directions=np.vstack([request.along[:, :, 0], outward[nodes]]))
-
-
-def shared_rows(placed: ContactSetup) -> Rows | None:
-    """Return the contact nodes whose rows of the compliance each rank has; None where every rank has all.
-
-    Ranks share what takes much memory: half-cycles in which many nodes touch go faster with one factor on one rank.
-    What heat and the contact on all displacements make of a compliance is whole.
-    """
-    comm, taken = placed.comm, contact_memory(placed)
-    alone = comm.size == 1 or placed.bodies.punch.setup.reproducible
-    both = (placed.bodies.punch, placed.bodies.strip)
-    alone = alone or any(body.operator != CONDENSED or body.creep is not None for body in both)
-    if alone or placed.heat is not None or placed.solver != "condensed":
-        return None
-    if taken < SHARED and taken * comm.size < COPIES * SHARED:
-        return None
-    return Rows.equal(lasting(comm), len(placed.pair.weights))
-
-
-def _kept(placed: ContactSetup, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np.int64] | None, ...]:
-    """Return the patterns of punch and strip whose columns this rank's rows are made from; None for all."""
-    if rows is None:
-        return None, None
-    nodes = np.arange(rows.own.start, rows.own.stop)
-    if not moves:
-        return nodes, nodes
-    below = [csr_array(pair.transfer[rows.own]).indices for pair in (placed.pair, *placed.pairs)]
-    return nodes, np.unique(np.concatenate(below)).astype(np.int64)
 
 
 def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
@@ -353,7 +308,7 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
 
     def on_material(phase: int) -> Interface:
         own, bodies = interfaces[phase], under[id(placed.loaded[phase])]
-        return own if own.strip is bodies.strip else join(own.rigid, bodies.punch, bodies.strip, strip_moves=True)
+        return own if own.strip is bodies.strip else Interface(own.rigid, bodies.punch, bodies.strip, strip_moves=True)
 
     creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
     return Tribosystem(
@@ -416,17 +371,13 @@ def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
     return chosen, np.linalg.lstsq(whole[:, chosen], whole, rcond=None)[0]
 
 
-def answers_for(condensed: Condensed, before: ContactSetup, placed: ContactSetup) -> bool:
-    """Return whether bodies condensed for one motion answer for another one, too; collective."""
+def answers_for(before: ContactSetup, placed: ContactSetup) -> bool:
+    """Return whether bodies condensed for one motion answer for another one, too."""
     frame = _frame(placed)
     if _frame(before) != frame:
         return False
     first, second = (np.zeros(0) if one.passage is None else one.passage.nodes for one in (before, placed))
-    if not np.array_equal(first, second):
-        return False
-    have = condensed.strip.kept
-    _, needed = _kept(placed, condensed.rows, moves=frame[0])
-    return bool(placed.comm.allreduce(have is None or needed is None or np.isin(needed, have).all(), op=MPI.LAND))
+    return np.array_equal(first, second)
 
 
 def _frame(placed: ContactSetup) -> tuple[bool, bool, bool]:

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -35,17 +34,14 @@ LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept bes
 class CondensedBody:
     """A body condensed onto q patterns of force on its contact surface, per thickness, the same on every rank.
 
-    Where ranks share the columns of a response that is too large for each, a rank has those that it was asked to keep.
-
     Attributes:
         patterns: Share of each trace node in a unit force (N, q).
         directions: Along which each pattern was solved for (q, d, a): one direction, or all d axes.
-        response: Displacement at each pattern from a unit force of each pattern, or of those that this rank has,
-            along each of its directions (q, d, k, a), mm per N/mm.
+        response: Displacement at each pattern from a unit force of each pattern along each of its directions
+            (q, d, k, a), mm per N/mm.
         by_load: Displacement at each pattern from the body's loads (q, d), mm.
         by_temperature: Displacement of each pattern along its one direction from the temperature of this
             rank's own nodes (q, owned), mm/K; None without heat. It differs between ranks.
-        kept: Patterns whose columns this rank has, ascending (k,); None for all.
     """
 
     patterns: csr_array
@@ -53,7 +49,6 @@ class CondensedBody:
     response: Array
     by_load: Array
     by_temperature: Array | None = None
-    kept: NDArray[np.int64] | None = None
 
     def arrays(self) -> dict[str, Array]:
         """Return what was solved for, by its name."""
@@ -61,7 +56,7 @@ class CondensedBody:
         return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
     def first(self, count: int) -> CondensedBody:
-        """Return the body condensed onto its first patterns alone, of those that it has all of."""
+        """Return the body condensed onto its first patterns alone."""
         warm = None if self.by_temperature is None else self.by_temperature[:count]
         answers = self.response[:count, :, :count]
         return CondensedBody(self.patterns[:, :count], self.directions[:count], answers, self.by_load[:count], warm)
@@ -72,7 +67,7 @@ class CondensedBody:
         return None
 
     def apply(self, forces: Array) -> Array:
-        """Return the displacements (q, a, ...) of forces (q, d, ...): of the patterns that it has the columns of.
+        """Return the displacements (q, a, ...) of forces (q, d, ...).
 
         By Maxwell and Betti the displacement at a pattern is the work of a force there.
         """
@@ -147,7 +142,7 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
     computed = iter(_condensed([one for one, found in zip(requests, stored, strict=True) if found is None]))
     condensed = []
     for one, key, found in zip(requests, keys, stored, strict=True):
-        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found, kept=one.kept)
+        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found)
         if found is None:
             kept.save(comm, key, body.arrays())
         condensed.append(body)
@@ -173,10 +168,9 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     for one, (response, warm), load in zip(requests, found, loads, strict=True):
         q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
         answers, by_temperature = _guided(one, response.reshape(q, d, -1, along.shape[2]), warm)
-        if one.kept is None:
-            answers = _symmetric(answers, along)
+        answers = _symmetric(answers, along)
         by_load = one.patterns.T @ load
-        condensed.append(CondensedBody(one.patterns, along, answers, by_load, by_temperature, one.kept))
+        condensed.append(CondensedBody(one.patterns, along, answers, by_load, by_temperature))
         if by_temperature is not None and entries(one.elastic.size, d) > LARGE:
             one.elastic.free_factor()
     return condensed
@@ -188,9 +182,7 @@ def _guided(one: Request, response: Array, by_temperature: Array | None) -> tupl
     if answer is None:
         return response, by_temperature
     rotations, moved = (one.seen(fields) for fields in (answer.rotations_there, answer.moved_there))
-    along = one.along if one.kept is None else one.along[one.kept]
-    of_columns = slice(None) if one.kept is None else one.kept
-    couple, work = (np.einsum("kdg,kda->gka", seen[of_columns], along) for seen in (rotations, moved))
+    couple, work = (np.einsum("kdg,kda->gka", seen, one.along) for seen in (rotations, moved))
     flat = [each.reshape(len(each), -1) for each in (couple, work)]
     response = response + answer.change(rotations, moved, flat[0], flat[1]).reshape(response.shape)
     if by_temperature is not None and one.thermal_coupling is not None:

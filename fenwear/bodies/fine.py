@@ -62,7 +62,6 @@ class FineBody:
     unresolved: float
     loaded: Array
     by_temperature: Array | None = None
-    kept: NDArray[np.int64] | None = None
 
     @property
     def directions(self) -> Array:

@@ -70,7 +70,6 @@ class HalfSpace:
     depth: float = np.inf
     along: Array | None = None
     by_temperature: Array | None = None
-    kept: NDArray[np.int64] | None = None
 
     @property
     def dim(self) -> int:

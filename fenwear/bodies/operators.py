@@ -14,9 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, Self, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.condensation import condense_together
 from fenwear.bodies.elasticity import ElasticBody
@@ -38,7 +35,6 @@ class SurfaceOperator(Protocol):
         by_load: Displacement of each pattern by the body's loads (q, d), mm.
         by_temperature: Displacement of each pattern along its one direction from the temperature of this
             rank's own nodes (q, owned), mm/K; None without heat.
-        kept: Patterns whose rows this rank has, ascending (k,), where ranks share them; None for all.
         cost: Of a product, in numbers that memory could give meanwhile; None where the operator is numbers in memory.
     """
 
@@ -55,26 +51,21 @@ class SurfaceOperator(Protocol):
         """Displacement from temperatures (q, owned), mm/K."""
 
     @property
-    def kept(self) -> NDArray[np.int64] | None:
-        """Patterns whose rows this rank has (k,)."""
-
-    @property
     def cost(self) -> float | None:
         """Of a product."""
 
     def apply(self, forces: Array) -> Array:
-        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N/mm in the plane; of the rows kept here."""
+        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N/mm in the plane."""
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the displacements at some patterns from unit forces along the axes at others (rows, a, columns, d).
 
         Args:
-            rows: Their numbers; where ranks share rows, among those that this one keeps.
-            columns: Their numbers.
+            rows, columns: Their numbers.
         """
 
     def diagonal(self) -> Array:
-        """Return the displacements at each pattern from unit forces at itself (q, a, d); where every rank has all."""
+        """Return the displacements at each pattern from unit forces at itself (q, a, d)."""
 
     def under(self, elastic: ElasticBody) -> Self:
         """Return the same under the loads of a body that differs by them alone; collective."""

@@ -42,14 +42,12 @@ class Request:
         patterns: Share of each trace node in a unit force (N, q).
         directions: One unit vector for each pattern (q, d); None for all axes.
         thermal_coupling: G; needs one direction for each pattern.
-        kept: Patterns whose columns this rank keeps, ascending (k,); None for all on every rank.
     """
 
     elastic: ElasticBody
     patterns: csr_array
     directions: Array | None = None
     thermal_coupling: PETSc.Mat | None = None
-    kept: NDArray[np.int64] | None = None
 
     @property
     def along(self) -> Array:
@@ -67,7 +65,6 @@ class Request:
         patterns, coupling = csr_array(self.patterns), self.thermal_coupling
         values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
         setup = self.elastic.setup
-        values += [] if self.kept is None else [self.kept]
         return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
 
     def on_mesh(self) -> Request:
@@ -135,7 +132,7 @@ class _Answer:
 
     def __init__(self, request: Request) -> None:
         """Bring to the owner what it needs; collective."""
-        elastic, coupling, a = request.elastic, request.thermal_coupling, request.along.shape[2]
+        elastic, coupling = request.elastic, request.thermal_coupling
         self.request = request
         self.factor = elastic.begin_substructures() if request.in_substructures else elastic.factor
         self.comm: MPI.Comm = self.factor.comm
@@ -143,7 +140,7 @@ class _Answer:
         held[elastic.supported] = 1.0
         self._held = elastic.trace.pick(held[:, None])[:, :, 0].ravel() > 0
         count = request.count
-        whole = request.by_surface and not self.factor.is_spread and request.kept is None
+        whole = request.by_surface and not self.factor.is_spread
         self.blocks: list[Columns] = (
             [np.arange(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK)]
             if not whole
@@ -155,11 +152,7 @@ class _Answer:
             self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
             self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.holders))
         q, d = request.patterns.shape[1], elastic.dim
-        self._response: Array = np.empty((q, d, count if request.kept is None else 0))
-        self._parts: list[Array] = []  # of the response, where ranks share it
-        # Of each rank the columns that it keeps, where ranks share them.
-        mine = None if request.kept is None else (request.kept[:, None] * a + np.arange(a)).ravel()
-        self._keeping: list[Columns] | None = None if mine is None else self.comm.allgather(mine)
+        self._response: Array = np.empty((q, d, count))
         self._by_temperature: Array | None = None  # (q, owned): as large as a factor, so there once
         self._filled = 0
 
@@ -210,9 +203,7 @@ class _Answer:
 
     def _share(self, holder: int, columns: Columns, found: Found | None) -> None:
         """Keep what a rank found for a block, and give each its part of the response to temperature; collective."""
-        if self._keeping is not None:
-            self._hand_out(self._keeping, holder, columns, None if found is None else found[0])
-        elif found is not None:
+        if found is not None:
             self._response[:, :, _run(columns)] = found[0]
         if self._temperatures is None:
             return
@@ -229,22 +220,6 @@ class _Answer:
         self.comm.Scatterv(sent, own, root=holder)
         self._fill(own)
 
-    def _hand_out(self, keeping: list[Columns], holder: int, columns: Columns, found: Array | None) -> None:
-        """Give each rank what it keeps of a block's response (q, d, k); collective."""
-        rank = self.comm.rank
-        shares = [np.flatnonzero(np.isin(columns, mine)) for mine in keeping]
-        if found is not None:
-            self._parts.append(found[:, :, shares[rank]])
-            if self.factor.is_spread:  # all ranks have it
-                return
-            for other, share in enumerate(shares):
-                if other != rank and len(share):
-                    self.comm.Send(np.ascontiguousarray(found[:, :, share]), other)
-        elif len(shares[rank]):
-            part = np.empty((self.request.patterns.shape[1], self.request.elastic.dim, len(shares[rank])))
-            self.comm.Recv(part, holder)
-            self._parts.append(part)
-
     def _fill(self, warm: Array) -> None:
         """Keep this rank's part of the response to temperature for a block (owned, k)."""
         if self._by_temperature is None:
@@ -254,9 +229,7 @@ class _Answer:
         self._filled = after
 
     def gathered(self) -> tuple[Array, Array | None]:
-        """Return the response, all of it on every rank or what each keeps, and that to temperature; collective."""
-        if self._keeping is not None:
-            return np.concatenate([self._response, *self._parts], axis=2), self._by_temperature
+        """Return the response, all of it on every rank, and that to temperature; collective."""
         for number in range(self.rounds if self.comm.size > 1 else 0):
             for holder, columns in self._round(number):  # where it is spread, equal to the last bit on all ranks
                 part = np.ascontiguousarray(self._response[:, :, _run(columns)])

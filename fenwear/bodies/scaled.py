@@ -43,11 +43,6 @@ class Scaled:
         return self.operator.by_temperature
 
     @property
-    def kept(self) -> NDArray[np.int64] | None:
-        """Patterns whose rows this rank has (k,)."""
-        return self.operator.kept
-
-    @property
     def cost(self) -> float | None:
         """Of a product."""
         return self.operator.cost

@@ -27,9 +27,6 @@ from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
 from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
-from fenwear.contact.row_blocks import SpreadPhases
-from fenwear.contact.spread import DistributedBlock, OwnRows, SpreadCompliance
-from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.interface.convolution import Convolution
@@ -50,7 +47,6 @@ PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
 WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: what then changes asks for all at once
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
-LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
@@ -140,8 +136,7 @@ class CondensedContact:
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
     PETSc's absolute tolerances mean the same for every case. Phases meet in what wears in the step only: where
     there are many, one small elimination for each of them takes the place of one of all. Where nodes are
-    many, no matrix of all of them is made: see `fenwear.contact.blocks`. On several ranks rank 0 solves it; where
-    they share the rows of the interface, all help: see `fenwear.contact.spread`.
+    many, no matrix of all of them is made: see `fenwear.contact.blocks`. On several ranks rank 0 solves it.
 
     Attributes:
         blocks: Of the phases, where nodes are many.
@@ -161,7 +156,7 @@ class CondensedContact:
     ) -> None:
         """Take the phases, where to note that a contact was solved in another way than usual, and ranks that have it.
 
-        By default every rank has a contact of its own, unless they share its rows. Of one phase of few nodes no
+        By default every rank has a contact of its own. Of one phase of few nodes no
         pressure exceeds `most`, MPa: there the surfaces flow, and the gap is what they have to, below zero.
         Friction may be `following` the pressure.
         """
@@ -179,13 +174,10 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
-        self._shared = interface.rows is not None
-        self._team = team or Team.of(MPI.COMM_SELF if interface.rows is None else interface.rows.comm)
-        if self._shared:
-            self._team.serve(self)
+        self._team = team or Team.of(MPI.COMM_SELF)
         gridded = interface.pair.punch.grid is not None and interface.cost is not None
         few = WHOLE if following or most < np.inf else MANY
-        self._many = n > few or (n > SOME and m * n > TOGETHER) or self._shared or gridded
+        self._many = n > few or (n > SOME and m * n > TOGETHER) or gridded
         self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []
@@ -193,7 +185,6 @@ class CondensedContact:
         self._rigid_normals = np.array([phase.interface.rigid.rigid_normal.T for phase in self.phases])
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
-        self._spread: SpreadPhases | None = None
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
@@ -226,21 +217,13 @@ class CondensedContact:
         self.blocks = [block for block in blocks if block is not None]
         for derived in ("_grid", "_own_diagonal"):
             self.__dict__.pop(derived, None)
-        if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self.gridded:
-            self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
         interface, alone = self.phases[k].interface, len(self.phases) == 1
-        compliance, rows = interface.compliance(self._ratios[k], scale, self._tables), interface.rows
-        diagonal = compliance.diagonal()
-        if rows is None:
-            known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
-            return PhaseBlock(known, diagonal, modes, balance, iterated=alone)
-        spread = SpreadCompliance(self._team, OwnRows(rows, compliance.columns))
-        if alone:
-            return DistributedBlock(spread, diagonal, modes, balance)
-        return PhaseBlock(spread, diagonal, modes, balance, iterated=False)
+        compliance = interface.compliance(self._ratios[k], scale, self._tables)
+        known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
+        return PhaseBlock(known, compliance.diagonal(), modes, balance, iterated=alone)
 
     def press(self, factor: float) -> None:
         """Take all loads times a factor."""
@@ -250,14 +233,7 @@ class CondensedContact:
             offset[n:] = factor * phase.interface.rigid.resultant / self._resultant_scale
 
     def slide(self, ratios: Sequence[Array]) -> None:
-        """Set tau of each phase, (n, d) each; collective where ranks share the rows."""
-        if not self._shared:
-            self.take(ratios)
-            return
-        self._team.each(self, "take", self._team.lead(lambda: list(ratios)))
-
-    def take(self, ratios: Sequence[Array]) -> None:
-        """Set tau of each phase on this rank."""
+        """Set tau of each phase, (n, d) each."""
         self._mu = None
         pairs = enumerate(zip(ratios, self._ratios, strict=True))
         changed = [k for k, (ratio, before) in pairs if ratio is not before and not np.array_equal(ratio, before)]
@@ -283,12 +259,12 @@ class CondensedContact:
         """
         n = self.shape[1]
         if not self._by_mu.size:
-            self.take([bare + along])
+            self.slide([bare + along])
             whole = self._dense[0, :, :n].copy()
-            self.take([bare])
+            self.slide([bare])
             self._by_mu = whole - self._dense[0, :, :n]
         elif self._ratios[0] is not bare:
-            self.take([bare])
+            self.slide([bare])
         self._mu = mu
 
     def _following(self, x: Array) -> Operator:
@@ -351,10 +327,7 @@ class CondensedContact:
         """Return the derivative without a matrix of all nodes."""
         if self.gridded and wear is None:
             return GriddedPhases(self._grid)
-        known = before if isinstance(before, ManyNodes) else None
-        if self._spread is None or layer is not None:
-            return ManyNodes(self.blocks, wear, known, layer)
-        return SpreadNodes(self._spread, self.blocks, wear, known)
+        return ManyNodes(self.blocks, wear, before if isinstance(before, ManyNodes) else None, layer)
 
     def _as_phases(
         self,

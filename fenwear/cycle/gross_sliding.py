@@ -189,7 +189,7 @@ class GrossSliding:
         if not conducts_alike:
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
         placed = self._placed(case, bodies, sliding)
-        if not answers_for(condensed, system, placed):
+        if not answers_for(system, placed):
             condensed = condense_bodies(placed)
         elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
             condensed = condensed.under_loads(bodies)

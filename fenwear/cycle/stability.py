@@ -51,7 +51,7 @@ def growth_rate(
     """
     _check_state(system, pressure)
     system = with_reduced_heat(system)  # before rank 0 leads
-    return system.led_whole(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
+    return system.team.lead(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
 
 
 def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> Array:
@@ -62,7 +62,7 @@ def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None
     """
     _check_state(system, pressure)
     system = with_reduced_heat(system)
-    sizes = np.abs(system.led_whole(partial(_factors, system, pressure, conductances, implicit=True)))
+    sizes = np.abs(system.team.lead(partial(_factors, system, pressure, conductances, implicit=True)))
     counted = (np.abs(sizes - 1) > NEUTRAL) & (sizes > ROUNDING)
     return np.sort(np.log(sizes[counted]) / system.motion.period)[::-1]
 
@@ -144,7 +144,7 @@ def stationary_growth(
     if not change < 1:  # the same number on all ranks
         return None, "the last cycle is the first, or not like the one before"
     system = with_reduced_heat(system)
-    return system.led_whole(partial(_stationary_growth, system, pressure, surfaces, phase, change))
+    return system.team.lead(partial(_stationary_growth, system, pressure, surfaces, phase, change))
 
 
 def _stationary_growth(

@@ -200,8 +200,7 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
                 raise ConvergenceError(NO_ONE_MOTION) from error
             raise
 
-    prepared.team.serve(prepared)
-    return replace(prepared.led_whole(found), system=system)
+    return replace(prepared.team.lead(found), system=system)
 
 
 def _check_sinks(system: Tribosystem) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -16,8 +15,6 @@ from fenwear.contact.grid_shape import GridShape
 from fenwear.contact.gridded import PhasesGrid
 from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
-from fenwear.contact.row_blocks import SpreadPhases
-from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface.convolution import Convolution
@@ -33,7 +30,6 @@ DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phas
 GRAZING = 1e-7  # of the wear by the mean pressure: a motion of open nodes that leaves them where they are
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
 GRIDDED = 1000  # nodes of a grid from which on products take the place of matrices
-LARGE = 4000  # nodes from which on no matrix of them is made
 NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
 SMALL = GIB  # below which no estimate refuses anything
 STEPS = 0.1, 1.0  # wear by the mean pressure over the elastic gap, of steps from afar
@@ -99,14 +95,12 @@ class SteadyInequality:
         interfaces, scale = self.system.interfaces, self.p_scale / self.gap_scale
         modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
-        self.equations: ShapeEquations | SpreadShape | GridShape
+        self.equations: ShapeEquations | GridShape
         linear = self.system.heat is None and self.closure is None and self.system.creep is None
         linear = linear and not self.system.track_changes
         grid = self._grid(ratios, scale, modes, balances) if linear and self.n >= GRIDDED else None
         if grid is not None:
             self.equations = GridShape(grid, modes, balances)
-        elif linear and (self.n >= LARGE or interfaces[0].rows is not None):
-            self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
         else:
             made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
             keys = [(id(own), np.asarray(ratio + own.pair.normal).tobytes()) for own, ratio in pairs]
@@ -220,20 +214,16 @@ class SteadyInequality:
             self.equations, self._known = self.equations.with_heat(by_heat), None
         failure: ConvergenceError | None = None
         if not (follow := self._may_follow and self._far):
-            self.x, f, iterations, self.peak_without_cap, failure = self._lead(self._found)
+            self.x, f, iterations, self.peak_without_cap, failure = self._found()
             follow = failure is not None and self._may_follow
         if follow:
-            contact = self.system.phase_contact(range(m))  # ranks that share its rows make it together
-            self.x, f, iterations, self.peak_without_cap, failure = self._lead(partial(self._followed, contact))
+            contact = self.system.phase_contact(range(m))
+            self.x, f, iterations, self.peak_without_cap, failure = self._followed(contact)
         if failure is not None:
             raise failure
         self._solved = True
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
         return ContactState(pressure, gap, np.zeros((m, self.r)), iterations)
-
-    def _lead(self, find: Callable[[], _Found]) -> _Found:
-        """Return what rank 0 finds, where ranks share the rows with the help of all; collective there."""
-        return self.equations.phases.team.lead(find) if isinstance(self.equations, SpreadShape) else find()
 
     @property
     def _may_follow(self) -> bool:

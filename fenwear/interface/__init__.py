@@ -4,7 +4,7 @@ Which nodes are opposite is found by `patches` and `overlap`, gaps and weights a
 `compliance.Interface`, and which rigid motions the contact balances `equilibrium`.
 """
 
-from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance, join
+from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance
 from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium
 from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
@@ -19,7 +19,6 @@ __all__ = [
     "check_distance",
     "interpolation",
     "is_translation",
-    "join",
     "pair",
     "pass_material",
     "rigid_equilibrium",

@@ -27,7 +27,6 @@ from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.frame_convolution import FrameConvolution, frame_convolution
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
-from fenwear.parallel import Rows
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
@@ -47,7 +46,6 @@ class Interface:
         punch: How it answers at its pressure nodes.
         strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
-        rows: Of the contact nodes on each rank; None where every rank has all.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
         like: One that differs by its loads or by where the strip's material is: what bodies answer is known of it.
         layer: Closure along e_n by unit pressures of what lies between (n,), mm/MPa; None where nothing gives way.
@@ -57,16 +55,13 @@ class Interface:
     punch: SurfaceOperator
     strip: SurfaceOperator
     strip_moves: bool
-    rows: Rows | None = None
     frame: Array | None = None
     like: Interface | None = None
     layer: Array | None = None
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
         """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
-        return Interface(
-            rigid, punch, strip, self.strip_moves, self.rows, self.frame, like=self.like or self, layer=self.layer
-        )
+        return Interface(rigid, punch, strip, self.strip_moves, self.frame, like=self.like or self, layer=self.layer)
 
     @property
     def pair(self) -> ContactPair:
@@ -84,11 +79,6 @@ class Interface:
         return self.pair.placement.back(self.axes.reshape(-1, self.axes.shape[2])).reshape(self.axes.shape)
 
     @property
-    def _own(self) -> slice:
-        """This rank's own rows."""
-        return slice(0, len(self.pair.weights)) if self.rows is None else self.rows.own
-
-    @property
     def cost(self) -> float | None:
         """Of a product, in numbers that memory could give meanwhile; None where the bodies answer by numbers."""
         if self.punch.cost is None or self.strip.cost is None:
@@ -96,7 +86,7 @@ class Interface:
         return self.punch.cost + self.strip.cost
 
     def apply(self, forces: Array) -> Array:
-        """Return the relative displacements (own rows, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
+        """Return the relative displacements (n, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
         if self.cost is None:
             return product(self.dense(), forces)
         found = self._by_bodies(forces)
@@ -143,8 +133,7 @@ class Interface:
         """Return displacements at some nodes from unit forces along the axes of space at others (rows, a, columns, d).
 
         Args:
-            rows: Their numbers; where ranks share rows, among this one's own.
-            columns: Their numbers.
+            rows, columns: Their numbers.
         """
         if self.cost is None:
             kept = self.dense()
@@ -154,18 +143,16 @@ class Interface:
         return self.asked(rows, columns)
 
     def diagonal(self) -> Array:
-        """Return displacements at each node from unit forces at itself (n, a, d); collective where ranks share rows."""
+        """Return displacements at each node from unit forces at itself (n, a, d)."""
         return self._diagonal
 
     @cached_property
     def _diagonal(self) -> Array:
         if self.like is not None:
             return self.like.diagonal()
-        own = self._own
         if self.cost is None:
-            kept = self.dense()
-            found = kept[np.arange(len(kept)), :, np.arange(own.start, own.stop)]
-            return found if self.rows is None else self.rows.gathered(found)
+            every = np.arange(len(self.pair.weights))
+            return self.dense()[every, :, every]
         gridded = self.pair.punch.grid is not None
         if (not self.strip_moves or gridded) and self.pair.placement.turn == ZERO:
             below = self.strip.diagonal()
@@ -176,11 +163,11 @@ class Interface:
             found = np.asarray(sum(_along(axes, own) for axes, own in both))
             found[:, 0] += self._closing
             return found
-        each = (np.array([node]) for node in range(own.stop))
+        each = (np.array([node]) for node in range(len(self.pair.weights)))
         return np.concatenate([self.asked(node, node)[:, :, 0] for node in each])
 
     def dense(self) -> Array:
-        """Return all entries (own rows, a, n, d), which are kept."""
+        """Return all entries (n, a, n, d), which are kept."""
         return self._dense
 
     @cached_property
@@ -189,7 +176,7 @@ class Interface:
 
     def asked(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the same as `entries`, from the bodies: for who keeps what it makes of them."""
-        own = np.arange(self._own.start, self._own.stop)[rows]
+        own = np.arange(len(self.pair.weights))[rows]
         on_punch = _along(self.axes[own], self.punch.entries(rows, columns))
         on_strip = self._on_strip(own, rows, columns)
         if self.pair.placement.turn != ZERO:
@@ -207,7 +194,7 @@ class Interface:
         if not self.strip_moves:
             return _along(axes, strip.entries(rows, columns))
         whole = csr_array(self.pair.transfer)
-        seen, read = _used(csr_array(whole[own])[:, EVERY if strip.kept is None else strip.kept], rows)
+        seen, read = _used(csr_array(whole[own]), rows)
         pushed, push = _used(csr_array(whole[columns]), columns)
         block = strip.entries(seen, pushed)
         found: Array = np.zeros((len(own), axes.shape[1], push.shape[0], axes.shape[2]))
@@ -232,11 +219,10 @@ class Interface:
 
     @cached_property
     def by_even(self) -> Array:
-        """Gap that an even unit pressure opens without friction (n,), mm/MPa; collective where ranks share rows."""
+        """Gap that an even unit pressure opens without friction (n,), mm/MPa."""
         if self.like is not None:
             return self.like.by_even
-        even = self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
-        return even if self.rows is None else self.rows.gathered(even)
+        return self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
 
     def compliance(
         self, friction_ratio: Array | float, scale: float = 1.0, known: dict[bytes, Array] | None = None
@@ -249,8 +235,7 @@ class Interface:
             known: Tables of convolutions that were made for other phases.
         """
         traction = self.pair.normal + friction_ratio
-        plain = self.frame is None and self.rows is None
-        if not self.strip_moves and self.cost is not None and plain:
+        if not self.strip_moves and self.cost is not None and self.frame is None:
             tables = {} if known is None else known
             found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables, self.layer)
             if found is not None:
@@ -265,17 +250,15 @@ class Interface:
         """
         if self.like is not None:
             return self.like.elastic_length
-        pair, modes, own = self.pair, self.rigid.rigid_normal, self._own
+        pair, modes = self.pair, self.rigid.rigid_normal
         inverse = np.linalg.pinv(modes)
         opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
-        opened = opened if self.rows is None else self.rows.gathered(opened)
         rigid = opened.T * pair.weights  # what modes take up of S, which is symmetric but for the weights
-        count, compliance = own.stop - own.start, self.compliance(0.0)
+        count, compliance = len(pair.weights), self.compliance(0.0)
         step = 1 if self.cost is None else max(count // SOME, 1)
         runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]
-        parts = [np.abs(compliance.columns(EVERY, run) - modes[own][run] @ rigid).sum(axis=1) for run in runs]
-        lengths = np.concatenate([np.zeros(0), *parts])
-        return float((lengths if self.rows is None else self.rows.gathered(lengths)).mean())
+        parts = [np.abs(compliance.columns(EVERY, run) - modes[run] @ rigid).sum(axis=1) for run in runs]
+        return float(np.concatenate(parts).mean())
 
 
 @dataclass(frozen=True)
@@ -300,12 +283,11 @@ class PressureCompliance:
         return self.interface.cost
 
     def apply(self, pressure: Array) -> Array:
-        """Return the gaps (n,) of pressures (n,); collective where ranks share rows."""
-        own, rows = self.interface.apply(self._force * pressure[:, None])[:, 0], self.interface.rows
-        return own if rows is None else rows.gathered(own)
+        """Return the gaps (n,) of pressures (n,)."""
+        return self.interface.apply(self._force * pressure[:, None])[:, 0]
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
-        """Return the columns of some nodes (n, k), or some rows of them; own rows where ranks share them."""
+        """Return the columns of some nodes (n, k), or some rows of them."""
         return np.einsum("ijd,jd->ij", self.interface.entries(rows, nodes)[:, 0], self._force[nodes])
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
@@ -313,13 +295,12 @@ class PressureCompliance:
         return self.columns(columns, rows)
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,); collective where ranks share rows."""
+        """Return the diagonal (n,)."""
         return np.einsum("id,id->i", self.interface.diagonal()[:, 0], self._force)
 
     def matrix(self) -> Array:
-        """Return all of it (n, n); collective where ranks share rows."""
-        own, rows = self.columns(EVERY), self.interface.rows
-        return own if rows is None else rows.gathered(own)
+        """Return all of it (n, n)."""
+        return self.columns(EVERY)
 
 
 class FrameCompliance:
@@ -385,31 +366,6 @@ class FrameCompliance:
     def diagonal(self) -> Array:
         """Return the diagonal (d n,)."""
         return self._diagonal
-
-
-def join(
-    rigid: RigidEquilibrium,
-    punch: SurfaceOperator,
-    strip: SurfaceOperator,
-    *,
-    strip_moves: bool,
-    rows: Rows | None = None,
-    layer: Array | None = None,
-) -> Interface:
-    """Join two bodies at the place of a pair; collective where ranks share the rows.
-
-    Args:
-        rigid: The equilibrium there.
-        punch: How it answers at its pressure nodes.
-        strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
-        strip_moves: Which of the two.
-        rows: Of the contact nodes on each rank; None where every rank has all.
-        layer: Closure of what lies between, see `Interface`.
-    """
-    interface = Interface(rigid, punch, strip, strip_moves, rows, layer=layer)
-    if rows is not None:  # now, while all ranks are here
-        _ = interface.diagonal(), interface.by_even, interface.elastic_length
-    return interface
 
 
 def _along(axes: Array, vectors: Array) -> Array:

@@ -1,6 +1,6 @@
 """Contacts of thousands of nodes: a sphere on a half-space that wears, by an operator and by a dense matrix.
 
-python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...] [--ranks N N ...] [--radius R]
+python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...] [--radius R]
 
 Square grids of 2,025, 4,900 and 10,000 nodes, constant pressure on each square (Love 1929), friction
 none, the load given. Each implicit wear step is one inequality in p and the approach.
@@ -8,9 +8,8 @@ none, the load given. Each implicit wear step is one inequality in p and the app
 "run" is the contact of every run, whose compliance is a matrix: it makes the columns of nodes that touch, and its
 factor follows them. "fft" has this half-space's own products by fast Fourier transform; a large set that comes at once
 is iterated. --beside gives the same steps with factors alone and with the matrix of all nodes. --loads changes
-the load from step to step, so that hundreds of nodes come and go; --radius 1000 lets all nodes touch. On several ranks
-each has its share of the rows. Times are of the process, or of rank 0; memory is the most that it, or any rank, had,
-each row in processes of its own; Krylov iterations are those of a step.
+the load from step to step, so that hundreds of nodes come and go; --radius 1000 lets all nodes touch. Times
+and memory are of the process, each row in a process of its own; Krylov iterations are those of a step.
 """
 
 from __future__ import annotations
@@ -38,7 +37,6 @@ from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Dense, Indices, Solve, Updating
 from fenwear.interface import Interface, RigidEquilibrium
-from fenwear.parallel import Rows
 
 COMM = MPI.COMM_WORLD
 WEAR, LOAD, RADIUS = 5e-4, 6.6e-4, 8.0  # gap worn by unit pressure in a step; mean pressure over all; of the sphere
@@ -118,18 +116,15 @@ class Rigid:
 
 
 def grid(side: int) -> Interface:
-    """Return the interface of sphere and half-space by Love's formula; several ranks share its rows."""
+    """Return the interface of sphere and half-space by Love's formula."""
     far, n = 2 / side * np.arange(side), side * side
     table, at = n * love(far[:, None], far[None, :], 1 / side), np.divmod(np.arange(n), side)
-    rows = Rows.equal(COMM, n) if COMM.size > 1 else None
-    own = slice(0, n) if rows is None else rows.own
-    by_force: Array = np.empty((own.stop - own.start, n, 1))
-    for k, i in enumerate(range(own.start, own.stop)):
-        by_force[k, :, 0] = table[np.abs(at[0] - at[0][i]), np.abs(at[1] - at[1][i])]
+    by_force: Array = np.empty((n, n, 1))
+    for i in range(n):
+        by_force[i, :, 0] = table[np.abs(at[0] - at[0][i]), np.abs(at[1] - at[1][i])]
     rigid = cast(RigidEquilibrium, Rigid(np.full(n, 1.0 / n)))
     even = by_force[:, :, 0].mean(axis=1)
-    even = even if rows is None else rows.gathered(even)
-    interface = Interface(rigid, None, None, False, rows)  # type: ignore[arg-type]  # its answers are known
+    interface = Interface(rigid, None, None, False)  # type: ignore[arg-type]  # its answers are known
     own = np.full((n, 1), table[0, 0])
     vars(interface).update(gap_by_force=by_force, load_gap=np.zeros(n), own_by_force=own, by_even=even)
     return interface
@@ -249,8 +244,7 @@ def report(name: str, side: int, run: Callable[[], Found]) -> None:
 def row(way: str, side: int, steps: int, asked: argparse.Namespace) -> Array:
     """Print the row of a run in a process of its own, or in several; return its pressures."""
     words = ["--way", way, "--sides", side, "--steps", steps, "--radius", asked.radius, "--loads", *asked.loads]
-    ranks = ["mpirun", "--oversubscribe", "-n", way.removesuffix(" ranks")] if way.endswith("ranks") else []
-    command = [*ranks, sys.executable, "-m", "mpi4py", __file__, *map(str, words)]
+    command = [sys.executable, "-m", "mpi4py", __file__, *map(str, words)]
     environment = {**os.environ, "HWLOC_HIDE_ERRORS": "2"}
     done = subprocess.run(command, check=True, env=environment, capture_output=True, text=True)
     text, pressures = json.loads(done.stdout.splitlines()[-1])
@@ -266,20 +260,18 @@ def main() -> None:
     parser.add_argument("--radius", type=float, default=RADIUS)
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--sides", type=int, nargs="*", default=[45, 70, 100])
-    parser.add_argument("--ranks", type=int, nargs="*", default=[2])
     parser.add_argument("--way", default=None)
     asked = parser.parse_args()
     if asked.way:
         way, side = asked.way, asked.sides[0]
-        found = run if way == "run" or way.endswith("ranks") else partial(wear, way=way)
+        found = run if way == "run" else partial(wear, way=way)
         report(way, side, lambda: found(side, asked.steps, loads=asked.loads, radius=asked.radius))
         return
     print("| nodes | way | in contact | first step | median ms | mean ms | longest s | Newton | Krylov | all | MiB |")
     print("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for side in asked.sides:
         few = min(asked.steps, 50)
-        ways = [("run", asked.steps), *((f"{ranks} ranks", asked.steps) for ranks in asked.ranks)]
-        ways += [("iterated", asked.steps)]
+        ways = [("run", asked.steps), ("iterated", asked.steps)]
         ways += [("factors", few), ("dense", few)] if asked.beside else []
         last = {way: row(way, side, steps, asked) for way, steps in ways}
         same = [last[way] for way, steps in ways if steps == asked.steps]

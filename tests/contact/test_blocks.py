@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from fenwear import Tribosystem, jump, march
 from fenwear.arrays import Array
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
-from fenwear.contact.krylov import NotSolvedError
 from fenwear.contact.operators import Phases
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -114,16 +113,3 @@ def test_runs_are_the_same(
     monkeypatch.setattr("fenwear.contact.condensed.MANY", 0)
     for one, other in zip(usual, ends(), strict=True):
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-9 * one.mean())
-    # Without any matrix of all nodes; and where iterations fail by elimination after all.
-    monkeypatch.setattr("fenwear.contact.condensed.LARGE", 0)
-    monkeypatch.setattr("fenwear.contact.spread_nodes.FEW", 0)
-    monkeypatch.setattr("fenwear.contact.phase_rows.RUN", 30)
-    for fails in (False, True) if settings == OPENING else (False,):
-        if fails:
-            monkeypatch.setattr("fenwear.contact.row_blocks.gmres_solution", _failing)
-        *_, last = jump(system, 4000, tolerance=1e-2)
-        np.testing.assert_allclose(last.pressure[-2:], usual[2], rtol=0, atol=1e-9 * usual[2].mean())
-
-
-def _failing(*_arguments: object) -> Array:
-    raise NotSolvedError

@@ -14,7 +14,7 @@ from laws import check_energy, check_laws
 from fenwear import load_case
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.errors import ConvergenceError
-from fenwear.interface import join
+from fenwear.interface import Interface
 from fenwear.plausibility.slip import unique_text
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.cone import project
@@ -79,7 +79,7 @@ def test_alternation_finds_the_same(unlike: Callable[[], StickInterface]) -> Non
     state = advance(interface, before, start, end, friction)
     position, n = interface.middle, len(end.opening)
     assert 0 < state.sticking.sum() < state.closed.sum()
-    joined = join(position.rigid, interface.punch, interface.strip, strip_moves=False)
+    joined = Interface(position.rigid, interface.punch, interface.strip, strip_moves=False)
     normal = CondensedContact([SlidingContact(joined, np.zeros((n, 2)))])
     every, t = np.arange(2 * n), before.traction
     C = position.compliance.entries(every, every)
@@ -105,7 +105,7 @@ def test_gross_sliding_is_the_limit(unlike: Callable[[], StickInterface], direct
     state, start = pressed(interface)
     end = imposed(interface, displacement=direction * 0.05)
     state = advance(interface, state, start, end, np.full(len(end.opening), MU))
-    joined = join(interface.middle.rigid, interface.punch, interface.strip, strip_moves=False)
+    joined = Interface(interface.middle.rigid, interface.punch, interface.strip, strip_moves=False)
     ratio = direction * MU * interface.middle.frame[:, 1]
     sliding = CondensedContact([SlidingContact(joined, ratio)]).solve(end.opening)
     assert not state.sticking.any()

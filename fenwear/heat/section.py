@@ -6,8 +6,9 @@ heat over the section alone. Its modes phi_j, orthonormal in the flow of heat ca
     integral of rho c |v . n| phi_i phi_j = F delta_ij,
     integral of k |v . n| grad phi_i . grad phi_j = lambda_j F delta_ij
 
-over the end, with F the flow of all of it. The first is 1 and does not decay: it is the bulk's. What leaves at the
-other end is read at the same places of the section.
+over the end, with F the flow of all of it. Uniform temperature does not decay: it is the bulk's. All modes lie beside
+it, so that they carry no heat into the mesh, and read none of uniform material that leaves at the other end, at the
+same places of the section.
 """
 
 from __future__ import annotations
@@ -84,13 +85,15 @@ def section_modes(body: HeatBody, sliding: SlidingField, way: float, until_back:
     sizes, vectors = scipy.linalg.eigh((capacity + capacity.T) / 2)
     kept = sizes > ROUNDING * sizes.max(initial=0.0)
     even = vectors[:, kept] / np.sqrt(sizes[kept])
+    even = even @ scipy.linalg.null_space(capacity.sum(axis=0)[None] @ even)  # the bulk's heat is no mode's
     rates, modes = scipy.linalg.eigh(even.T @ (conduction + conduction.T) @ even / 2)
-    lasting = slice(1, 1 + min(MOST, int((rates[1:] * until_back < LASTS).sum())))
+    lasting = slice(min(MOST, int((rates * until_back < LASTS).sum())))
     modes = even @ modes[:, lasting] * np.sqrt(capacity.sum())
     modes = modes * np.sign(modes[np.abs(modes).argmax(axis=0), np.arange(modes.shape[1])])
-    return Section(
-        ends[0].loads(modes), ends[1].loads(_carried_over(ends[0].places, modes, ends[1].places)), rates[lasting]
-    )
+    leaving = _carried_over(ends[0].places, modes, ends[1].places)
+    flows = ends[1].matrix.sum(axis=0)
+    leaving = leaving - flows @ leaving / flows.sum()
+    return Section(ends[0].loads(modes), ends[1].loads(leaving), rates[lasting])
 
 
 class _Face:

@@ -202,3 +202,21 @@ def test_half_a_disc_and_the_rest_of_its_track() -> None:
     leaving = half.surface.x[:, 1] > 0.99 * np.hypot(*half.surface.x[:, :2].T)  # the whole ring conducts on beyond
     assert off[~leaving].max() < 0.02 * spot
     assert off.max() < 0.05 * spot
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_modes_of_a_track_carry_no_heat(count: int) -> None:
+    """A ring that turns about an axis beside it: material enters and leaves by oblique facets, some only in part.
+
+    Whatever the facets are, the modes bring no heat in all, and uniform material that leaves has none of them.
+    """
+    mesh = ring(count)
+    mesh.geometry.x[:, 0] += 3.0
+    body = conducting(mesh, "solid", groups(3))
+    comm, speed = mesh.comm, 1.0
+    step = body.step(speed, 1.0, Surroundings(renewed=True, sliding=TURNING))
+    section = section_modes(body, TURNING, speed, 0.1)
+    assert len(section.rates) > 2
+    flow = comm.allreduce(step.entering.sum())
+    sums = [comm.allreduce(loads.sum(axis=0)) for loads in (section.entering, section.leaving)]
+    np.testing.assert_allclose(sums, 0.0, atol=1e-12 * flow)

@@ -140,8 +140,11 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
 def set_up_by(case: Case) -> tuple[object, ...]:
     """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
     bodies = (
-        (body.regions, body.supports, body.pivot, body.profile, body.topography, body.operator, body.creep)
-        for body in (case.punch, case.strip)
+        (
+            *(body.regions, body.supports, body.no_turning_about, body.pivot, body.profile, body.topography),
+            *(body.operator, body.creep, {load.on for load in case.loads_of(name)}),
+        )
+        for name, body in case.bodies.items()
     )
     initial = case.heat.initial if case.heat is not None and case.warming else None
     meshed = (case.geometry, case.folder, tuple(case.diffusion.items()))

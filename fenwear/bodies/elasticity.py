@@ -24,7 +24,7 @@ from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.grid import RegularGrid
-from fenwear.bodies.guides import GuideAnswer, make_guides
+from fenwear.bodies.guides import GuideAnswer, Guides, Loose, make_guides
 from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import BodyMesh
@@ -68,7 +68,7 @@ class ElasticBody:
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
-        guides: Rotations that guides hold, and their couples; None without.
+        guides: Rotations that guides hold and free modes, and the couples and means that fix them; None without.
         guided_resultant: The loads' moments about them (g,).
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
@@ -137,13 +137,23 @@ class ElasticBody:
             self._ufl, self._form = a, compiled(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
-        self.guides = make_guides(self.space, measure(mesh, law.kind), held.guided) if held.guided else None
+        self.guides = self._fixed_by_means(held.loose, description.loads)
         self._set_loads(description.loads)
         # None or one of each, of all bodies that differ by their loads.
         self._answers: list[GuideAnswer] = []
         self.known: dict[bytes, Any] = {}  # what an operator has solved for that does not depend on the grid
         self._factors: list[Factor] = []
         self._substructures: list[Substructures] = []
+
+    def _fixed_by_means(self, loose: Sequence[Loose], loads: Sequence[Load]) -> Guides | None:
+        """Return what guides hold, and where free motions are measured; None where supports hold all; collective."""
+        mesh = self.body.mesh
+        tags = [self.body.curve(load.on, f"{load.key(self.body.name, k)}.on") for k, load in enumerate(loads)]
+        if not loose:
+            return None
+        ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
+        loaded = ds(tuple(sorted(set(tags)))) if tags else None
+        return make_guides(self.space, measure(mesh, self.law.kind), loaded, loose)
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
         comm, load = self.body.mesh.comm, self._assemble_load(loads)

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from fenwear import compat
 from fenwear.arrays import Mask
 from fenwear.bodies.contact_surface import ContactSurface, Trace
-from fenwear.bodies.guides import Guided
+from fenwear.bodies.guides import Loose
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Body, Kind, Support
@@ -53,7 +53,7 @@ class Supports:
         names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx" and
             "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
             share no node with the name of the part's contact, as "lambda_F_left", or its number, as "lambda_F_2".
-        guided: What guides hold of each part that has any.
+        loose: The motions that supports leave each part that has any, and those of them that guides hold.
         mirrors: Planes of which supports hold the motion across them and no other, as planes of symmetry are held: the
             number of the axis that they are square to, and where on it they are, mm.
     """
@@ -78,7 +78,7 @@ class Supports:
         self.pivot = self._pivots[0]
         self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
-        self.guided: list[Guided] = []
+        self.loose: list[Loose] = []
         self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
@@ -260,13 +260,13 @@ class Supports:
         by_guides = np.diag(np.isin(columns, turns).astype(float))
         free = _null_space(gram * np.outer(scale, scale) + by_guides)
         taken = loose @ _null_space((loose.T @ free) @ (free.T @ loose))
-        if taken.shape[1]:
-            self.guided.append(Guided(basis, [columns.index(turn) for turn in turns], scale[:, None] * taken))
         loose, free = scale[:, None] * loose, scale[:, None] * free
         if free.shape[1] and len(names) == len(RIGID_MODES[self.kind][0]):
             _check_facing(self._trace.surface, normal)
         # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
         echelon, pivots = _column_echelon(free)
+        if loose.shape[1]:
+            self.loose.append(Loose(basis, [columns.index(t) for t in turns], scale[:, None] * taken, echelon))
         away = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
         if away:
             name = self.body.name

@@ -1,8 +1,8 @@
 """What bodies and layer have crept, in history.nc and summary.json, apart from wear.
 
-The depth that a body has crept is how far its contact surface has gone back into it, against its side away from the
-contact, by what its compliance has grown to since it was loaded. It is seen at the contact nodes in the middle of a
-half-cycle; its volume is the integral over them, on a contact grid that grows over those that there were.
+The depth that a body has crept is how far its contact surface has gone back into it, against its supports or, of a free
+body, the surfaces on which its loads act, by what its compliance has grown to since it was loaded. It is that of the
+contact nodes in the middle of a half-cycle. Its volume is the integral over them; a contact grid that grows adds nodes.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Where bodies find their place: how far each free motion has gone, and a shaft's eccentricity in its bore.
 
-A body that supports leave free moves until pressure and friction balance its loads. What it has moved by, against where
-it was meshed, is told of its side away from the contact. Of a shaft in a bore, along y, it is the way e from the middle
-of the bore to that of the shaft: of circles that fit their surfaces as they are deformed, without their wear, in least
-squares. Its size is the eccentricity; the attitude angle is that from the way in which the load presses the shaft to e,
-positive as the strip turns. Where rigid bodies wear a bore by an arc of psi0 to each side the eccentricity is
-D / cos psi0, D the radial clearance; friction has the middle of the contact at atan mu against the turning: a dry shaft
-climbs. A shaft in several bores, each a contact with a name, has a place in each of them, in the middle along y; there
-the angle is from the force that the bore carries.
+A body that supports leave free moves until pressure and friction balance its loads. Its motion is that of the surfaces
+on which its loads act, in the mean, against where it was meshed (of its whole volume where none acts). Of a shaft in a
+bore, along y, it is the way e from the middle of the bore to that of the shaft: of circles that fit their surfaces as
+they are deformed, without their wear, in least squares. Its size is the eccentricity; the attitude angle is that from
+the way in which the load presses the shaft to e, positive as the strip turns. Where rigid bodies wear a bore by an arc
+of psi0 to each side the eccentricity is D / cos psi0, D the radial clearance; friction has the middle of the contact at
+atan mu against the turning: a dry shaft climbs. A shaft in several bores, each a contact with a name, has a place in
+each of them, in the middle along y; there the angle is from the force that the bore carries.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, load_case, march
+from fenwear import Tribosystem, assemble, load_case, march, vary
 from fenwear.arrays import Array
 from fenwear.parallel import total
 from fenwear.results.fields import body_fields
@@ -90,3 +90,10 @@ def test_solvers_agree(law: str) -> None:
         (last,) = march(system, 1)
         found.append(last.pressure[-1])
     np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * found[0].max())
+
+
+def test_variants_have_the_guides_of_their_case() -> None:
+    """A guide is no operator that variants share."""
+    system = assemble(load_case("example1", ["geometry.parameters.elements_along_contact=4", "geometry.degree=1"]))
+    assert system.rigid.mode_names == ("lambda_F", "lambda_M")
+    assert vary(system, "punch.no_turning_about=['y']").rigid.mode_names == ("lambda_F",)

@@ -84,7 +84,7 @@ for distance, published in ((800, 16.155), (1600, 25.709)):
 # ## Calibrate each scar
 #
 # The unknowns are the coefficient and the offset of the trace. Neighbouring residuals are alike, since grooves are
-# wider than the distance between two points: fenwear sees that and widens the standard errors.
+# wider than the distance between two points: the files say so in the line `# scatter`, and the standard errors are wider.
 
 # %%
 found = [calibrate(case, [test], ["wear.punch.coefficient"], baseline=["offset"]) for test in tests]
@@ -136,8 +136,7 @@ drawn = float(np.exp(np.log(2e-9) + 0.12 * generator.standard_normal()))
 check = ["punch.loads.0.force.1=-130"]
 depth = parse_quantity("depth after 1600 m")
 measured = evaluate(model, depth, {"wear.punch.coefficient": drawn}, check)[0] + 1e-3 * generator.standard_normal()
-middle = scatter.distribution.computeQuantile(0.5)[0]
-low, high = (scatter.distribution.computeQuantile(q)[0] for q in (0.025, 0.975))
+low, middle, high = scatter.marginals[0].ppf([0.025, 0.5, 0.975])
 expected = [1e3 * evaluate(model, depth, {"wear.punch.coefficient": k}, check)[0] for k in (low, middle, high)]
 print(f"made-up measurement {1e3 * measured:.1f} µm; expected {expected[1]:.1f} µm, "
       f"95 % from {expected[0]:.1f} to {expected[2]:.1f} µm")  # fmt: skip
@@ -161,16 +160,16 @@ tornado(depths)
 # ## Life with scatter
 #
 # How far do blocks slide until the scar is 0.03 mm deep, where the coefficient scatters as between the three tests, and
-# the load by 10 %? Quantiles with the interval that holds them with 95 %, and Sobol indices: whose scatter it is.
+# the load by 10 %? Quantiles with the interval that holds them with 95 %.
 
 # %%
 inputs = scatter.and_also(parse_scatter(case, "punch.loads.0.force.1=normal(-65 N, 10 %)"))
-life = lifetime(case, "distance until depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6, indices=True)
+life = lifetime(case, "distance until depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6)
 print(life.text())
 life_figure(life)
 
 # %% [markdown]
-# For rigid bodies $s \propto 1 / (K P')$, so that the shares of the variance are those of $\ln K$ and of $\ln P'$.
+# For rigid bodies $s \propto 1 / (K P')$, so that the variance of $\ln s$ is the sum of those of $\ln K$ and $\ln P'$.
 #
 # ## Do the intervals hold what they say? Twin experiments
 #
@@ -192,4 +191,4 @@ print(f"{held.sum()} of {len(held)} intervals hold the truth; the coefficient is
 #         --each -o rings
 #     fenwear sensitivity block_on_ring.toml --of "depth after 3600 m" --to wear.punch.coefficient --to contact.friction
 #     fenwear life block_on_ring.toml --until "distance until depth 0.03 mm" --from rings \
-#         --scatter "punch.loads.0.force.1=normal(-65 N, 10 %)" --sobol -o lives
+#         --scatter "punch.loads.0.force.1=normal(-65 N, 10 %)" -o lives

@@ -57,9 +57,11 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
     from fenwear.cli import UsageError, app, told, typer
+    from fenwear.cli.removed import check_removed
     from fenwear.signals import ignore_from_now_on
 
     try:
+        check_removed(arguments)
         with importing():  # commands import what they need
             result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
         return int(result) if isinstance(result, int) else 0

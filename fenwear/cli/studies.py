@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, show, show_results
-from fenwear.errors import CaseError, InputError, StackError
+from fenwear.errors import StackError
 
 QuantitiesOption = Annotated[
     list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
@@ -118,9 +118,6 @@ def calibrate_command(
     each: Annotated[
         bool, typer.Option("--each", help="Fit every file alone, and print the scatter between them.")
     ] = False,
-    posterior: Annotated[
-        int | None, typer.Option(metavar="STEPS", help="Sample the posterior too, so many steps of each walker.")
-    ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
@@ -130,19 +127,14 @@ def calibrate_command(
 
     loaded = load(case, settings)
     if each:
-        if posterior is not None:
-            raise CaseError(InputError("--posterior", "given together with --each; expected one of them"))
         tests, between, folder = commands.run_calibrate_each(
             loaded, Path(case).stem, data, unknowns, baseline, output, log
         )
         text = "\n".join([*(one.text() for one in tests), *between.text])
         show_results(commands.each_as_json(tests, between) if as_json else text, f"results in {folder}")
         return
-    found, sample, folder = commands.run_calibrate(
-        loaded, Path(case).stem, data, unknowns, baseline, posterior, output, log
-    )
-    text = found.text() if sample is None else f"{found.text()}\n{sample.text()}"
-    show_results(found.as_json() if as_json else text, f"results in {folder}")
+    found, folder = commands.run_calibrate(loaded, Path(case).stem, data, unknowns, baseline, output, log)
+    show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 
 
 @app.command("life")
@@ -168,10 +160,6 @@ def life_command(
         Path | None, typer.Option("--from", metavar="DIR", help="Folder of a calibration whose result scatters.")
     ] = None,
     samples: Annotated[int, typer.Option(help="Size of the sample: so many runs.")] = 200,
-    indices: Annotated[
-        bool,
-        typer.Option("--sobol", help="Also which of d keys the scatter comes from: d + 2 times as many runs."),
-    ] = False,
     seed: Annotated[int, typer.Option(help="Of the sample.")] = 0,
     wanted: Annotated[str | None, typer.Option(help='A life whose reliability is asked for: "1e6 cycles".')] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
@@ -179,13 +167,13 @@ def life_command(
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Print the distribution of the life of parts whose keys scatter, and what the scatter comes from."""
+    """Print the distribution of the life of parts whose keys scatter."""
     from fenwear.life import commands
 
     loaded = load(case, settings)
     found, folder = commands.run_life(
         loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log,
-        indices=indices, resume=resume,
+        resume=resume,
     )  # fmt: skip
     show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 

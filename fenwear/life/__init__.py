@@ -16,12 +16,11 @@ from fenwear.life.data import DataSet, Series, measured_folder, read_data
 from fenwear.life.least_squares import LeastSquares, repeated, without_values
 from fenwear.life.lifetime import Lifetime, lifetime
 from fenwear.life.model import Model
-from fenwear.life.posterior import Posterior, posterior
+from fenwear.life.noise import Noise
 from fenwear.life.quantities import Quantity, evaluate, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Sensitivity, sensitivity
 from fenwear.life.snapshot import Snapshot
-from fenwear.life.sobol import SobolIndices, sobol_design, sobol_indices
 from fenwear.life.unknowns import Unknown
 
 __all__ = [
@@ -30,13 +29,12 @@ __all__ = [
     "LeastSquares",
     "Lifetime",
     "Model",
-    "Posterior",
+    "Noise",
     "Quantity",
     "Scatter",
     "Sensitivity",
     "Series",
     "Snapshot",
-    "SobolIndices",
     "Unknown",
     "between",
     "calibrate",
@@ -46,11 +44,8 @@ __all__ = [
     "measured_folder",
     "parse_quantity",
     "parse_scatter",
-    "posterior",
     "read_data",
     "repeated",
     "sensitivity",
-    "sobol_design",
-    "sobol_indices",
     "without_values",
 ]

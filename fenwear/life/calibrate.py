@@ -3,8 +3,8 @@
 Minimised is chi^2 = sum ((prediction - value) / sigma)^2 over the unknown keys and, for every profile, the
 offset and tilt of the trace where they are asked for. The covariance is (J^T J)^-1, J the Jacobian
 of the weighted residuals, times chi^2 / (n - m) where no sigma was given. Unknowns that cannot be
-negative are fitted by their logarithms: their intervals are intervals of a ratio. Residuals that are correlated
-are fitted again as such, see `fenwear.life.correlated`; a given sigma is a relative one then.
+negative are fitted by their logarithms: their intervals are intervals of a ratio. Intervals end at the key's bounds.
+Errors that depend on each other are whitened, see `fenwear.life.noise`.
 """
 
 from __future__ import annotations
@@ -17,19 +17,23 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from scipy import stats
+from scipy.optimize import OptimizeResult
 
 from fenwear.arrays import Array, Mask
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
-from fenwear.life.correlated import LARGEST_CONDITION, Correlated, Correlation
 from fenwear.life.data import DataSet, Series
 from fenwear.life.identifiable import hardly_known, known_together, not_determined, without_baselines
+from fenwear.life.keys import nearest_possible
 from fenwear.life.least_squares import STEP, LeastSquares
-from fenwear.life.quantities import UNITS
+from fenwear.life.noise import FEW, SMOOTH, Noise, in_order, neighbours_ratio
+from fenwear.life.quantities import GROWING, UNITS
 from fenwear.life.scatter import Scatter
 from fenwear.life.unknowns import ScaledUnknown, Unknown
 
 ROUNDS = 2  # of fits, each on the jumps of a run at its start
+LARGEST_CONDITION = 1e12  # of the Jacobian, beyond which the data do not tell what is fitted
+WIDER = 1.5  # factor of a standard error worth a word
 
 
 @dataclass(frozen=True)
@@ -88,13 +92,11 @@ class Calibration:
         traces: Every series with its prediction.
         noise: Standard deviation of a measurement over its sigma, or where none was given in internal units.
         degrees_of_freedom: Measurements less unknowns.
-        inflation: Largest factor of the standard errors for residuals that are correlated; 1 for none.
         not_known: What the data cannot tell, in sentences.
         remarks: What else is to be said.
         at_bound: Keys whose value is at a bound.
         evaluations: Runs computed.
         jacobian: Of the weighted residuals by the fitted unknowns and baselines (n, m + baselines).
-        correlated: How the residuals are correlated; None where they are not.
     """
 
     fitted: tuple[Fitted, ...]
@@ -103,13 +105,11 @@ class Calibration:
     traces: tuple[Trace, ...]
     noise: float
     degrees_of_freedom: int
-    inflation: float
     not_known: tuple[str, ...]
     remarks: tuple[str, ...]
     at_bound: tuple[str, ...]
     evaluations: int
     jacobian: Array = field(repr=False)
-    correlated: Correlated | None = field(default=None, repr=False)
 
     @property
     def values(self) -> dict[str, float]:
@@ -153,7 +153,6 @@ class Calibration:
             ],
             "noise": self.noise,
             "degrees_of_freedom": self.degrees_of_freedom,
-            "inflation": self.inflation,
             "not_known": list(self.not_known),
             "remarks": list(self.remarks),
             "at_bound": list(self.at_bound),
@@ -223,7 +222,7 @@ def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calib
             problem.check_influence(problem.jacobian(z), z)
         progress(f"fit {number + 1} of {ROUNDS}")
         result = problem.fit(start=z)
-        before, z = z, np.array([result.params[f"u{k}"].value for k in range(len(z))])
+        before, z = z, np.asarray(result.x[: len(z)])
         if np.abs(z - before).max() < STEP:
             break
         if not result.success:
@@ -232,30 +231,8 @@ def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calib
             )
     if result is None:
         raise ConvergenceError("the fit did not begin")
-    correlated: Correlated | None = None
-    remarks: tuple[str, ...] = ()
-    if _parts(problem, result)[2].all():  # at a bound residuals are what the data want beyond it, too
-        correlated, remarks = _correlation(problem, result).test(np.asarray(result.residual))
-    if correlated is not None:
-        progress("fit with residuals that are correlated")
-        problem.correlated, remarks = correlated, correlated.lines
-        result = problem.fit(start=z)
-        z = np.array([result.params[f"u{k}"].value for k in range(len(z))])
     problem.predicted(z, strict=True)  # raises what a trial may do, and a result may not
-    return _calibration(problem, result, list(remarks))
-
-
-def _parts(problem: LeastSquares, result: Any) -> tuple[Array, Array, Mask]:
-    """Return the fitted unknowns (m,), the baselines, and which of the unknowns are at no bound (m,)."""
-    numbers, m = np.array([p.value for p in result.params.values()]), len(problem.unknowns)
-    free = [not _at_bound(one, part) for one, part in zip(problem.unknowns, numbers, strict=False)]
-    return numbers[:m], numbers[m:], np.array(free)
-
-
-def _correlation(problem: LeastSquares, result: Any, jacobian: Array | None = None) -> Correlation:
-    """Return how the residuals of a fit may be correlated."""
-    whole = np.asarray(result.jac) if jacobian is None else jacobian
-    return Correlation(problem.series, whole, problem.sigma, has_sigma=problem.has_sigma)
+    return _calibration(problem, result)
 
 
 def _begin(problem: LeastSquares, z: Array) -> bool:
@@ -273,58 +250,78 @@ def _begin(problem: LeastSquares, z: Array) -> bool:
         ) from error
 
 
-def _calibration(problem: LeastSquares, result: Any, remarks: list[str]) -> Calibration:
+def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
     """Return the result in the unknowns' own units, with what the data cannot tell."""
     m, n = len(problem.unknowns), len(problem.observed)
-    z, lines, free = _parts(problem, result)
-    freedom = n - m - len(lines)
-    noise = float(np.sqrt(result.chisqr / freedom))
-    scale = 1.0 if problem.absolute else noise
-    residual, weighted = np.asarray(result.residual), np.asarray(result.jac)
+    z, lines, weighted = result.x[:m], result.x[m:], np.asarray(result.jac)
+    free = np.array([not _at_bound(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
+    freedom = n - len(result.x)
+    noise = float(np.sqrt(2 * result.cost / freedom))
+    scale = 1.0 if problem.has_sigma else noise
     own = without_baselines(weighted, m)
     covariance = _covariance(own, free, scale)
-    factor = stats.t.ppf(0.975, freedom) if not problem.absolute else stats.norm.ppf(0.975)
-    ends = np.outer(np.sqrt(np.diag(covariance)), [-factor, factor])
-    inflation = 1.0
-    if problem.correlated is not None:
-        residual, weighted = problem.weighted(z, lines)
-        known = 1.0 if problem.has_sigma else float(np.sqrt(residual @ residual / freedom))
-        independent = _covariance(without_baselines(weighted, m), free, known)
-        if np.isfinite(covariance).all():
-            mixture = _correlation(problem, result, weighted).mixture(residual, m)
-            covariance, ends = mixture.covariance, np.array([mixture.interval(k) for k in range(m)])
-            inflation = float(np.sqrt((np.diag(covariance) / np.diag(independent)).max()))
+    factor = stats.norm.ppf(0.975) if problem.has_sigma else stats.t.ppf(0.975, freedom)
+    errors = np.sqrt(np.diag(covariance))
     keys = [one.unknown.key for one in problem.unknowns]
     at_bound = [key for key, inside in zip(keys, free, strict=True) if not inside]
     relative = own * np.array([_per_relative(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
     not_known = not_determined([key for key in keys if key not in at_bound], relative[:, free] / scale)
-    errors = np.sqrt(np.diag(covariance))
-    fitted = tuple(map(_fitted, problem.unknowns, z, errors, ends))
     own_units = np.array([1.0 if one.logarithmic else one.scale for one in problem.unknowns])
     correlation = covariance / np.outer(errors, errors)
-    if not not_known:
-        not_known = hardly_known(keys, problem.data, own)
-    remarks = [*remarks, *known_together(keys, correlation, at_bound)]
-    if problem.correlated is not None:
-        remarks.append(f"standard errors are up to {inflation:.2g} times those of independent residuals")
-    if problem.absolute and noise > 2:
+    traces = _traces(problem, problem.with_baselines(result.x), lines)
+    remarks = [*_scatter_remarks(result, traces, free, errors), *known_together(keys, correlation, at_bound)]
+    if problem.has_sigma and noise > 2:
         remarks.append(f"the residuals are {noise:.2g} times their sigma: the model does not describe the data, or "
                        "sigma is too small; standard errors are those of the given sigma")  # fmt: skip
     return Calibration(
-        fitted,
+        tuple(map(partial(_fitted, problem.case), problem.unknowns, z, errors, factor * errors)),
         correlation,
         covariance * np.outer(own_units, own_units),
-        tuple(_traces(problem, residual, lines)),
+        tuple(traces),
         noise,
         freedom,
-        inflation,
-        tuple(not_known),
+        tuple(not_known or hardly_known(keys, problem.data, own)),
         tuple(remarks),
         tuple(at_bound),
         problem.model.evaluations,
         weighted,
-        problem.correlated,
     )
+
+
+def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask, errors: Array) -> list[str]:
+    """Return what the data cannot tell of their scatter, where their files do not say of which kind it is."""
+    remarks: list[str] = []
+    added, m, begin = [], len(free), 0
+    both = np.column_stack([result.jac, result.fun])
+    for trace in traces:
+        series, ratio = trace.series, neighbours_ratio(trace.residual)
+        rows = slice(begin, begin + len(series.values))
+        begin = rows.stop
+        if series.noise.kind or not trace.residual.any():
+            continue
+        if series.x is None and series.quantity in GROWING and (len(series.values) < FEW or ratio < SMOOTH):
+            added.append(series.quantity)
+            both[rows] = Noise("adds up").whitened(both[rows], None, None, series.after)
+        elif series.x is not None and ratio < SMOOTH:
+            alike = 1 - ratio / 2
+            length = -float(np.median(in_order(series.x)[1])) / np.log(alike)
+            remarks.append(
+                f"{trace.name}: neighbouring residuals are alike (correlation {alike:.2f}), so standard errors are too "
+                f"small. Set `# scatter = alike over {length:.2g} mm` in the file"
+            )
+    if added:
+        columns, residual = both[:, :-1], both[:, -1]
+        residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+        noise = float(np.sqrt(residual @ residual / (len(both) - columns.shape[1])))
+        other = np.diag(_covariance(without_baselines(columns, m), free, noise))
+        factor = float(np.nanmax(np.sqrt(other) / errors, initial=1.0))
+        if factor > WIDER:
+            remarks.append(
+                f"the rows do not tell whether the scatter of {' and '.join(dict.fromkeys(added))} adds up from one to "
+                f"the next. If it does, standard errors are up to {factor:.2g} times as large. Set `# scatter = adds "
+                "up` or `# scatter = independent` in the file"
+            )
+    return remarks
 
 
 def _covariance(own: Array, free: Mask, scale: float) -> Array:
@@ -340,12 +337,16 @@ def _covariance(own: Array, free: Mask, scale: float) -> Array:
     return covariance
 
 
-def _fitted(one: ScaledUnknown, z: float, error: float, ends: Array) -> Fitted:
-    """Return an unknown in its own unit; `ends` are those of its interval less z."""
-    value = one.value(z)
-    low, high = (one.value(z + end) for end in ends)
+def _fitted(case: Case, one: ScaledUnknown, z: float, error: float, reach: float) -> Fitted:
+    """Return an unknown in its own unit, whose interval reaches from z by `reach` and ends at the key's bounds."""
+    key, value = one.unknown.key, one.value(z)
+
+    def end(z: float) -> float:
+        reached = float(np.clip(one.value(z), one.unknown.low, one.unknown.high))
+        return nearest_possible(case, key, value, reached) if np.isfinite(reached) else reached
+
     spread = float((value if one.logarithmic else one.scale) * error)
-    return Fitted(one.unknown.key, value, one.unit, spread, low, high, one.logarithmic)
+    return Fitted(key, value, one.unit, spread, end(z - reach), end(z + reach), one.logarithmic)
 
 
 def _at_bound(one: ScaledUnknown, z: float) -> bool:
@@ -358,7 +359,8 @@ def _per_relative(one: ScaledUnknown, z: float) -> float:
     return 1.0 if one.logarithmic else (abs(one.value(z)) or one.scale) / one.scale
 
 
-def _traces(problem: LeastSquares, residual: Array, lines: Array) -> list[Trace]:
+def _traces(problem: LeastSquares, predicted: Array, lines: Array) -> list[Trace]:
+    """Return every series with its prediction, of all predictions (n,) with their baselines."""
     found, begin = [], 0
     names = [one.name for one in problem.data for _ in one.series]
     for number, (name, series) in enumerate(zip(names, problem.series, strict=True)):
@@ -367,6 +369,5 @@ def _traces(problem: LeastSquares, residual: Array, lines: Array) -> list[Trace]
         own = {
             what: float(value) for (k, what), value in zip(problem.baseline_names, lines, strict=True) if k == number
         }
-        predicted = series.values + residual[rows] * problem.sigma[rows]
-        found.append(Trace(name, series, predicted, **own))
+        found.append(Trace(name, series, predicted[rows], **own))
     return found

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,9 @@ from fenwear.life.between_tests import between, between_as_json
 from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import read_data
 from fenwear.life.keys import with_values
-from fenwear.life.least_squares import LeastSquares
 from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
 from fenwear.life.model import Model
 from fenwear.life.pictures import life_figure, residuals, save, tornado
-from fenwear.life.posterior import Posterior, posterior
 from fenwear.life.quantities import UNITS, cycles_of, parse_amount, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
@@ -34,16 +31,6 @@ from fenwear.results.history import CASE, free_directory, make_directory, write_
 
 Log = Callable[[str], None]
 FITTED = "fitted.toml"  # the case with the values that a calibration has found
-
-
-def _need(package: str, what: str) -> None:
-    """Check that an optional package is there.
-
-    Raises:
-        CaseError: it is not.
-    """
-    if find_spec(package) is None:
-        raise CaseError(InputError(what, f"needs the package {package}: on Debian, install python3-{package}"))
 
 
 def _folder(output: Path | None, what: str, name: str, comm: MPI.Comm) -> Path:
@@ -104,17 +91,15 @@ def run_calibrate(
     files: Sequence[Path],
     unknowns: Sequence[str],
     baseline: Sequence[str],
-    steps: int | None,
     output: Path | None,
     log: Log,
     comm: MPI.Comm = MPI.COMM_WORLD,
-) -> tuple[Calibration, Posterior | None, Path]:
-    """Calibrate; write the fitted case, calibration.json, residuals, and on request posterior.csv; collective.
+) -> tuple[Calibration, Path]:
+    """Calibrate; write the fitted case, calibration.json and residuals; collective.
 
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
     """
-    _need("lmfit", "calibrate")
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
     _tell_of_stick(case, log, comm)
@@ -129,15 +114,6 @@ def run_calibrate(
         save(residuals(found), folder / "residuals.png")
 
     on_root(comm, write)
-    sample: Posterior | None = None
-    if steps is not None:
-        log("sampling the posterior")
-        drawn = posterior(LeastSquares(case, data, asked, baseline, MPI.COMM_SELF), found, steps)
-        on_root(
-            comm,
-            lambda: write_text(folder / "posterior.csv", _table(list(drawn.keys), [list(row) for row in drawn.values])),
-        )
-        sample = drawn
     if found.at_bound:
         raise CaseError(
             [
@@ -146,7 +122,7 @@ def run_calibrate(
                 for key in found.at_bound
             ]
         )  # fmt: skip
-    return found, sample, folder
+    return found, folder
 
 
 def run_calibrate_each(
@@ -160,8 +136,6 @@ def run_calibrate_each(
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[list[Calibration], Scatter, Path]:
     """Calibrate every file alone; write calibration.json with the scatter between them; collective."""
-    _need("lmfit", "calibrate")
-    _need("openturns", "--each")
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
     _tell_of_stick(case, log, comm)
@@ -221,12 +195,10 @@ def run_life(
     output: Path | None,
     log: Log,
     *,
-    indices: bool = False,
     resume: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[Lifetime, Path]:
     """Compute lives; write samples.csv, life.json and life.png; collective."""
-    _need("openturns", "life")
     quantities = [parse_quantity(one, "--until", case.names) for one in until]
     scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
     for text in scatters:
@@ -248,7 +220,7 @@ def run_life(
     for line in scatter.text:
         log(line)
     found = lifetime(
-        case, quantities, scatter, samples=samples, seed=seed, wanted=level, indices=indices, folder=folder,
+        case, quantities, scatter, samples=samples, seed=seed, wanted=level, folder=folder,
         resume=resume, comm=comm, progress=_counter(log, "samples"),
     )  # fmt: skip
 

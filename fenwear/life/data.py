@@ -9,9 +9,10 @@
 
 Lines that start with # may set keys of the case for this file (set KEY = VALUE), the amount of sliding
 after which all rows were measured (after), the worn body (body), the standard deviation of the
-measurement (sigma) and the density that turns a lost mass into a volume (density). Columns: x with depth or
-height (the profile of a worn surface; height is minus the depth), or after with volume, mass, depth, scar_width,
-friction or temperature; sigma belongs to the measured column. Several profiles follow each other with a column after.
+measurement (sigma), how it scatters (scatter, see `fenwear.life.noise`), and the density that turns a lost mass into a
+volume (density). Columns: x with depth or height (the profile of a worn surface; height is minus the depth), or after
+with volume, mass, depth, scar_width, friction or temperature; sigma belongs to the measured column. Several profiles
+follow each other with a column after.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from fenwear.arrays import Array
 from fenwear.case import Case, changed_case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
+from fenwear.life.noise import Noise
 from fenwear.life.quantities import UNITS, Quantity, of_case, parse_amount
 
 MEASURED = {
@@ -36,7 +38,7 @@ MEASURED = {
     "temperature": "K",
 }  # fmt: skip
 PLACES = {"x": "mm"}
-DIRECTIVES = ("set", "after", "body", "sigma", "density")
+DIRECTIVES = ("set", "after", "body", "sigma", "density", "scatter")
 LEAST_ROWS = 3
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*([(\[]\s*(?P<unit>[^)\]]*?)\s*[)\]])?\s*")
 
@@ -54,6 +56,7 @@ class Series:
         values: (k,), in the internal unit.
         sigma: Standard deviations (k,); None where the file gives none.
         rows: Lines of the file (k,).
+        noise: How the errors depend on each other.
     """
 
     quantity: str
@@ -64,6 +67,11 @@ class Series:
     values: Array
     sigma: Array | None
     rows: tuple[int, ...]
+    noise: Noise = field(default_factory=Noise)
+
+    def whitened(self, values: Array) -> Array:
+        """Return residuals, or columns of their Jacobian (k, ...), as those of independent errors."""
+        return self.noise.whitened(values, self.sigma, self.x, self.after)
 
 
 @dataclass(frozen=True)
@@ -128,9 +136,9 @@ class _Reader:
             values, sigma, quantity = self._measured(name, units, columns, lines, only=len(measured) == 1)
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", UNITS[quantity], body)
             of_case(wanted, case, str(self.path))
-            whole = Series(quantity, body, None, after, counted, values, sigma, lines)
-            if "x" in names:
-                x = self._converted("x", units["x"], "mm", columns["x"])
+            x = self._converted("x", units["x"], "mm", columns["x"]) if "x" in names else None
+            whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity, x))
+            if x is not None:
                 series += self._profiles(whole, x)
             else:
                 self._check_rising(after, lines, strictly=True)
@@ -305,6 +313,15 @@ class _Reader:
             raise self._fail("# sigma", f"expected more than zero, got {given!r}")
         return np.full(len(lines), value)
 
+    def _noise(self, quantity: str, x: Array | None) -> Noise:
+        """Return how a measured quantity scatters."""
+        try:
+            noise = Noise.parse(self.directives["scatter"]) if "scatter" in self.directives else Noise()
+            noise.check(quantity, x)
+        except ValueError as error:
+            raise self._fail("# scatter", str(error)) from None
+        return noise
+
     def _profiles(self, whole: Series, x: Array) -> list[Series]:
         """Return one series for each time."""
         found = []
@@ -313,16 +330,9 @@ class _Reader:
             if len(own) < LEAST_ROWS:
                 raise self._fail(f"row {whole.rows[int(own[0])]}", f"expected at least {LEAST_ROWS} rows of a profile, "
                                  f"got {len(own)}")  # fmt: skip
+            sigma = None if whole.sigma is None else whole.sigma[own]
+            rows = tuple(whole.rows[int(k)] for k in own)
             found.append(
-                Series(
-                    whole.quantity,
-                    whole.body,
-                    x[own],
-                    whole.after[own],
-                    whole.counted,
-                    whole.values[own],
-                    None if whole.sigma is None else whole.sigma[own],
-                    tuple(whole.rows[int(k)] for k in own),
-                )
+                replace(whole, x=x[own], after=whole.after[own], values=whole.values[own], sigma=sigma, rows=rows)
             )
         return found

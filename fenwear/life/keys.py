@@ -11,6 +11,7 @@ from fenwear.case import Case, changed_case
 from fenwear.errors import CaseError, InputError
 
 EXPONENTS = ("pressure_exponent", "speed_exponent")
+BISECTIONS = 40
 
 
 @dataclass(frozen=True)
@@ -107,3 +108,21 @@ def value_of(case: Case, path: str, text: str, option: str = "") -> float:
     except ValueError:
         return find_key(changed_case(case, f'{path}="{text.strip()}"'), path).value
     return find_key(with_values(case, {path: number}), path).value
+
+
+def nearest_possible(case: Case, path: str, inside: float, outside: float) -> float:
+    """Return the possible value of a key that is nearest to `outside`, from `inside`, which is possible."""
+
+    def possible(value: float) -> bool:
+        try:
+            with_values(case, {path: value})
+        except CaseError:
+            return False
+        return True
+
+    if possible(outside):
+        return outside
+    for _ in range(BISECTIONS):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if possible(middle) else (inside, middle)
+    return inside

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from mpi4py import MPI
+from scipy.optimize import OptimizeResult, least_squares
 
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
-from fenwear.life.correlated import Correlated
 from fenwear.life.data import DataSet
 from fenwear.life.identifiable import hardly_known, without_baselines
 from fenwear.life.model import Model
@@ -22,9 +21,6 @@ from fenwear.life.ranks import share
 from fenwear.life.unknowns import Unknown, scaled
 from fenwear.parallel import Team
 from fenwear.progress import Log, now_and_then
-
-if TYPE_CHECKING:
-    import lmfit
 
 STEP = 1e-5  # of the unknowns in the Jacobian, which are of order one
 NO_INFLUENCE = 1e-9  # relative change of all predictions over the relative change of an unknown
@@ -69,7 +65,6 @@ class LeastSquares:
         self.observed = np.concatenate([series.values for series in self.series])
         self.has_sigma = self.series[0].sigma is not None
         self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
-        self.correlated: Correlated | None = None  # how the errors of measurement are, beyond sigma
         self._lines, self.baseline_names = self._baselines()
         self._reach = self._first_reach()
         count = len(self.unknowns) + self._lines.shape[1]
@@ -209,18 +204,23 @@ class LeastSquares:
         Only the places and conditions of the data count, not their values: a plan of a measurement will do.
         """
         jacobian = self.jacobian(np.zeros(len(self.unknowns)) if z is None else z)
-        weighted = np.hstack([jacobian, self._lines]) / self.sigma[:, None]
+        weighted = self.whitened(np.hstack([jacobian, self._lines]))
         return hardly_known(
             [one.unknown.key for one in self.unknowns], self.data, without_baselines(weighted, len(self.unknowns))
         )
+
+    def whitened(self, values: Array) -> Array:
+        """Return residuals, or columns of their Jacobian (n, ...), as those of independent errors."""
+        rows = np.split(values, np.cumsum([len(series.values) for series in self.series])[:-1])
+        return np.concatenate([series.whitened(own) for series, own in zip(self.series, rows, strict=True)])
 
     def fit(
         self,
         observed: Array | None = None,
         start: Vector | None = None,
         jacobian: Array | None = None,
-    ) -> lmfit.minimizer.MinimizerResult:
-        """Return lmfit's result; collective.
+    ) -> OptimizeResult:
+        """Return scipy's result, whose `x` has the fitted unknowns and the baselines; collective.
 
         Args:
             observed: Values in place of the measured ones (n,).
@@ -228,55 +228,28 @@ class LeastSquares:
             jacobian: Of the predictions (n, m), kept instead of computed anew in each step: for data near those
                 it belongs to.
         """
-
-        def derivative(parameters: lmfit.Parameters) -> Array:
-            z = self._parts(parameters)[0]
-            columns = self.jacobian(z) if jacobian is None else jacobian
-            return self._independent(np.hstack([columns, self._lines]) / self.sigma[:, None])
-
-        minimizer = self.minimizer(observed, start)
-        minimizer.max_nfev = MOST_TRIALS
-        with warnings.catch_warnings(action="ignore"):  # a singular covariance is told in our words
-            return minimizer.minimize(method="least_squares", jac=derivative, x_scale=self._reach, xtol=SETTLED)
-
-    def minimizer(self, observed: Array | None = None, start: Vector | None = None) -> lmfit.Minimizer:
-        """Return lmfit's minimizer of the weighted residuals; arguments as of `fit`."""
-        import lmfit
-
         values = self.observed if observed is None else observed
-        parameters = lmfit.Parameters()
-        begin = np.zeros(len(self.unknowns)) if start is None else start
-        for k, (one, z) in enumerate(zip(self.unknowns, begin, strict=True)):
-            bounds = (one.unknown.low, one.unknown.high)
-            low, high = (one.fitted(bound) if np.isfinite(bound) else bound for bound in bounds)
-            parameters.add(f"u{k}", value=float(np.clip(z, low, high)), min=low, max=high)
-        for k in range(self._lines.shape[1]):
-            parameters.add(f"b{k}", value=0.0)
+        m, lines = len(self.unknowns), self._lines.shape[1]
+        ends = [[one.fitted(b) if np.isfinite(b) else b for b in (one.unknown.low, one.unknown.high)]
+                for one in self.unknowns]  # fmt: skip
+        low, high = np.array([*ends, *[[-np.inf, np.inf]] * lines]).T
+        begin = np.clip(np.concatenate([np.zeros(m) if start is None else start, np.zeros(lines)]), low, high)
 
-        def residual(parameters: lmfit.Parameters) -> Array:
-            z, lines = self._parts(parameters)
-            return self._independent((self._tried(z) + self._lines @ lines - values) / self.sigma)
+        def derivative(both: Array) -> Array:
+            columns = self.jacobian(both[:m]) if jacobian is None else jacobian
+            return self.whitened(np.hstack([columns, self._lines]))
 
-        return lmfit.Minimizer(residual, parameters, scale_covar=not self.absolute)
+        def residual(both: Array) -> Array:
+            return self.whitened(self.with_baselines(both) - values)
 
-    @property
-    def absolute(self) -> bool:
-        """Whether the errors' size is given, and not to be told by the residuals."""
-        return self.has_sigma and self.correlated is None
+        return least_squares(
+            residual, begin, derivative, (low, high), x_scale=self._reach, xtol=SETTLED, max_nfev=MOST_TRIALS
+        )
 
-    def _independent(self, weighted: Array) -> Array:
-        """Return residuals over sigma (n, ...) as independent ones."""
-        return np.asarray(weighted) if self.correlated is None else self.correlated.whiten(weighted)
-
-    def weighted(self, z: Vector, lines: Array) -> tuple[Array, Array]:
-        """Return the residuals over sigma (n,), as measured, and their Jacobian (n, m + baselines)."""
-        residual = (self._tried(np.asarray(z, dtype=float)) + self._lines @ lines - self.observed) / self.sigma
-        return np.asarray(residual), np.hstack([self.jacobian(z), self._lines]) / self.sigma[:, None]
-
-    def _parts(self, parameters: lmfit.Parameters) -> tuple[Array, Array]:
-        """Return fitted unknowns and baselines."""
-        numbers = np.array([parameters[name].value for name in parameters if name[0] in "ub" and name[1:].isdigit()])
-        return numbers[: len(self.unknowns)], numbers[len(self.unknowns) :]
+    def with_baselines(self, both: Array) -> Array:
+        """Return the predictions (n,) of fitted unknowns and baselines."""
+        m = len(self.unknowns)
+        return np.asarray(self._tried(np.asarray(both[:m])) + self._lines @ both[m:])
 
 
 def repeated(problem: LeastSquares, truth: Vector, repetitions: int, seed: int = 0) -> tuple[Array, Array]:
@@ -298,12 +271,14 @@ def repeated(problem: LeastSquares, truth: Vector, repetitions: int, seed: int =
     problem.keep_jumps(truth)
     exact, jacobian = problem.predicted(truth), problem.jacobian(truth)
     m = len(problem.unknowns)
-    noise = generator.standard_normal((repetitions, len(exact))) * problem.sigma
+    colour = np.linalg.inv(problem.whitened(np.eye(len(exact))))
+    noise = generator.standard_normal((repetitions, len(exact))) @ colour.T
 
     def one(k: int) -> tuple[Array, Array]:
         result = problem.fit(exact + noise[k], truth, jacobian)
-        values = [(result.params[f"u{i}"].value, result.params[f"u{i}"].stderr) for i in range(m)]
-        return np.array([v for v, _ in values]) - np.asarray(truth), np.array([e for _, e in values], dtype=float)
+        covariance = np.linalg.inv(result.jac.T @ result.jac)
+        scale = 1.0 if problem.has_sigma else np.sqrt(2 * result.cost / (len(exact) - len(result.x)))
+        return result.x[:m] - np.asarray(truth), scale * np.sqrt(np.diag(covariance)[:m])
 
     found = share(problem.comm, repetitions, one)
     return np.array([value for value, _ in found]), np.array([error for _, error in found])

@@ -25,11 +25,11 @@ from fenwear.life.quantities import LIMIT, Quantity, of_case, parse_quantity
 from fenwear.life.quantities import lives as lives_until
 from fenwear.life.ranks import everywhere, in_chunks
 from fenwear.life.scatter import Scatter
-from fenwear.life.sobol import LEVEL, SobolIndices, sobol_design, sobol_indices
 from fenwear.parallel import on_root
 from fenwear.results.disk import writing
 
 SAMPLES = "samples.csv"
+LEVEL = 0.95  # of the intervals
 QUANTILES = (0.01, 0.05, 0.1, 0.5, 0.9, 0.95)
 MOST_FAILED = 0.05  # of the samples, beyond which what is left says nothing of all
 
@@ -62,7 +62,6 @@ class Lifetime:
         lives: (n,); infinite where the level is never reached, NaN where a run did not converge.
         quantiles: Of the lives; those of level q are reached before by a share q of the parts.
         reliability: Share of parts that live as long as was wanted; None if that was not asked for.
-        sobol: Indices of the logarithm of the life; None where they were not asked for, or a part lives for ever.
         failures: What went wrong, by its sample.
         seed: Of the sample.
         each: Of the levels that were asked for, and of the named contacts; empty for one level of one contact. The
@@ -76,7 +75,6 @@ class Lifetime:
     lives: Array
     quantiles: tuple[Estimate, ...]
     reliability: Estimate | None
-    sobol: SobolIndices | None
     failures: dict[int, str]
     seed: int
     each: tuple[Lifetime, ...] = ()
@@ -109,7 +107,6 @@ class Lifetime:
             "never_reached": int(np.isinf(self.lives).sum()),
             "quantiles": [row(one, "level") for one in self.quantiles],
             "reliability": None if self.reliability is None else row(self.reliability, "wanted"),
-            "sobol": None if self.sobol is None else self.sobol.as_json(),
             "seed": self.seed,
             **self._each_as_json(),
         }
@@ -136,14 +133,6 @@ class Lifetime:
             lines.append(
                 f"  a share of {one.value:.4f} ({one.low:.4f} to {one.high:.4f}) lives for {one.level:.6g} {unit}"
             )
-        if self.sobol is not None:
-            lines.append(
-                "  share of the variance of the life's logarithm with 95 % intervals: alone, with interactions"
-            )
-            lines += [
-                f"    {name:36} {first:7.3f} ({a[0]:.3f} to {a[1]:.3f})  {total:7.3f} ({b[0]:.3f} to {b[1]:.3f})"
-                for name, first, total, a, b in self.sobol.rows()
-            ]  # fmt: skip
         if self.each:
             lines.append(
                 f"  {'of each, reached before by a share of':40} {'1 %':>11} {'10 %':>12} {'50 %':>12}  is first"
@@ -198,7 +187,6 @@ def lifetime(
     samples: int = 200,
     seed: int = 0,
     wanted: float | None = None,
-    indices: bool = False,
     limit: int = LIMIT,
     folder: Path | None = None,
     resume: bool = False,
@@ -215,7 +203,6 @@ def lifetime(
         samples: Size n of the sample, a run for each.
         seed: Of the sample.
         wanted: A life whose reliability is asked for, in the unit of the lives.
-        indices: Whether Sobol indices of d independent keys are wanted, too: n (d + 2) runs.
         limit: Cycles after which a level counts as never reached.
         folder: Where samples.csv is kept; None for nowhere.
         resume: Go on with the samples that are there.
@@ -231,9 +218,7 @@ def lifetime(
     if samples < 2:
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
-    if indices and (len(scatter.keys) < 2 or scatter.correlated):
-        raise CaseError(InputError("--sobol", "expected two or more keys that scatter independently of each other"))
-    design = on_root(comm, lambda: _design(scatter, samples, seed, with_indices=indices))
+    design = on_root(comm, lambda: scatter.sample(samples, seed))
     model = Model(case)
     quantities = everywhere(comm, lambda: _of_contacts(model, asked))
     names = [one.text for one in quantities]
@@ -241,11 +226,11 @@ def lifetime(
     done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
     lives, failures = _run(model, quantities, scatter.keys, design, done, record, limit, comm, progress)
 
-    def summary(one: Quantity, own: Array, level: float | None, *, with_indices: bool = False) -> Lifetime:
-        return _summary(one, scatter.keys, design, own, failures, samples, level, seed, with_indices=with_indices)
+    def summary(one: Quantity, own: Array, level: float | None) -> Lifetime:
+        return _summary(one, scatter.keys, design, own, failures, level, seed)
 
     whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
-    found = summary(whole, lives.min(axis=1), wanted, with_indices=indices)
+    found = summary(whole, lives.min(axis=1), wanted)
     told = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one is not asked[0]]
     each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in told)
     return replace(found, each=each)
@@ -286,15 +271,6 @@ def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
     if len(asked) > 1 or whole.contact or whole.at is not None or len(names) < 2:
         return list(asked)
     return [whole, *(whole.within(name) for name in names)]
-
-
-def _design(scatter: Scatter, samples: int, seed: int, *, with_indices: bool) -> Array:
-    import openturns as ot
-
-    if with_indices:
-        return sobol_design(scatter.distribution, samples, seed)
-    ot.RandomGenerator.SetSeed(seed)
-    return np.array(scatter.distribution.getSample(samples))
 
 
 def _run(
@@ -415,22 +391,15 @@ def _summary(
     design: Array,
     lives: Array,
     failures: dict[int, str],
-    samples: int,
     wanted: float | None,
     seed: int,
-    *,
-    with_indices: bool,
 ) -> Lifetime:
     if len(failures) > MOST_FAILED * len(lives):
         first = next(iter(failures.values()))
         raise ConvergenceError(
             f"{len(failures)} of {len(lives)} samples did not converge, too many for a distribution; the first: {first}"
         )
-    plain = lives[: 2 * samples] if with_indices else lives  # two independent samples stand first in the design
-    known = plain[~np.isnan(plain)]
-    indices = None
-    if with_indices and np.isfinite(lives).all() and np.ptp(lives) > 0:
-        indices = sobol_indices(keys, design, np.log(lives), samples, seed)
+    known = lives[~np.isnan(lives)]
     return Lifetime(
         quantity.text,
         quantity.unit,
@@ -439,7 +408,6 @@ def _summary(
         lives,
         tuple(quantile(known, level) for level in QUANTILES),
         None if wanted is None else reliability(known, wanted),
-        indices,
         failures,
         seed,
     )

@@ -77,8 +77,8 @@ def _label_places(ax: Axes) -> None:
 
 
 def life_figure(life: Lifetime) -> Figure:
-    """Return the distribution of the lives and, where there are some, the Sobol indices."""
-    figure, axes = panels(1 if life.sobol is None else 2, 3.0, share_x=False)
+    """Return the distribution of the lives."""
+    figure, axes = panels(1, 3.0, share_x=False)
     known = np.sort(life.lives[~np.isnan(life.lives)])
     share = np.arange(1, len(known) + 1) / len(known)
     finite = np.isfinite(known)
@@ -98,17 +98,6 @@ def life_figure(life: Lifetime) -> Figure:
     axes[0].set_xlabel(f"{life.quantity} ({life.unit or 'cycles'})")
     axes[0].set_ylabel("share that has failed")
     axes[0].set_title("95 % intervals of the quantiles in red")
-    if life.sobol is not None:
-        heights = np.arange(len(life.sobol.names))
-        for shift, values, interval, colour, name in (
-            (0.2, life.sobol.first, life.sobol.first_interval, BLUE, "alone"),
-            (-0.2, life.sobol.total, life.sobol.total_interval, RED, "with interactions"),
-        ):
-            errors = np.abs(interval.T - values)
-            axes[1].barh(heights + shift, values, 0.38, xerr=errors, color=colour, label=name)
-        axes[1].set_yticks(heights, life.sobol.names)
-        axes[1].set_xlabel("share of the variance of the life's logarithm")
-        axes[1].legend(frameon=False)
     return figure
 
 

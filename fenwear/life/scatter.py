@@ -1,4 +1,4 @@
-"""Distributions of keys of a case, by OpenTURNS: given one by one, or together by a calibration.
+"""Distributions of keys of a case: given one by one, or together by a calibration.
 
 wear.punch.coefficient = lognormal(4e-8 1/MPa, 50 %)    median and coefficient of variation
 contact.friction = normal(0.25, 0.02)                   mean and standard deviation, or its percentage of the mean
@@ -12,17 +12,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy import linalg, stats
 
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
-from fenwear.life.keys import find_key, value_of, with_values
-
-if TYPE_CHECKING:
-    import openturns as ot
+from fenwear.life.keys import find_key, nearest_possible, value_of, with_values
 
 RARE = 1e-6  # probability below which an impossible value does not count
 _FORM = re.compile(
@@ -33,19 +31,26 @@ KINDS = ("normal", "lognormal", "uniform")
 
 @dataclass(frozen=True)
 class Scatter:
-    """The joint distribution of keys.
+    """The joint distribution of keys: of each its own, which depend on each other as normal ones do.
 
     Attributes:
         keys: Their paths.
-        distribution: OpenTURNS' distribution of their values, in internal units.
-        correlated: Whether they depend on each other.
+        marginals: scipy's distributions of their values, in internal units.
+        correlation: Of the normal variables behind them (d, d).
         text: For people, one line for each key.
     """
 
     keys: tuple[str, ...]
-    distribution: ot.Distribution
-    correlated: bool
+    marginals: tuple[Any, ...]
+    correlation: Array
     text: tuple[str, ...]
+
+    def sample(self, size: int, seed: int) -> Array:
+        """Return values of the keys (size, d)."""
+        generator = np.random.default_rng(seed)
+        normal = generator.multivariate_normal(np.zeros(len(self.keys)), self.correlation, size, method="eigh")
+        columns = [one.ppf(stats.norm.cdf(z)) for one, z in zip(self.marginals, normal.T, strict=True)]
+        return np.column_stack(columns)
 
     @classmethod
     def joint(
@@ -59,24 +64,19 @@ class Scatter:
             covariance: Of the values, or of their logarithms (m, m).
             logarithmic: Of each key.
         """
-        import openturns as ot
-
         errors = np.sqrt(np.diag(covariance))
-        rounded = np.clip(covariance / np.outer(errors, errors), -1.0, 1.0)
-        np.fill_diagonal(rounded, 1.0)
-        correlation = ot.CorrelationMatrix(rounded.tolist())
-        marginals = [
-            ot.LogNormal(float(np.log(value)), float(error)) if log else ot.Normal(float(value), float(error))
+        correlation = np.clip(covariance / np.outer(errors, errors), -1.0, 1.0)
+        np.fill_diagonal(correlation, 1.0)
+        marginals = tuple(
+            stats.lognorm(error, scale=value) if log else stats.norm(value, error)
             for value, error, log in zip(values, errors, logarithmic, strict=True)
-        ]
+        )
         text = tuple(
             f"{key}: {'lognormal, median' if log else 'normal, mean'} {value:.6g}, "
             + (f"standard deviation of the logarithm {error:.3g}" if log else f"standard deviation {error:.3g}")
             for key, value, error, log in zip(keys, values, errors, logarithmic, strict=True)
         )
-        coupled = len(keys) > 1 and bool((np.abs(np.array(correlation) - np.eye(len(keys))) > 1e-12).any())
-        joined = ot.JointDistribution if hasattr(ot, "JointDistribution") else ot.ComposedDistribution
-        return cls(tuple(keys), joined(marginals, ot.NormalCopula(correlation)), coupled, text)
+        return cls(tuple(keys), marginals, correlation, text)
 
     def and_also(self, other: Scatter) -> Scatter:
         """Return both, independent of each other.
@@ -84,15 +84,13 @@ class Scatter:
         Raises:
             CaseError: a key is in both.
         """
-        import openturns as ot
-
         twice = [key for key in self.keys if key in other.keys]
         if twice:
             raise CaseError([InputError(f"--scatter {key}", "has a distribution already") for key in twice])
         return Scatter(
             (*self.keys, *other.keys),
-            ot.BlockIndependentDistribution([self.distribution, other.distribution]),
-            self.correlated or other.correlated,
+            (*self.marginals, *other.marginals),
+            linalg.block_diag(self.correlation, other.correlation),
             (*self.text, *other.text),
         )
 
@@ -103,15 +101,14 @@ class Scatter:
             CaseError: names the key, the value and how probable it is.
         """
         problems = []
-        for number, key in enumerate(self.keys):
+        for key, marginal in zip(self.keys, self.marginals, strict=True):
             find_key(case, key, "--scatter")
-            marginal = self.distribution.getMarginal(number)
             for level in (RARE, 0.5, 1 - RARE):
-                value = float(marginal.computeQuantile(level)[0])
+                value = float(marginal.ppf(level))
                 try:
                     with_values(case, {key: value})
                 except CaseError as error:
-                    share = self._share_of_impossible(case, key, marginal)
+                    share = 0.5 if level == 0.5 else self._share_beyond(case, key, marginal, value)
                     problems.append(
                         InputError(
                             f"--scatter {key}",
@@ -124,28 +121,10 @@ class Scatter:
             raise CaseError(problems)
 
     @staticmethod
-    def _share_of_impossible(case: Case, key: str, marginal: Any) -> float:
-        """Return the probability of impossible values, which lie below or above a limit, by bisection."""
-
-        def possible(level: float) -> bool:
-            try:
-                with_values(case, {key: float(marginal.computeQuantile(level)[0])})
-            except CaseError:
-                return False
-            return True
-
-        if not possible(0.5):
-            return 0.5
-        share = 0.0
-        for outer in (RARE, 1 - RARE):
-            if possible(outer):
-                continue
-            inner, limit = 0.5, outer
-            for _ in range(30):
-                middle = (inner + limit) / 2
-                inner, limit = (middle, limit) if possible(middle) else (inner, middle)
-            share += limit if limit < 0.5 else 1 - limit
-        return share
+    def _share_beyond(case: Case, key: str, marginal: Any, impossible: float) -> float:
+        """Return the probability of values beyond the limit between the median and an impossible value."""
+        limit = float(marginal.cdf(nearest_possible(case, key, float(marginal.median()), impossible)))
+        return min(limit, 1 - limit)
 
 
 def parse_scatter(case: Case, text: str) -> Scatter:
@@ -154,8 +133,6 @@ def parse_scatter(case: Case, text: str) -> Scatter:
     Raises:
         CaseError: no such key or kind, or numbers that make no distribution.
     """
-    import openturns as ot
-
     path, equals, form = (part.strip() for part in text.partition("="))
     match = _FORM.fullmatch(form)
     name = f"--scatter {path}"
@@ -170,17 +147,18 @@ def parse_scatter(case: Case, text: str) -> Scatter:
         high = value_of(case, path, second, "--scatter")
         if not middle < high:
             raise CaseError(InputError(name, f"expected ends that rise, got {form!r}"))
-        return Scatter((path,), ot.Uniform(middle, high), False, (f"{path}: uniform from {middle:.6g} to {high:.6g}",))
+        line = f"{path}: uniform from {middle:.6g} to {high:.6g}"
+        return Scatter((path,), (stats.uniform(middle, high - middle),), np.eye(1), (line,))
     spread = _spread(case, path, name, middle, second)
     if kind == "normal":
         line = f"{path}: normal, mean {middle:.6g}, standard deviation {spread:.4g}"
-        return Scatter((path,), ot.Normal(middle, spread), False, (line,))
+        return Scatter((path,), (stats.norm(middle, spread),), np.eye(1), (line,))
     if middle <= 0:
         raise CaseError(InputError(name, f"expected a median above zero, got {first!r}"))
     variation = spread / middle
     width = float(np.sqrt(np.log1p(variation**2)))
     line = f"{path}: lognormal, median {middle:.6g}, coefficient of variation {100 * variation:.3g} %"
-    return Scatter((path,), ot.LogNormal(float(np.log(middle)), width), False, (line,))
+    return Scatter((path,), (stats.lognorm(width, scale=middle),), np.eye(1), (line,))
 
 
 def _spread(case: Case, path: str, name: str, middle: float, text: str) -> float:

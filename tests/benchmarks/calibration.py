@@ -6,9 +6,9 @@ Data are made by the model itself, of a punch that translates, and fitted anew i
 
 - with normal noise of 0.2 um that is known: the wear coefficient from one profile, then coefficient, exponent and
   friction from profiles at two loads;
-- with errors whose size and correlation the calibration has to find: the wear coefficient from volumes and from a
-  profile, with independent readings, with scatter that adds up from one volume to the next, and with roughness, whose
-  neighbours have a correlation of 0.9.
+- with errors whose size the calibration has to find, and whose kind the series names: the wear coefficient from
+  volumes and from a profile, with independent readings, with scatter that adds up from one volume to the next, and with
+  roughness, whose neighbours have a correlation of 0.9.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy import stats
 
 from fenwear import load_case
 from fenwear.arrays import Array
-from fenwear.life import DataSet, LeastSquares, Series, Unknown, calibrate, repeated
+from fenwear.life import DataSet, LeastSquares, Noise, Series, Unknown, calibrate, repeated
 
 SMALL = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"]
 KEYS = ("wear.punch.coefficient", "wear.punch.pressure_exponent", "contact.friction")
@@ -69,12 +69,12 @@ def volumes() -> Series:
 
 
 def told(repetitions: int) -> None:
-    """Print how often intervals hold where the calibration finds the errors' size and correlation itself."""
-    kinds: tuple[tuple[str, Callable[[], Series], Callable[[np.random.Generator, int], Array], float], ...] = (
-        ("volumes, independent readings", volumes, independent, 1e-2),
-        ("volumes, scatter that adds up", volumes, added_up, 1e-3),
-        ("profile, independent readings", profile, independent, 1e-2),
-        ("profile, rough", profile, rough, 1e-2),
+    """Print how often intervals hold where the calibration finds the errors' size itself."""
+    kinds: tuple[tuple[str, Callable[[], Series], Callable[[np.random.Generator, int], Array], float, Noise], ...] = (
+        ("volumes, independent readings", volumes, independent, 1e-2, Noise("independent")),
+        ("volumes, scatter that adds up", volumes, added_up, 1e-3, Noise("adds up")),
+        ("profile, independent readings", profile, independent, 1e-2, Noise("independent")),
+        ("profile, rough", profile, rough, 1e-2, Noise("alike", -1 / np.log(0.9))),
     )
     case = load_case("example2", SMALL)
     chance = stats.binom(repetitions, 0.95)
@@ -83,8 +83,8 @@ def told(repetitions: int) -> None:
         print(
             f"errors found, {repetitions} repetitions; chance allows {chance.ppf(0.005):.0f} to {chance.ppf(0.995):.0f}"
         )
-    for name, make, errors, size in kinds:
-        series, settings = make(), plan(10e3).settings
+    for name, make, errors, size, noise in kinds:
+        series, settings = replace(make(), noise=noise), plan(10e3).settings
         exact = LeastSquares(case, [DataSet(name, settings, (series,))], [Unknown(KEYS[0])]).predicted([0.0])
         draw, begin = np.random.default_rng(5), time.perf_counter()
         held, deviations, widths = 0, [], []

@@ -118,7 +118,7 @@ def test_stick_that_is_left_out_is_told_before_a_fit(monkeypatch: pytest.MonkeyP
     (tmp_path / "volumes.csv").write_text(VOLUMES)
     case = load_case("fretting-partial-slip", ["contact.law=gross-sliding"])
     with pytest.raises(CaseError, match="the fit has begun"):
-        commands.run_calibrate(case, "x", [tmp_path / "volumes.csv"], [K], [], None, None, told.append)
+        commands.run_calibrate(case, "x", [tmp_path / "volumes.csv"], [K], [], None, told.append)
     assert len(told) == 1
     assert "% of the amplitude" in told[0]
     assert "gross sliding leaves that out" in told[0]

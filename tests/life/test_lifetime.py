@@ -1,4 +1,4 @@
-"""Life with scatter: exact distributions, intervals that hold what they say, Sobol indices, resuming, ranks."""
+"""Life with scatter: exact distributions, intervals that hold what they say, resuming, ranks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import openturns as ot
 import pytest
 from mpi4py import MPI
 from scipy import stats
@@ -20,32 +19,12 @@ from fenwear.life import (
     load_scatter,
     parse_quantity,
     parse_scatter,
-    sobol_design,
-    sobol_indices,
 )
 from fenwear.life.lifetime import quantile, reliability
 from tests.results.test_contacts import two_pads
 
 K = "wear.punch.coefficient"
 UNTIL = "volume 3 mm^3"
-
-
-def test_indices_of_ishigamis_function() -> None:
-    """sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1: known first-order and total indices (row 39)."""
-    size, a, b = 20_000, 7.0, 0.1
-    distribution = ot.JointDistribution([ot.Uniform(-np.pi, np.pi)] * 3)
-    x = sobol_design(distribution, size, 1)
-    y = np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-    parts = np.array([0.5 * (1 + b * np.pi**4 / 5) ** 2, a**2 / 8, 0.0])
-    together = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
-    variance = parts.sum() + together
-    found = sobol_indices(("x1", "x2", "x3"), x, y, size)
-    first, total = parts / variance, (parts + together * np.array([1, 0, 1])) / variance
-    assert found.first == pytest.approx(first, abs=0.02)
-    assert found.total == pytest.approx(total, abs=0.02)
-    for exact, intervals in ((first, found.first_interval), (total, found.total_interval)):
-        assert (np.abs(exact - intervals.mean(axis=1)) < np.diff(intervals, axis=1)[:, 0]).all()  # twice as wide
-        assert (np.diff(intervals, axis=1) < 0.06).all()
 
 
 @pytest.mark.parametrize("level", [0.05, 0.5])
@@ -82,23 +61,6 @@ def test_life_of_a_lognormal_coefficient_is_lognormal(small: Callable[..., Case]
     assert found.reliability is not None
     exact = stats.norm.cdf(np.log(3.0 / (4e-8 * 6e4) / 1000.0) / width)
     assert found.reliability.low <= exact <= found.reliability.high
-    assert found.sobol is None
-
-
-def test_indices_of_a_life_of_two_keys(small: Callable[..., Case]) -> None:
-    """ln N = const - ln k - ln F: the shares of the variance are those of the two logarithms."""
-    case = small("example2")
-    first = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 40 %)")
-    scatter = first.and_also(parse_scatter(case, "motion.amplitude=lognormal(1.5 mm, 20 %)"))
-    plain = lifetime(case, UNTIL, scatter, samples=8, comm=MPI.COMM_SELF)
-    assert (len(plain.lives), plain.sobol) == (8, None)  # what was asked for is what is done
-    found = lifetime(case, UNTIL, scatter, samples=30, indices=True, comm=MPI.COMM_SELF)
-    assert len(found.lives) == 30 * 4
-    assert found.sobol is not None
-    assert "with 95 % intervals" in found.text()
-    variances = np.log1p(np.array([0.4, 0.2]) ** 2)
-    for exact, interval in zip(variances / variances.sum(), found.sobol.first_interval, strict=True):
-        assert interval[0] - 0.1 <= exact <= interval[1] + 0.1
 
 
 def test_an_interrupted_sampling_goes_on(small: Callable[..., Case], tmp_path: Path) -> None:
@@ -158,13 +120,11 @@ def test_what_makes_no_sense_is_refused(small: Callable[..., Case], tmp_path: Pa
 def test_a_joint_distribution_has_the_correlation_of_its_calibration() -> None:
     covariance = np.array([[0.04, 0.015], [0.015, 0.01]])
     scatter = Scatter.joint([K, "contact.friction"], [4e-8, 0.25], covariance, [True, False])
-    ot.RandomGenerator.SetSeed(1)
-    sample = np.array(scatter.distribution.getSample(20_000))
+    sample = scatter.sample(20_000, 1)
     sample[:, 0] = np.log(sample[:, 0] / 4e-8)
     assert np.cov(sample.T) == pytest.approx(covariance, abs=1e-3)
-    assert scatter.correlated
-    with pytest.raises(CaseError, match="independent"):
-        sobol_design(scatter.distribution, 10, 0)
+    whole = scatter.and_also(Scatter.joint(["motion.amplitude"], [1.5], np.array([[0.01]]), [False]))
+    assert np.corrcoef(whole.sample(20_000, 2).T)[2, :2] == pytest.approx([0, 0], abs=0.03)
 
 
 def test_each_contact_has_a_life(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ for share in shares:
     varied = vary(system, f"heat.partition={share}")
     state = steady(varied)
     states.append(state)
-    rates.append(growth_rate(varied, state.pressure))
+    rates.append(growth_rate(varied, state))
     critical.append(critical_speed(varied, direction=1))
     print(f"{share:5.1f}   {state.heat.punch.max():8.2f} K   {state.pressure.max():12.2f} MPa   "
           f"{rates[-1]:+9.4f}/s   {critical[-1]:10.2f} mm/s")  # fmt: skip
@@ -128,7 +128,7 @@ alike = steady(insulated)
 middle = np.abs(x).argmin()
 same = np.interp(alike.heat.punch[0, middle], [state.heat.punch[0, middle] for state in states], shares)
 print(f"faces insulated, kappa = 0.2: {alike.heat.punch[0, middle]:.1f} K in the middle, "
-      f"growth {growth_rate(insulated, alike.phase_pressure):+.4f}/s")  # fmt: skip
+      f"growth {growth_rate(insulated, alike):+.4f}/s")  # fmt: skip
 print(f"faces convect:   kappa = {same:.2f} for the same temperature, "
       f"growth {np.interp(same, shares, rates):+.4f}/s")  # fmt: skip
 

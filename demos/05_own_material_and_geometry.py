@@ -221,7 +221,7 @@ print(f"{len(system.pair.x)} contact nodes, mean pressure {system.rigid.mean_pre
 
 # %%
 state = steady(system)
-rate = growth_rate(system, state.pressure)
+rate = growth_rate(system, state)
 print(f"largest pressure {state.pressure.max():.2f} MPa, twice the mean is {2 * system.rigid.mean_pressure:.2f} MPa")
 print(f"largest temperature: lining {state.heat.punch.max():.1f} K, rail {state.heat.strip.max():.1f} K")
 print(f"growth rate {rate:+.2g} 1/s: {'stable' if rate < 0 else 'unstable'}")

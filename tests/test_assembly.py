@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble, load_case, march, vary
+from fenwear import CaseError, Tribosystem, assemble, evolve, load_case, make_case, march, sweep, to_dataset, vary
 from fenwear.assembly import Bodies, Sliding, elastic, place, with_exchange, with_reduced_heat
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import OwnLaw, lame, strain, stress
@@ -43,23 +43,26 @@ def isotropic(u: Any) -> Any:
     return stress(strain(u), *lame(2e5, 0.3, "stress"))
 
 
-def test_own_materials() -> None:
+def test_own_materials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A demo of at most 60 lines; its steady state is twice the mean pressure of 10 MPa, whatever the material."""
     assert len(DEMO.read_text("utf-8").splitlines()) <= 60
+    monkeypatch.chdir(tmp_path)
     names = runpy.run_path(str(DEMO))
     pressure, weights = names["state"].pressure, names["system"].pair.weights
     assert pressure.max() == pytest.approx(20, rel=1e-9)
     np.testing.assert_allclose(pressure @ weights, 200, rtol=1e-10)  # N/mm of 2 kN over 10 mm
-    np.testing.assert_allclose(names["last"].pressure @ weights, 200, rtol=1e-10)
-
-
-def test_the_fibres_matter() -> None:
-    """The stiffness of the fibres' direction is felt: the pad's compliance is that of neither isotropic bound."""
-    names = runpy.run_path(str(DEMO))
-    carbon = names["pad"].law
-    u = ufl.Coefficient(names["pad"].space)
-    assert carbon.stress(u).ufl_shape == (2, 2)
-    response = names["system"].condensed.punch.response[:, :, :, 0]
+    system, case = names["system"], names["case"]
+    assert "made in Python" in case.to_toml()
+    found = sweep(case, {"contact.friction": [0.1, 0.2]})
+    np.testing.assert_allclose(found["largest_pressure"][-1], pressure.max(axis=1), rtol=1e-9)
+    again = vary(system, "punch.loads.0.force=[0, '-4 kN']")
+    assert again.rigid.mean_pressure == pytest.approx(2 * system.rigid.mean_pressure, rel=1e-12)
+    assert again.bodies.punch.body is names["pad"]
+    data = to_dataset(list(evolve(vary(system, "run.half_cycles=4"))))
+    np.testing.assert_allclose(data["pressure"].values @ weights, 200, rtol=1e-10)
+    # The stiffness of the fibres' direction is felt: the pad's compliance is that of neither isotropic bound.
+    assert system.bodies.punch.law.stress(ufl.Coefficient(system.bodies.punch.space)).ufl_shape == (2, 2)
+    response = system.condensed.punch.response[:, :, :, 0]
     sideways, down = np.abs(response[:, 0]).max(), np.abs(response[:, 1]).max()
     assert 0.01 < sideways / down < 1  # pressed fibres at 30 degrees give way sideways, too
 
@@ -192,3 +195,12 @@ def test_a_variant_takes_the_operator_of_its_own_settings() -> None:
     assert cycles.heat.operator == "full"
     found = [one.exchange.reduced for one in (full, reduced, again, cycles) if one.exchange is not None]
     assert found == [False, True, False, True]
+
+
+def test_meshes_given_are_all() -> None:
+    """Both are given or none, and the geometry's own keys do not go with them."""
+    tables = load_case("example1").resolved()
+    with pytest.raises(CaseError, match="meshes: expected"):
+        make_case(tables, meshes={"punch": None})
+    with pytest.raises(CaseError, match=r"geometry\.file"):
+        make_case(tables, meshes={"punch": None, "strip": None})

@@ -149,7 +149,12 @@ def build_bodies(
     check_operators(case)
     release(comm)  # what earlier systems have left
     known, owners = case.diffusion, _owners(case, comm)
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names, fresh)
+    given = case.given.meshes
+    meshes = (
+        (given["punch"], given["strip"])
+        if given
+        else build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names, fresh)
+    )
     moved, made = (None, (None, None)) if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
@@ -222,7 +227,9 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
             initial one.
     """
     regions, kind = description.regions, case.model.law
-    if theta is None:
+    if mesh.name in case.given.stresses:
+        law = case.given.stresses[mesh.name]
+    elif theta is None:
         law = isotropic(mesh, regions, case.initial_materials, kind)
     else:
         at = nodal_function(mesh, case.geometry.degree, theta)

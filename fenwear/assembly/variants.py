@@ -147,7 +147,7 @@ def set_up_by(case: Case) -> tuple[object, ...]:
         for name, body in case.bodies.items()
     )
     initial = case.heat.initial if case.heat is not None and case.warming else None
-    meshed = (case.geometry, case.folder, tuple(case.diffusion.items()))
+    meshed = (case.geometry, case.folder, case.given.meshes, case.given.stresses, tuple(case.diffusion.items()))
     grid = None if case.grid is None else (case.grid, case.motion)  # it reaches as far as the punch does
     return (*meshed, grid, case.model, case.setup, case.materials, case.heat is None, initial, *bodies)
 

@@ -12,7 +12,8 @@ Open Source Software 5, 2020).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, Self, runtime_checkable
+from functools import partial
+from typing import Any, Protocol, Self, runtime_checkable
 
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.condensation import condense_together
@@ -21,6 +22,7 @@ from fenwear.bodies.fine import fine
 from fenwear.bodies.half_space import half_space
 from fenwear.bodies.response import Request
 from fenwear.case import AUTO, CONDENSED, Case
+from fenwear.case.own_laws import BELOW
 from fenwear.errors import CaseError, InputError
 
 
@@ -86,19 +88,24 @@ OPERATORS: dict[str, Make] = {
 }  # besides the condensed body, which all of them are made of at once
 
 
-def register_operator(name: str, make: Make) -> None:
-    """Make an operator known by its name, as `operator = "name"` of a body in a case made in Python.
+def register_operator(name: str, make: Any = BELOW) -> Any:
+    """Make an operator known by its name, as `operator = "name"` of a body in a case made in Python; or a decorator.
 
     It is called on every rank with what the body is asked for: the body, the shares of its trace nodes in the forces
     (N, q), and one direction for each where no other is asked for.
 
     Args:
         name: A word, with hyphens; registered again, the new one takes its place.
-        make: Returns the operator; collective.
+        make: Returns the operator; collective. Without it, what the decorator stands above.
+
+    Returns:
+        The function, or the decorator.
 
     Raises:
         CaseError: `name` is no word, or that of the condensed body, or `make` cannot be called.
     """
+    if make is BELOW:
+        return partial(register_operator, name)
     if not (isinstance(name, str) and name.replace("-", "_").isidentifier()) or name in (AUTO, CONDENSED):
         raise CaseError(
             InputError(
@@ -108,6 +115,7 @@ def register_operator(name: str, make: Make) -> None:
     if not callable(make):
         raise CaseError(InputError(f"operator {name!r}", "expected a function of a request"))
     OPERATORS[name] = make
+    return make
 
 
 def check_operators(case: Case) -> None:

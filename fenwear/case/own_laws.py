@@ -12,7 +12,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from types import MappingProxyType
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from fenwear.errors import CaseError, InputError
 
 Now = Mapping[str, Array]
 Function = Callable[[Now], Any]
+F = TypeVar("F", bound=Function)
+BELOW: Any = object()  # in place of a function that follows a decorator
 WEAR = "wear"  # worn off both bodies at a node, mm/s: rates of states may depend on it
 FIRST, SLOW = 3, 0.02  # calls of a law that are timed, and seconds of each that are told
 
@@ -64,35 +68,51 @@ class _Law:
     of: frozenset[str]
 
 
+NO_STATES: Mapping[str, State] = MappingProxyType({})
 _CALLS: dict[str, list[float]] = {}  # CPU seconds of the first ones, by the law's name
 _LAWS: dict[str, _Law] = {}  # by their names: those of this process
 _STATES: dict[str, State] = {}
 
 
+@overload
 def register_law(
-    name: str, function: Function, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] | None = None
-) -> None:
+    name: str, *, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> Callable[[F], F]: ...
+@overload
+def register_law(
+    name: str, function: F, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> F: ...
+def register_law(
+    name: str, function: Any = BELOW, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> Any:
     """Make a law of one's own known by its name, as `law = "name"` in a case made in Python.
+
+    Without a function it is a decorator: `@register_law("name")` above the function.
 
     It is called with the values of its variables at the contact nodes (n,), by their names, and returns the
     coefficient at each (n,), or one number. Derivatives are taken by differences, where any are needed.
 
     Args:
         name: A word; registered again, the new function takes its place.
-        function: Of the state of the contact.
+        function: Of the state of the contact; without it, what the decorator stands above.
         of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with depth or
             s nothing ever repeats.
         states: What it remembers, by names that are words; laws that name the same state share it.
 
+    Returns:
+        The function, or the decorator.
+
     Raises:
         CaseError: `name` is no word, `function` cannot be called, or a state is wrong.
     """
+    if function is BELOW:
+        return partial(register_law, name, of=of, states=states)
     key = f"law {name!r}"
     if not (isinstance(name, str) and name.isidentifier()):
         raise CaseError(InputError("law", f"expected a word as the name of a law, got {str(name)!r}"))
     if not callable(function):
         raise CaseError(InputError(key, "expected a function of the state"))
-    own = dict(states or {})
+    own = dict(states)
     known = {**_STATES, **own}
     _check_of(key, of, (*VARIABLES, *known))
     for word, state in own.items():
@@ -100,6 +120,7 @@ def register_law(
     _STATES.update(own)
     _LAWS[name] = _Law(function, frozenset({*of, *own}))
     _CALLS.pop(name, None)
+    return function
 
 
 def forget_laws() -> None:

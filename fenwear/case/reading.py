@@ -7,17 +7,19 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pydantic
 
 from fenwear.case.cycle_table import with_cycle
 from fenwear.case.keys import find_keys
+from fenwear.case.names import ROLES
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
 from fenwear.case.profile import BODIES, with_profiles
 from fenwear.case.program import check_length, half_cycles_of, with_program
-from fenwear.case.schema import Case, Written
+from fenwear.case.schema import MADE, Case, Given, Written
 from fenwear.case.thermal import Heat
 from fenwear.case.units import shown
 from fenwear.errors import CaseError, InputError
@@ -172,12 +174,26 @@ def _laid_over(below: Any, above: Any) -> Any:
     return {**below, **{key: _laid_over(below.get(key), value) for key, value in above.items()}}
 
 
-def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
+def make_case(
+    data: Mapping[str, Any],
+    folder: Path | None = None,
+    *,
+    meshes: Mapping[str, Any] = MappingProxyType({}),
+    stresses: Mapping[str, Any] = MappingProxyType({}),
+) -> Case:
     """Validate `data`, nested as in a case file.
+
+    Args:
+        data: The tables.
+        folder: Where paths in it start.
+        meshes: Of "punch" and "strip", as `fenwear.bodies.mesh.own_mesh` makes them, in place of `geometry.file`.
+        stresses: Of either, as `fenwear.bodies.material.OwnLaw`, in place of the isotropic stress of its material.
 
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
+    given = Given(meshes, stresses)
+    data = _on_meshes(data, given)
     data = with_profiles(with_program(with_cycle(data, folder), folder), folder)
     run = data.get("run", {})
     open_end = isinstance(data.get("program"), Mapping) and isinstance(run, Mapping) and "half_cycles" not in run
@@ -192,7 +208,22 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
     if open_end:
         case = case.model_copy(update={"run": case.run.model_copy(update={"half_cycles": half_cycles_of(case)})})
     check_length(case)
-    return case.at(folder, written(data, case.resolved()))
+    return case.on(given).at(folder, written(data, case.resolved()))
+
+
+def _on_meshes(data: Mapping[str, Any], given: Given) -> Mapping[str, Any]:
+    """Return the tables with a geometry that says that meshes are given."""
+    if not given.meshes and not given.stresses:
+        return data
+    if set(given.meshes) != set(ROLES):
+        wanted, known = " and ".join(repr(role) for role in ROLES), ", ".join(sorted(given.meshes)) or "none"
+        raise CaseError(InputError("meshes", f"expected one of {wanted} each, got {known}"))
+    fixed = {"file": MADE, "parameters": {}, "order": 1, "follow_wear": "never"}
+    geometry = data.get("geometry", {})
+    wrong = next((key for key, value in fixed.items() if geometry.get(key, value) != value), "")
+    if wrong:
+        raise CaseError(InputError(f"geometry.{wrong}", "expected none with meshes that are given, which stay as made"))
+    return {**data, "geometry": {**geometry, **fixed}}
 
 
 def _read_text(path: Path) -> str:
@@ -249,7 +280,7 @@ def changed_case(case: Case, *settings: str) -> Case:
     data = case.resolved()
     for setting in settings:
         _apply(data, setting)
-    changed = make_case(data, case.folder)
+    changed = make_case(data, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)
     own, before = changed.written, case.written  # quantities are resolved now: how they were written is known of before
     as_were = {key: before.united.get(key, text) for key, text in own.united.items()}
     return changed.at(case.folder, Written(own.bare, as_were))

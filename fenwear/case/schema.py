@@ -44,6 +44,25 @@ class Written:
     united: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
+MADE = "made in Python"  # geometry.file of a case whose meshes are given
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Meshes and stresses that a program in Python gives to a case, by the bodies' roles.
+
+    Attributes:
+        meshes: A `BodyMesh` of punch and strip; none where the case has a geometry.
+        stresses: An `ElasticLaw` in place of the isotropic one, of either.
+    """
+
+    meshes: Mapping[str, Any] = field(default_factory=dict)
+    stresses: Mapping[str, Any] = field(default_factory=dict)
+
+
+NOTHING_GIVEN = Given()
+
+
 class Case(Part):
     """A problem: the root of the case file."""
 
@@ -72,6 +91,7 @@ class Case(Part):
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
     _written: Written = Written()
+    _given: Given = NOTHING_GIVEN
     _diffusion: dict[str, float] | None = None  # of a stage: that of its program
 
     @model_validator(mode="before")
@@ -522,6 +542,17 @@ class Case(Part):
     def written(self) -> Written:
         """How its quantities were written; nothing is known of those of a case made from its parts."""
         return self._written
+
+    @property
+    def given(self) -> Given:
+        """The meshes and stresses that a program has given it."""
+        return self._given
+
+    def on(self, given: Given) -> Case:
+        """Return this case on meshes that a program gives."""
+        placed = self.model_copy()
+        placed._given = given
+        return placed
 
     def at(self, folder: Path | None, written: Written | None = None) -> Case:
         """Return this case with the folder that its geometry's path starts from, and how it was written."""

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pint
@@ -165,7 +165,7 @@ def _parsed(given: str) -> pint.Unit | None:
 
     for usual in (True, False):
         with suppress(Exception):  # pint's parser raises many types on nonsense
-            return cast("pint.Unit", registry(usual=usual).parse_units(given))
+            return registry(usual=usual).parse_units(given)
     return None
 
 

@@ -80,7 +80,7 @@ def steady_command(
         _print_steady(case, found, state, of_step[1] if of_step else "")
     uncertain = _uncertain(state) if accuracy else {}
     way = time.perf_counter()
-    rate = growth_rate(found, state.phase_pressure, state.conductances)
+    rate = growth_rate(found, state)
     short = len(found.motion.phases) <= FOLLOWED
     cycles = running_in(found, state, 0.01) if rate < 0 and short else None
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -26,8 +27,20 @@ CLOSE = 1e-10  # change of these temperatures over their range that ends them
 APART = 0.1  # what a nearly stationary state may be away from itself a cycle later, or from its own temperatures
 
 
+class StationaryState(Protocol):
+    """A state whose disturbances grow or decay, such as a `SteadyState`."""
+
+    @property
+    def phase_pressure(self) -> Array:
+        """The pressure of each phase (phases, n), MPa."""
+
+    @property
+    def conductances(self) -> Array | None:
+        """By which its temperatures have come about (phases, n), N/(mm s K); None without heat."""
+
+
 def growth_rate(
-    system: Tribosystem, pressure: Array, conductances: Array | None = None, *, implicit: bool = True
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None = None, *, implicit: bool = True
 ) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
@@ -40,35 +53,42 @@ def growth_rate(
 
     Args:
         system: The assembled problem.
-        pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
-        conductances: By which its temperatures have come about (phases, n), as `SteadyState.conductances`; by
-            default those of the nodes that these pressures close by more than rounding.
+        state: What `steady` returns, or the pressure of each phase (phases, n), MPa, positive where nodes touch.
+        conductances: By which its temperatures have come about (phases, n); by default those of the state, or of the
+            nodes that these pressures close by more than rounding.
         implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
 
     Raises:
         CaseError: a coefficient is negative or not finite there, or the pressures are of other phases or nodes.
         ConvergenceError: friction and the temperatures that it depends on do not come together, or numbers overflow.
     """
-    _check_state(system, pressure)
+    pressure, conductances = _parts(system, state, conductances)
     system = with_reduced_heat(system)  # before rank 0 leads
     return system.team.lead(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
 
 
-def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> Array:
+def decay_rates(system: Tribosystem, state: Array | StationaryState, conductances: Array | None = None) -> Array:
     """Return the rates at which all disturbances of a state grow, 1/s, the largest first; collective.
 
     Real parts; those that neither grow nor decay, such as rigid motions of the shape, and those that are gone after a
     cycle are left out. Arguments and errors as of `growth_rate`, which is the first of them.
     """
-    _check_state(system, pressure)
+    pressure, conductances = _parts(system, state, conductances)
     system = with_reduced_heat(system)
     sizes = np.abs(system.team.lead(partial(_factors, system, pressure, conductances, implicit=True)))
     counted = (np.abs(sizes - 1) > NEUTRAL) & (sizes > ROUNDING)
     return np.sort(np.log(sizes[counted]) / system.motion.period)[::-1]
 
 
-def _check_state(system: Tribosystem, pressure: Array) -> None:
-    """Raise where these pressures are no state that could grow or decay."""
+def _parts(
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None
+) -> tuple[Array, Array | None]:
+    """Return the pressures and conductances of a state.
+
+    Raises:
+        CaseError: no state of the system grows or decays, or the pressures are of other phases or nodes.
+    """
+    pressure, own = (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
     if system.passing_laws:
         raise CaseError(
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
@@ -76,7 +96,8 @@ def _check_state(system: Tribosystem, pressure: Array) -> None:
     shape = (len(system.motion.phases), len(system.pair.weights))
     if pressure.shape != shape:
         message = f"expected pressures of {shape[0]} phases at {shape[1]} nodes, as `SteadyState.phase_pressure`"
-        raise CaseError(InputError("pressure", f"{message}, got {pressure.shape}"))
+        raise CaseError(InputError("state", f"{message}, got {pressure.shape}"))
+    return pressure, own if conductances is None else conductances
 
 
 def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:

@@ -56,7 +56,7 @@ def with_shape(case: Case, points: list[list[float]]) -> Case:
     tables = case.resolved()
     tables["punch"]["profile"] = {"points": points}
     tables["punch"].pop("topography", None)  # which the points have in them
-    return make_case(tables, case.folder)
+    return make_case(tables, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)
 
 
 def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: float) -> None:

@@ -140,10 +140,11 @@ def test_by_name_or_condensed(name: str, small: list[str]) -> None:
         def __getattr__(self, name: str) -> Any:
             return getattr(self.own, name)
 
+    @register_operator("products")
     def products(request: Request) -> SurfaceOperator:
         return Product(condense(request.elastic, request.patterns, request.directions))
 
-    register_operator("products", products)
+    assert operators.OPERATORS["products"] is products
     settings = ("punch.operator='products'", "strip.operator='products'")
     pressed, by_products = (
         list(march(assemble(load_case(name, [*small, *by])), 2))[-1].pressure[-1] for by in ((), settings)

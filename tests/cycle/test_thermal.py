@@ -387,6 +387,7 @@ def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
     assert np.isnan(state.conductances[opened]).all()
     rounding = np.where(opened, 1e-14 * state.phase_pressure.max(), state.phase_pressure)
     rate = growth_rate(system, state.phase_pressure, state.conductances)
+    assert growth_rate(system, state) == rate
     assert growth_rate(system, rounding) == pytest.approx(rate, rel=1e-9)
     for pressure, conductances in ((state.phase_pressure, state.conductances), (rounding, None)):
         found = steady_snapshot(system, pressure, state.velocity, conductances).temperature

@@ -217,7 +217,8 @@ def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Once, after the first calls; here any time counts as slow."""
     monkeypatch.setattr(own_laws, "SLOW", -1.0)
     state = {"p": np.ones(5)}
-    fenwear.register_law("slow", lambda now: now["p"], of=["p"])
+    function = fenwear.register_law("slow", of=["p"])(lambda now: now["p"])
+    assert function(state) is state["p"]  # the decorator gives it back
     try:
         for _ in range(own_laws.FIRST - 1):
             evaluate_law("slow", state, (5,))

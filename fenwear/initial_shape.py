@@ -1,15 +1,23 @@
 """The shape to machine: the one that wear would make in the end, so that nothing is left to run in.
 
 At the cyclic steady state the wear of a cycle is a rigid motion of the punch. Its shape omega, the depth worn off
-without the rigid part, is the optimal contact shape of Paczelt and Mroz: a punch that is made with it has the steady
-pressures from its first cycle on, and keeps them, at the load it was found for.
+up to a rigid motion, is the optimal contact shape of Paczelt and Mroz: a punch that is made with it has the steady
+pressures from its first cycle on, and keeps them, at the load it was found for. The depth to take off is omega less the
+rigid motion H a of the free parts that leaves the least to take off,
+
+    minimise  sum of A_i (omega - H a)_i    with    omega - H a >= 0 where surfaces touch,
+
+a linear programme. Where they never touch the depth keeps them apart, and is zero wherever that does.
 
 For loads of several sizes that take turns, with shares w_k of the sliding, the pressures are to first order
 p_k(omega) = p_k - S_k^-1 (omega - omega_k), which wear the contact evenly in all where
 
     omega = sum of w_k omega_k,
 
-exactly so for linear wear and one contact zone, as the shapes of the loads differ by elasticity alone.
+exactly so for linear wear and one contact zone, as the shapes of the loads differ by elasticity alone. Loads that reach
+different zones leave some of the wear uneven.
+
+In partial slip the shape is that of `fenwear.stick.final`: the stick zone carries all of the load, nothing else wears.
 """
 
 from __future__ import annotations
@@ -18,17 +26,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linprog
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.assembly.variants import with_case
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import SteadyState, steady
 from fenwear.cycle.state import pressure_scale
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.stick.final import FinalShape
+from fenwear.stick.records import TimeStepRecords
 
 ALLOWED = 0.1  # of the pressure scale: what a deviation of the size of the tolerance changes the pressure by
+ROUNDED = 1e-12  # of the largest depth: what rounding leaves of none
 PROBE = 1e-3  # of the elastic gap under the pressure scale: a deviation that is small
-CLEAR = 2.0  # of the shape's depth: where the surfaces never touch they are this far apart at least
 
 
 @dataclass(frozen=True)
@@ -36,18 +48,23 @@ class InitialShape:
     """The shape to machine, for one load or several.
 
     Attributes:
-        depth: To be taken off the punch at its contact nodes (n,), mm; 0 somewhere, and never less.
-        states: The steady state of each load.
+        surface: The punch's contact surface.
+        depth: To be taken off it at its nodes (n,), mm; 0 somewhere, and never less.
+        states: The steady state of each load; in partial slip the final shape.
         largest_pressure: On that shape, of each load, MPa; NaN with heat.
         left_to_run_in: Largest difference between the first cycle's pressures on that shape and the steady ones, over
             the pressure scale, of each load; NaN with heat, where the first cycle is colder.
+        uneven_wear: Largest deviation of the wear in all loads together from a rigid motion, over the largest wear;
+            NaN with heat, 0 in partial slip, where nothing wears.
         tolerance: Amplitude of a wave once over the contact that changes the pressure by a tenth of its scale, mm.
     """
 
+    surface: ContactSurface
     depth: Array
-    states: tuple[SteadyState, ...]
+    states: tuple[SteadyState | FinalShape, ...]
     largest_pressure: tuple[float, ...]
     left_to_run_in: tuple[float, ...]
+    uneven_wear: float
     tolerance: float
 
 
@@ -59,24 +76,33 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
         loads: Factor of all loads of the case, and share of the sliding, of each load that acts in turn.
 
     Raises:
-        CaseError: a factor or share is not positive.
+        CaseError: a factor or share is not positive, or there are several loads in partial slip.
         ConvergenceError: there is no steady state.
     """
     for factor, share in loads:
         if not (0 < factor < np.inf and 0 < share < np.inf):
             raise CaseError(InputError("--load", f"expected positive numbers FACTOR or FACTOR:SHARE, got {factor:g}"))
+    if system.sticks and len(loads) > 1:
+        message = "each load has its own stick zone, which alone carries it in the end: give one load"
+        raise CaseError(InputError("--load", message))
     systems = [system if factor == 1.0 else _under(system, factor) for factor, _ in loads]
-    states = tuple(steady(one) for one in systems)
-    depth = _mean_shape(states, np.array([share for _, share in loads]))
-    first = [np.full_like(state.phase_pressure, np.nan) for state in states]
+    states: tuple[SteadyState | FinalShape, ...] = tuple(steady(one) for one in systems)
+    if system.sticks:
+        systems = [state.system for state in states]  # on the grid that the scar has grown to
+    shares = np.array([share for _, share in loads]) / sum(share for _, share in loads)
+    depth = _depth(system, states, shares)
+    goals = [_steady_pressures(state) for state in states]
+    first, uneven = [np.full_like(goal, np.nan) for goal in goals], np.nan
     if system.case.heat is None:
         first = [_pressures(one, depth) for one in systems]
+        uneven = 0.0 if system.sticks else _uneven(systems, shares, first)
     left = [
-        float(np.abs(p - state.phase_pressure).max() / pressure_scale(system, state.phase_pressure))
-        for p, state in zip(first, states, strict=True)
+        float(np.abs(p - goal).max() / pressure_scale(one, goal))
+        for one, p, goal in zip(systems, first, goals, strict=True)
     ]
-    tolerance = min(_tolerance(one, state, depth) for one, state in zip(systems, states, strict=True))
-    return InitialShape(depth, states, tuple(float(p.max()) for p in first), tuple(left), tolerance)
+    tolerance = min(_tolerance(one, goal, depth) for one, goal in zip(systems, goals, strict=True))
+    largest = tuple(float(p.max()) for p in first)
+    return InitialShape(systems[0].pair.punch, depth, states, largest, tuple(left), uneven, tolerance)
 
 
 def _under(system: Tribosystem, factor: float) -> Tribosystem:
@@ -87,30 +113,62 @@ def _under(system: Tribosystem, factor: float) -> Tribosystem:
     return with_case(system, case.model_copy(update=of))
 
 
-def _mean_shape(states: Sequence[SteadyState], shares: Array) -> Array:
-    """Return the mean of the shapes, from its highest point down (n,), mm."""
-    shapes = np.array([state.shape for state in states])
-    mean = shares @ shapes / shares.sum()  # NaN where the surfaces never touch under one of the loads
-    touched = np.isfinite(mean)
-    depth: Array = mean - mean[touched].min()
-    depth[~touched] = CLEAR * max(depth[touched].max(), *(-state.gap.min(initial=0.0) for state in states))
-    return depth
+def _depth(system: Tribosystem, states: Sequence[SteadyState | FinalShape], shares: Array) -> Array:
+    """Return the depth to take off (n,), mm: the mean of the shapes less the rigid motion that leaves the least."""
+    shapes = [state.depth if isinstance(state, FinalShape) else state.closest_shape for state in states]
+    pressed = np.any([_steady_pressures(state).any(axis=0) for state in states], axis=0)
+    mean = shares @ np.array(shapes)
+    depth = mean if system.sticks else mean - _least_motion(system, mean, pressed)
+    return np.where(depth > ROUNDED * depth.max(), depth, 0.0)
+
+
+def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
+    """Return the rigid motion of the free parts that leaves a shape above zero and the least of it (n,), mm.
+
+    Raises:
+        ConvergenceError: there is none.
+    """
+    modes, scale = system.rigid.rigid_normal / system.mode_lengths, float(np.abs(shape[where]).max()) or 1.0
+    weights = system.pair.weights / system.pair.weights.sum()
+    found = linprog(-(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None))
+    if found.x is None:
+        raise ConvergenceError(
+            "no shape to machine: every rigid motion of the punch would have material added somewhere"
+        )
+    return np.asarray(scale * (modes @ found.x))
+
+
+def _steady_pressures(state: SteadyState | FinalShape) -> Array:
+    """Return the pressures of every phase or time step of a cycle (phases, n), MPa."""
+    return state.pressures if isinstance(state, FinalShape) else state.phase_pressure
 
 
 def _pressures(system: Tribosystem, depth: Array) -> Array:
-    """Return the pressure of each phase on a shape (phases, n), MPa; collective."""
+    """Return the pressures of the first cycle on a shape (phases, n), MPa; collective."""
+    if system.sticks:
+        problem = system.law_state.problem
+        made = problem.beginning(replace(problem.unworn(), punch=depth))
+        return TimeStepRecords.joined(problem.cycle(made)[1]).pressure
     worn = replace(system.unworn(), punch=depth)
     phases = range(len(system.motion.phases))
     return np.array([system.phase_contact((k,)).solve(system.gap(k, worn)).pressure[0] for k in phases])
 
 
-def _tolerance(system: Tribosystem, state: SteadyState, depth: Array) -> float:
+def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> float:
+    """Return how far the wear in all loads together is from a rigid motion, over the largest wear."""
+    worn = [share * one.phases_wear.opening(p)[0] for one, share, p in zip(systems, shares, pressures, strict=True)]
+    total, pressed = np.sum(worn, axis=0), np.any([p.any(axis=0) for p in pressures], axis=0)
+    modes = systems[0].rigid.rigid_normal[pressed]
+    rest = total[pressed] - modes @ np.linalg.lstsq(modes, total[pressed], rcond=None)[0]
+    return float(np.abs(rest).max() / total.max())
+
+
+def _tolerance(system: Tribosystem, goal: Array, depth: Array) -> float:
     """Return the amplitude of a wave over the contact that changes the pressure by a share of its scale, mm."""
-    scale = pressure_scale(system, state.phase_pressure)
-    small = PROBE * system.interface.elastic_length * scale
-    before, x, found = _pressures(system, depth), system.pair.punch.x, []
-    axis = int(np.abs(system.pair.weights @ system.pair.normal).argmax())
-    for s in np.delete(x, axis, axis=1).T:
+    scale = pressure_scale(system, goal)
+    small = PROBE * system.contact_law.elastic_length(system) * scale
+    before, surface, found = _pressures(system, depth), system.pair.punch, []
+    for s in surface.places.T:
         wave = np.cos(2 * np.pi * (s - s.min()) / np.ptp(s))
         change = _pressures(system, depth + small * (1 + wave)) - before
         found.append(small * ALLOWED * scale / float(np.abs(change).max()))

@@ -9,18 +9,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
 from fenwear.initial_shape import initial_shape
-from fenwear.results.machining import TRIANGLE, shape_points, with_shape
+from fenwear.results.machining import TRIANGLE, profile_of, with_shape
+from fenwear.stick.records import TimeStepRecords
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
 
 RING = ("geometry.degree=2", "geometry.parameters.across=4", "wear.strip.coefficient=1e-30")
 
 
+BUSHING = ("geometry.degree=1", "geometry.parameters.elements_along_contact=60")
+BLOCK = ("geometry.degree=1", "geometry.parameters.elements_along_contact=30")
+DRUM = tuple(f"geometry.parameters.{name}" for name in ("elements_along_lining=12", "elements_along_drum=44"))
+
+
 def made_with(system: Tribosystem, *shapes: Any) -> Tribosystem:
-    return assemble(with_shape(system.case, shape_points(system.pair.punch, *shapes)))
+    return assemble(with_shape(system.case, profile_of(system.pair.punch, *shapes)))
 
 
 @pytest.mark.parametrize(
@@ -30,6 +37,9 @@ def made_with(system: Tribosystem, *shapes: Any) -> Tribosystem:
         ("example2", (*SMALL, "wear.punch.coefficient='1e-8 MPa^-2'", "wear.punch.pressure_exponent=2.0")),
         ("ring-on-ring", RING),
         ("pin-on-disc", ("geometry.degree=1", "geometry.order=1")),
+        ("bushing", BUSHING),
+        ("block-on-ring", BLOCK),
+        ("drum-brake", DRUM),
     ],
 )
 def test_nothing_runs_in(assembled: Callable[..., Tribosystem], name: str, settings: tuple[str, ...]) -> None:
@@ -39,6 +49,7 @@ def test_nothing_runs_in(assembled: Callable[..., Tribosystem], name: str, setti
     (state,) = shape.states
     assert shape.depth.min() == 0
     assert shape.left_to_run_in[0] < 1e-9
+    assert shape.uneven_wear < 1e-9
     own = made_with(system, shape.depth)
     np.testing.assert_allclose(own.pair.initial_gap - system.pair.initial_gap, shape.depth, atol=1e-12)
     first = [own.phase_contact((k,)).solve(own.gap(k, own.unworn())) for k in range(len(own.motion.phases))]
@@ -55,6 +66,39 @@ def test_it_stays(assembled: Callable[..., Tribosystem]) -> None:
     *_, block = march(own, 50)
     r = own.pair.x
     np.testing.assert_allclose(block.pressure, np.tile(2000 / (2 * np.pi * 10 * r), (len(block), 1)), rtol=1e-8)
+
+
+def test_the_least_is_taken_off(assembled: Callable[..., Tribosystem]) -> None:
+    """No rigid motion of a bushing or of a hinged shoe takes less off without having material added somewhere."""
+    for name, settings in (("bushing", BUSHING), ("drum-brake", DRUM)):
+        system = assembled(name, *settings)
+        shape, modes = initial_shape(system), system.rigid.rigid_normal / system.mode_lengths
+        (state,) = shape.states
+        pressed = state.phase_pressure.max(axis=0) > 0
+        touching = pressed & (shape.depth < 1e-9 * shape.depth.max())
+        assert touching.sum() >= modes.shape[1]
+        # By Farkas' lemma: the volume taken off is a sum of depths at these nodes with factors that are not negative.
+        volume = system.pair.weights[pressed] @ modes[pressed]
+        rest = nnls(modes[touching].T, volume)[1]
+        assert rest < 1e-9 * np.abs(volume).max()
+        assert shape.depth[~pressed].max(initial=0.0) <= shape.depth.max()
+
+
+def test_partial_slip(assembled: Callable[..., Tribosystem]) -> None:
+    """A cylinder made so carries its load by the stick zone alone from the first cycle on, and hardly wears."""
+    settings = ("geometry.degree=1", "geometry.parameters.elements_along_contact=20", "stick.steps=6")
+    system = assembled("fretting-partial-slip", *settings)
+    shape = initial_shape(system)
+    (state,) = shape.states
+    assert shape.left_to_run_in[0] < 0.1  # the ends of the stick zone lie within elements
+    problem = made_with(system, shape.depth).law_state.problem
+    made, unworn = (
+        TimeStepRecords.joined(one.cycle(one.beginning())[1]) for one in (problem, system.law_state.problem)
+    )
+    np.testing.assert_allclose(made.pressure[-1], state.pressure, atol=0.1 * state.pressure.max())
+    assert made.energy(problem.weights) < 0.2 * unworn.energy(problem.weights)
+    with pytest.raises(CaseError, match="--load"):
+        initial_shape(system, ((1.0, 1.0), (1.2, 1.0)))
 
 
 def test_tolerance_is_the_one_told(assembled: Callable[..., Tribosystem]) -> None:
@@ -74,9 +118,9 @@ def test_loads_that_take_turns(assembled: Callable[..., Tribosystem]) -> None:
     """The load and 1.2 times it, 3 to 1: the mean of both pressures wears a ring evenly, neither alone does."""
     system = assembled("ring-on-ring", *RING)
     shape = initial_shape(system, ((1.0, 3.0), (1.2, 1.0)))
-    points, pressures = shape_points(system.pair.punch, shape.depth), []
+    profile, pressures = profile_of(system.pair.punch, shape.depth), []
     for force in (-2000.0, -2400.0):
-        tables = with_shape(system.case, points).resolved()
+        tables = with_shape(system.case, profile).resolved()
         tables["punch"]["loads"][0]["force"] = [0.0, force]
         own = assemble(make_case(tables))
         pressures.append(own.phase_contact((0,)).solve(own.gap(0, own.unworn())).pressure[0])
@@ -85,6 +129,13 @@ def test_loads_that_take_turns(assembled: Callable[..., Tribosystem]) -> None:
     assert min(np.ptp(one) / one.max() for one in worn[:2]) > 0.02
     np.testing.assert_allclose(worn[2], worn[2].mean(), rtol=1e-8)
     assert shape.largest_pressure == pytest.approx([p.max() for p in pressures], rel=1e-9)
+
+
+def test_loads_that_reach_different_zones(assembled: Callable[..., Tribosystem]) -> None:
+    """Their wear together is uneven; that of loads which reach one zone is not."""
+    block = assembled("block-on-ring", *BLOCK)
+    assert initial_shape(block, ((1.0, 3.0), (1.2, 1.0))).uneven_wear < 1e-9
+    assert 0.01 < initial_shape(block, ((1.0, 1.0), (0.2, 1.0))).uneven_wear < 1.0
 
 
 def test_files(fenwear: Callable[..., Any], tmp_path: Path) -> None:

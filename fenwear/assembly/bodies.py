@@ -237,7 +237,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in case.loads_of(mesh.name))})
     body = ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
     if description.profile is not None and (case.grid is None or case.grid.across is not None):
-        body.surface = body.meshed = profiled(body.surface, np.array(description.profile.points))
+        body.surface = body.meshed = profiled(body.surface, description.profile)
     return body
 
 

@@ -30,12 +30,16 @@ from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.bodies.round import Round, rounds_of
+from fenwear.case.bodies import Profile
 from fenwear.errors import CaseError, InputError
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
 NO_WEIGHT = 1e-9  # of the largest: what rounding leaves
 BETWEEN = 0.1  # of the mean length of several curves: the gap between two of them
 REACH = 1e-6  # of the surface's size: how far it may reach beyond the points of its profile
+WRAPS = 1e-3  # component of the normal along its mean, with the sign turned: from there on a surface is no graph
+CLOSING = 1.5  # of the longest distance of two points: the one over the seam of a closed curve
+NEAREST = 12  # points of a profile in space between which it is read on a surface that wraps around
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,28 @@ class ContactSurface:
         return self.x[:, 0] if self.arc is None else self.arc[self.nodes]
 
     @cached_property
+    def places(self) -> Array:
+        """Where profiles have the pressure nodes, mm: in the plane x or the arc length (n, 1).
+
+        In a solid the coordinates across its mean normal (n, 2); all of them (n, 3) where it is no graph over these.
+        """
+        if self.arc is not None:
+            return self.abscissa[:, None]
+        mean = self.weights @ self.outward
+        axis = int(np.abs(mean).argmax())
+        turned = self.dim == 3 and (self.outward[:, axis] * np.sign(mean[axis])).min() < -WRAPS
+        return self.x if turned else np.delete(self.x, axis, axis=1)
+
+    @cached_property
+    def length_around(self) -> float:
+        """Length of a closed curve, mm; 0 of all else."""
+        ends = self.facets[:, :2]
+        if self.arc is None or self.part.max() > 0 or (np.bincount(ends.ravel())[ends] != 2).any():
+            return 0.0
+        first, last = self.arc.argmin(), self.arc.argmax()
+        return float(np.ptp(self.arc) + np.linalg.norm(self.trace[last] - self.trace[first]))
+
+    @cached_property
     def x(self) -> Array:
         """Coordinates of the pressure nodes (n, d), mm."""
         return self.trace[self.nodes]
@@ -164,30 +190,48 @@ class ContactSurface:
         return float(np.median(np.diff(self.abscissa)))
 
 
-def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
-    """Return a surface with a profile, as it was meshed but for that; arguments and errors as of `profile_at`."""
-    axis = int(np.abs(surface.weights @ surface.outward).argmax())
-    return replace(surface, profile=profile_at(surface.body, points, np.delete(surface.x, axis, axis=1)))
+def profiled(surface: ContactSurface, profile: Profile) -> ContactSurface:
+    """Return a surface with a profile, as it was meshed but for that.
+
+    Raises:
+        CaseError: the points do not reach over the surface, two are at one place, or they go along what it has not.
+    """
+    key, points = f"{surface.body}.profile", np.array(profile.points)
+    if surface.arc is None and profile.along == "arc":
+        raise CaseError(InputError(f"{key}.along", "the contact surface is a graph over x: expected [x, depth]"))
+    if surface.arc is not None and profile.along != "arc":
+        message = "several places of the contact surface have one x: expected along = 'arc' and [s, depth], s as in "
+        raise CaseError(InputError(f"{key}.along", message + "the file that export --worn writes"))
+    length, rows = surface.length_around, np.sort(points[:, 0])
+    if length and length - np.ptp(rows) <= CLOSING * np.diff(rows).max():
+        points = np.concatenate([points + np.array([turn * length, 0.0]) for turn in (-1, 0, 1)])
+        points = points[np.unique(np.round(points[:, 0] / (REACH * length)), return_index=True)[1]]
+    return replace(surface, profile=profile_at(surface.body, points, surface.places))
 
 
 def profile_at(body: str, points: Array, x: Array) -> Array:
     """Return the depths of a profile at places (n,), mm: linear between its points, in space on Delaunay's triangles.
 
+    On a solid's surface that is no graph they are the linear radial functions through the nearest points.
+
     Args:
         body: Whose it is.
-        points: Coordinates along the surface and depths (k, d), mm: x (r) and depth; of solids two coordinates, those
-            across the mean normal, and depth.
-        x: The places along the surface (n, d - 1), mm.
+        points: `ContactSurface.places` and depths (k, d), mm.
+        x: The places of the nodes (n, d - 1), or of a solid's surface that is no graph (n, d), mm.
 
     Raises:
         CaseError: the points do not reach over all places, or two of them are at one place.
     """
-    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator  # which takes long to load
+    from scipy.interpolate import (  # which take long to load
+        LinearNDInterpolator,
+        NearestNDInterpolator,
+        RBFInterpolator,
+    )
 
     key = f"{body}.profile.points"
     places, depth = points[:, :-1], points[:, -1]
     if places.shape[1] != x.shape[1]:
-        expected = "[x, depth]" if x.shape[1] == 1 else "[x, y, depth]"
+        expected = {1: "[x, depth]", 2: "[x, y, depth]", 3: "[x, y, z, depth]"}[x.shape[1]]
         raise CaseError(InputError(key, f"expected rows {expected} for this model, got {points.shape[1]} numbers"))
     slack = REACH * float(np.ptp(x, axis=0).max())
     low, high = places.min(axis=0), places.max(axis=0)
@@ -201,6 +245,9 @@ def profile_at(body: str, points: Array, x: Array) -> Array:
     if x.shape[1] == 1:
         order = places[:, 0].argsort()
         return np.asarray(np.interp(x[:, 0], places[order, 0], depth[order]))
+    if x.shape[1] == 3:
+        near = RBFInterpolator(places, depth, neighbors=min(NEAREST, len(places)), kernel="linear")
+        return np.asarray(near(x))
     values = LinearNDInterpolator(places, depth)(x)
     outside = np.isnan(values)  # by rounding, or in a corner that the points' hull leaves out
     values[outside] = NearestNDInterpolator(places, depth)(x[outside]) if outside.any() else 0.0

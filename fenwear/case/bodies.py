@@ -294,10 +294,16 @@ class Profile(Part):
     """What the surface that touches differs by from the mesh's: a depth at places on it, straight in between."""
 
     points: Annotated[
-        tuple[Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)], ...], Field(min_length=2)
+        tuple[Annotated[tuple[Length, ...], Field(min_length=2, max_length=4)], ...], Field(min_length=2)
     ] = Field(
-        description="[x, depth] of plane bodies and rings (x the radius), of solids [x, y, depth]; positive where the "
-        "surface lies deeper. In place of them file = a CSV file with these columns and their units"
+        description="[x, depth] of plane bodies and rings (x the radius), of solids [x, y, depth]; [s, depth] of "
+        "curves that have several places at one x, and [x, y, z, depth] of such surfaces of solids, as bores; positive "
+        "where the surface lies deeper. In place of them file = a CSV file with these columns and their units"
+    )
+    along: Literal["x", "arc"] = Field(
+        default="x",
+        description="what the first number of points of a plane body is: x, or the arc length s, which is x in the "
+        "middle of the curve and grows with x there; a file says it by its heading",
     )
 
 

@@ -9,7 +9,8 @@ from typing import Any
 from fenwear.case.csv_table import read_csv
 from fenwear.errors import CaseError, InputError
 
-COLUMNS = {"x": "mm", "r": "mm", "y": "mm", "depth": "mm"}
+COLUMNS = {"x": "mm", "r": "mm", "s": "mm", "y": "mm", "z": "mm", "depth": "mm"}
+PLACES = (("x",), ("r",), ("s",), ("x", "y"), ("x", "y", "z"))
 BODIES = ("punch", "strip")
 
 
@@ -30,12 +31,12 @@ def with_profiles(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any
             raise CaseError(InputError(key, "expected the name of a CSV file, and no points beside it"))
         rest = {name: value for name, value in profile.items() if name != "file"}
         path = Path(profile["file"]) if folder is None else folder / profile["file"]
-        found[body] = {**table, "profile": {**rest, "points": read_profile(path, key)}}
+        found[body] = {**table, "profile": {**rest, **read_profile(path, key)}}
     return found
 
 
-def read_profile(path: Path, key: str) -> list[list[float]]:
-    """Return [x, depth] or [x, y, depth] of each row of a CSV file, mm.
+def read_profile(path: Path, key: str) -> dict[str, Any]:
+    """Return the table of a profile in a CSV file: the points of its rows, mm, and along what they go.
 
     Args:
         path: Of the file; each heading has its unit, as in "depth (um)".
@@ -47,14 +48,18 @@ def read_profile(path: Path, key: str) -> list[list[float]]:
     table = read_csv(path, key, COLUMNS, least=2)
     names = table.names
     places = [name for name in names if name != "depth"]
-    if sorted(places) not in (["x"], ["r"], ["x", "y"]) or names.count("depth") != 1:
-        raise table.wrong("expected the columns x and depth, r and depth of rings, or x, y and depth of solids")
+    if tuple(sorted(places)) not in PLACES or names.count("depth") != 1:
+        expected = "x and depth, r and depth of rings, s and depth along a curve, or x, y, (z) and depth of solids"
+        raise table.wrong(f"expected the columns {expected}")
     order = [names.index(name) for name in (*sorted(places), "depth")]
-    return [[row[k] for k in order] for row in table.rows]
+    along = "arc" if "s" in places else "x"
+    return {"points": [[row[k] for k in order] for row in table.rows], "along": along}
 
 
-def profile_text(axes: tuple[str, ...], points: list[list[float]]) -> str:
-    """Return a CSV file that reads back as these points, [x, (y,) depth], mm; depths in micrometres."""
+def profile_text(kind: str, profile: Mapping[str, Any]) -> str:
+    """Return a CSV file that reads back as the table of a profile of a kind of model; depths in micrometres."""
+    points, first = profile["points"], "r" if kind == "axisymmetric" else "x"
+    axes = ("s",) if profile["along"] == "arc" else (first, "y", "z")[: len(points[0]) - 1]
     lines = [",".join([*(f"{axis} (mm)" for axis in axes), "depth (um)"])]
     lines += [",".join([*(f"{place:.9g}" for place in row[:-1]), f"{1e3 * row[-1]:.9g}"]) for row in points]
     return "\n".join(lines) + "\n"

@@ -31,27 +31,30 @@ def shape_command(
     as_json: JsonOption = False,
 ) -> None:
     """Find the shape to machine: that of the steady state, of a program in its last step. Nothing is left to run in."""
-    from fenwear.assembly import assemble, with_reduced_heat
+    from fenwear.assembly import with_reduced_heat
     from fenwear.assembly.variants import with_case
     from fenwear.cycle import held
     from fenwear.initial_shape import initial_shape
+    from fenwear.law_choice import resolve_law
     from fenwear.parallel import on_root
     from fenwear.results.machining import write_shape
 
-    loaded = load(case, settings)
+    law_state = resolve_law(load(case, settings), log, heat="none")
+    loaded, system = law_state.case, law_state.system
     wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
-    system = assemble(loaded, heat="none")
     of_step = held(system)
     if of_step is not None:
         system = with_case(system, of_step[0])
-    system = with_reduced_heat(system, keep=True)
+    if not system.sticks:
+        system = with_reduced_heat(system, keep=True)
     shape = initial_shape(system, wanted)
-    on_root(system.comm, lambda: write_shape(output, loaded, system.pair.punch, shape))
+    on_root(system.comm, lambda: write_shape(output, loaded, shape))
     if as_json:
         rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
         names = ("largest_pressure", "left_to_run_in")
         known = [dict(zip(names, (None, None) if math.isnan(row[0]) else row, strict=True)) for row in rows]
         numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}
+        numbers["uneven_wear"] = None if math.isnan(shape.uneven_wear) else shape.uneven_wear
         print_json({**coordinates(system), **numbers})
         return
     show(f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep")
@@ -66,6 +69,8 @@ def shape_command(
         else:
             change = "the same" if left < SAME else f"differ by {100 * left:.2g} % at most"
             show(f"  largest pressure{at}: {p:.3f} MPa in the first cycle, {worn} ({change})")
+    if shape.uneven_wear > SAME:
+        show(f"  the loads reach different zones: their wear together is uneven by {100 * shape.uneven_wear:.2g} %")
     log(f"profile, surface and case in {output}; next: fenwear run {output / 'case.toml'}")
 
 

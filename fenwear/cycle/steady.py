@@ -93,6 +93,7 @@ class SteadyState:
         phase_pressure: In every phase, that is in every position (phases, n), MPa.
         gap: The same (half_cycles, n), mm.
         shape: Worn depth without its rigid part (n,), mm; NaN where the surfaces never touch.
+        closest_shape: The same; where they never touch the least depth that keeps them apart (n,), mm.
         contact_width: Width in contact there (half_cycles,), mm.
         wear_per_cycle: Depth worn off both bodies in a cycle (n,), mm.
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
@@ -115,6 +116,7 @@ class SteadyState:
     phase_pressure: Array
     gap: Array
     shape: Array
+    closest_shape: Array
     contact_width: Array
     wear_per_cycle: Array
     velocity: dict[str, float]
@@ -338,7 +340,8 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
     touched = problem.x[problem.omega] < OPEN
     if (contact.pressure[:, ~touched] > 0).any():  # its shape goes away from all others
         raise ConvergenceError(NO_ONE_MOTION)
-    shape = np.where(touched, omega - _rigid_part(system, omega - system.pair.initial_gap, touched), np.nan)
+    moved = _rigid_part(system, omega - system.pair.initial_gap, touched) + system.pair.initial_gap
+    closest = np.where(touched, omega, omega - contact.gap.min(axis=0)) - moved
     depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
     depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
     velocity = depths / problem.lengths
@@ -348,7 +351,8 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
         contact.pressure[middle],
         contact.pressure,
         contact.gap[middle],
-        shape - system.pair.initial_gap,
+        np.where(touched, closest, np.nan),
+        closest,
         (contact.pressure[middle] > 0) @ weights,
         worn,
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},

@@ -233,7 +233,8 @@ def check_distance(pair: ContactPair) -> None:
     Raises:
         CaseError: they are apart, or one inside the other.
     """
-    closest = float(pair.initial_gap.min())
+    made = pair.punch.below_mesh + pair.wear_interpolation @ pair.strip.below_mesh  # which may have a rigid part
+    closest = float((pair.initial_gap - made).min())
     if abs(closest) > 0.01 * pair.punch.extent():
         way = "above" if closest > 0 else "inside"
         reason = f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,39 +23,37 @@ AROUND = 360  # facets around a ring
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL
 
 
-def write_shape(directory: Path, case: Case, surface: ContactSurface, shape: InitialShape) -> None:
+def write_shape(directory: Path, case: Case, shape: InitialShape) -> None:
     """Write profile.csv, surface.stl and case.toml into a new folder; for one rank.
 
     Args:
         directory: The folder.
         case: That the shape was found for.
-        surface: The punch's contact surface.
-        shape: In addition to the profile that the surface has already.
+        shape: In addition to the profile that the punch's contact surface has already.
 
     Raises:
         CaseError: the folder is not empty.
         OutputError: it cannot be written.
     """
     make_directory(directory)
-    points = shape_points(surface, shape.depth)
-    axes = {"axisymmetric": ("r",), "solid": ("x", "y"), "plane": ("x",)}[case.model.kind]
-    write_text(directory / PROFILE, profile_text(axes, points))
+    surface = shape.surface
+    profile = profile_of(surface, shape.depth)
+    write_text(directory / PROFILE, profile_text(case.model.kind, profile))
     thickness = case.model.thickness if case.model.kind == "plane" else 0.0
     write_stl(directory / SURFACE, surface, shape.depth, thickness)
-    write_case(directory, with_shape(case, points))
+    write_case(directory, with_shape(case, profile))
 
 
-def shape_points(surface: ContactSurface, depth: Array) -> list[list[float]]:
-    """Return [x, depth] or [x, y, depth] of each node, mm: with all that the surface lies below its mesh already."""
-    axis = int(np.abs(surface.weights @ surface.outward).argmax())
-    rows = np.column_stack([np.delete(surface.x, axis, axis=1), depth + surface.below_mesh])
-    return [[float(value) for value in row] for row in rows]
+def profile_of(surface: ContactSurface, depth: Array) -> dict[str, Any]:
+    """Return the table of a profile at the nodes, mm: a depth, and all that the surface lies below its mesh already."""
+    rows = np.column_stack([surface.places, depth + surface.below_mesh])
+    return {"points": rows.tolist(), "along": "x" if surface.arc is None else "arc"}
 
 
-def with_shape(case: Case, points: list[list[float]]) -> Case:
-    """Return a case whose punch is made with a profile."""
+def with_shape(case: Case, profile: dict[str, Any]) -> Case:
+    """Return a case whose punch is made with the table of a profile."""
     tables = case.resolved()
-    tables["punch"]["profile"] = {"points": points}
+    tables["punch"]["profile"] = profile
     tables["punch"].pop("topography", None)  # which the points have in them
     return make_case(tables, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)
 

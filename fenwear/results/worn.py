@@ -23,10 +23,9 @@ from fenwear.parallel import on_root
 from fenwear.results.disk import write_text, writing
 from fenwear.results.export import FOLDER, RECORDS, chosen_rows
 from fenwear.results.history import CASE
-from fenwear.results.machining import facing_outward, shape_points, write_stl
+from fenwear.results.machining import facing_outward, profile_of, write_stl
 from fenwear.results.reading import load_history
 
-AXES = {"axisymmetric": ("r",), "solid": ("x", "y"), "plane": ("x",)}
 VTK_CELLS = {2: "LINES", 3: "POLYGONS", 4: "POLYGONS"}
 
 
@@ -78,7 +77,7 @@ def _depths(directory: Path, at: str) -> dict[str, Array]:
 def _written(stem: Path, case: Case, surface: ContactSurface, depth: Array) -> list[Path]:
     """Write the files of one surface; return them."""
     csv, stl, vtk = (stem.with_suffix(suffix) for suffix in (".csv", ".stl", ".vtk"))
-    write_text(csv, profile_text(AXES[case.model.kind], shape_points(surface, depth)))
+    write_text(csv, profile_text(case.model.kind, profile_of(surface, depth)))
     write_stl(stl, surface, depth, case.model.thickness if case.model.kind == "plane" else 0.0)
     write_text(vtk, _vtk(surface, depth))
     return [csv, stl, vtk]

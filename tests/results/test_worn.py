@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenwear import CaseError, load_case, run_case
+from fenwear import CaseError, assemble, load_case, run_case
+from fenwear.assembly import build_bodies, place_case
+from fenwear.bodies.contact_surface import profiled
+from fenwear.case.bodies import Profile
 from fenwear.errors import FenwearError
-from fenwear.results.machining import TRIANGLE
+from fenwear.results.machining import TRIANGLE, profile_of
 from fenwear.results.reading import load_history
 from fenwear.results.worn import export_worn
 
@@ -45,6 +48,50 @@ def test_next_half_cycle_goes_on_from_the_files(tmp_path: Path) -> None:
     third = load_history(run("fretting", tmp_path / "third", *both, *twice, "run.half_cycles=1"))
     longer = load_history(run("fretting", tmp_path / "longer", *both, "run.half_cycles=9"))
     assert np.abs(third.pressure.values[0] - longer.pressure.values[8]).max() < 1e-6 * after.max()
+
+
+def test_a_bore_goes_on_from_its_files(tmp_path: Path) -> None:
+    """A closed curve has each x twice; its profile goes by the arc length, on other meshes and all around, too."""
+    coarse = (
+        "geometry.degree=1",
+        "geometry.parameters.elements_along_contact=60",
+        "run.integration='explicit'",
+        *QUIET,
+    )
+    worn = ("wear.punch.coefficient='4e-8 mm^3/(N mm)'", "unset=wear.strip")
+    whole = load_history(run("bushing", tmp_path / "whole", *coarse, *worn, "run.half_cycles=4"))
+    export_worn(run("bushing", tmp_path / "first", *coarse, *worn, "run.half_cycles=3"), tmp_path / "surfaces")
+    profile = f"punch.profile.file='{tmp_path}/surfaces/worn_punch.csv'"
+    again = load_history(run("bushing", tmp_path / "again", *coarse, *worn, profile, "run.half_cycles=1"))
+    after = whole.pressure.values[3]
+    assert np.abs(after - whole.pressure.values[0]).max() > 0.05 * after.max()
+    assert np.abs(again.pressure.values[0] - after).max() < 1e-6 * after.max()
+    with pytest.raises(CaseError, match=r"punch\.profile\.along"):
+        assemble(load_case("bushing", [*coarse, "punch.profile.points=[[-11, 0.0], [11, 0.0]]"]))
+    finer = ("geometry.degree=1", "geometry.parameters.elements_along_contact=120")
+    areas = []
+    for settings in (coarse, finer):
+        surface = place_case(load_case("bushing", [*settings, profile])).pair.punch
+        areas.append(surface.weights @ surface.below_mesh)
+    assert areas[1] == pytest.approx(areas[0], rel=5e-3)
+
+
+def test_a_bore_in_a_solid_goes_on_from_its_points() -> None:
+    """Each x and y twice: profiles have all coordinates; read at the nodes of a finer mesh, too."""
+    coarse, fine = (
+        build_bodies(load_case("bushing-misaligned", ["geometry.degree=1", *sizes])).punch.surface
+        for sizes in (
+            ("geometry.parameters.fine_elements=12", "geometry.parameters.along=2"),
+            ("geometry.parameters.fine_elements=16", "geometry.parameters.along=4"),
+        )
+    )
+
+    def depth(x: np.ndarray) -> np.ndarray:
+        return np.asarray(1e-3 * (2 + np.cos(np.arctan2(x[:, 0], x[:, 2])) + 0.02 * x[:, 1]))
+
+    profile = Profile(**profile_of(coarse, depth(coarse.x)))
+    np.testing.assert_allclose(profiled(coarse, profile).profile, depth(coarse.x), atol=1e-15)
+    np.testing.assert_allclose(profiled(fine, profile).profile, depth(fine.x), rtol=0.03)
 
 
 def test_files_of_a_solid_have_its_surface(tmp_path: Path) -> None:

@@ -54,8 +54,8 @@ def shape_command(
         names = ("largest_pressure", "left_to_run_in")
         known = [dict(zip(names, (None, None) if math.isnan(row[0]) else row, strict=True)) for row in rows]
         numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}
-        numbers["uneven_wear"] = None if math.isnan(shape.uneven_wear) else shape.uneven_wear
-        print_json({**coordinates(system), **numbers})
+        uneven = None if math.isnan(shape.uneven_wear) else shape.uneven_wear
+        print_json({**coordinates(system), **numbers, "uneven_wear": uneven})
         return
     show(f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep")
     show(f"  made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale")

@@ -88,23 +88,6 @@ def sensitivity_command(
     show_results(commands.as_json(found) if as_json else text, f"results in {folder}")
 
 
-@app.command("serve")
-def serve_command(
-    case: CaseArgument,
-    quantities: QuantitiesOption,
-    keys: KeysOption,
-    port: Annotated[int, typer.Option(help="To listen on; 0 for one that is free.")] = 4242,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; by default only this machine reaches it.")
-    ] = "127.0.0.1",
-    settings: SetOption = [],  # noqa: B006
-) -> None:
-    """Answer other programs: quantities of interest and their derivatives as a model of UM-Bridge."""
-    from fenwear.life.server import forward, serve
-
-    serve(forward(load(case, settings), quantities, keys), host, port, log)
-
-
 @app.command("calibrate")
 def calibrate_command(
     case: CaseArgument,

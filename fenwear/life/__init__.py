@@ -13,6 +13,7 @@ From Python:
 from fenwear.life.between_tests import between
 from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import DataSet, Series, measured_folder, read_data
+from fenwear.life.forward import Forward, forward
 from fenwear.life.least_squares import LeastSquares, repeated, without_values
 from fenwear.life.lifetime import Lifetime, lifetime
 from fenwear.life.model import Model
@@ -26,6 +27,7 @@ from fenwear.life.unknowns import Unknown
 __all__ = [
     "Calibration",
     "DataSet",
+    "Forward",
     "LeastSquares",
     "Lifetime",
     "Model",
@@ -39,6 +41,7 @@ __all__ = [
     "between",
     "calibrate",
     "evaluate",
+    "forward",
     "lifetime",
     "load_scatter",
     "measured_folder",

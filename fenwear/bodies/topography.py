@@ -2,10 +2,7 @@
 
 A self-affine surface has the isotropic power spectrum C(q) ~ q^-2(1 + H), in the plane q^-(1 + 2 H), between the wave
 numbers of its longest and its shortest wave length, and random phases (B. N. J. Persson et al., J. Phys. Condens.
-Matter 17, 2005); its root mean square is set exactly. Roughness numbers are those of ISO 25178, of heights over their
-mean:
-
-    Sa = mean of |z|,    Sq = sqrt(mean of z²),    Ssk = mean of z³ / Sq³.
+Matter 17, 2005); its root mean square is set exactly.
 """
 
 from __future__ import annotations
@@ -39,23 +36,6 @@ class HeightMap:
 
     places: tuple[Array, ...]
     heights: Array
-
-
-@dataclass(frozen=True)
-class Roughness:
-    """Sa, Sq, mm, and Ssk of heights."""
-
-    mean: float
-    rms: float
-    skewness: float
-
-
-def roughness(heights: Array, weights: Array | None = None) -> Roughness:
-    """Return the roughness numbers of heights, mm, over their mean; weighed by areas."""
-    share = np.full(heights.shape, 1 / heights.size) if weights is None else weights / weights.sum()
-    z = heights - (share * heights).sum()
-    rms = float(np.sqrt((share * z**2).sum()))
-    return Roughness(float((share * np.abs(z)).sum()), rms, float((share * z**3).sum() / max(rms, 1e-300) ** 3))
 
 
 def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | None) -> Array:

@@ -52,9 +52,8 @@ TEXTS = {
     "Within the convex hull of its scar its form is off, too, the nearest surface of second order (S-F, ISO 25178).",
     "surface_strip_map": "Maps of the height of the strip over its smooth shape, worn depths taken off, at {chosen}. "
     "Within the convex hull of its scar its form is off, too, the nearest surface of second order (S-F, ISO 25178).",
-    "roughness": "Rough surfaces where they have worn, without their form: (a) mean and root mean square of the "
-    "heights and (b) their skewness over the {axis}, and bearing curves at {chosen}: what share of the surface lies "
-    "above a height over its mean.",
+    "roughness": "Rough surfaces where they have worn, without their form: mean and root mean square of the heights "
+    "over the {axis}.",
     "temperature_map": "Maps of the temperature of the punch's contact surface at {chosen}.",
     "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch at {chosen}.",
     "tracks": "Sliding over the last cycle: (a) tracks of the strip's material, dots where it begins, and (b) the "

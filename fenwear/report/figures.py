@@ -170,7 +170,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
             drawn["temperature"] = temperature_figure(history, chosen, look)
         if lies_between(history):
             drawn["between"] = between_figure(history, chosen, look)
-    drawn |= roughness_of(history, chosen, look)
+    drawn |= roughness_of(history, look)
     drawn["peaks"] = peak_figure(history, look)
     if bores_of(history):
         drawn["place"] = place_figure(history, look)

@@ -18,10 +18,7 @@ from fenwear.report.figures import FOLDER, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, names_in, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
-from fenwear.report.shown import chosen_half_cycles
 from fenwear.report.style import STANDARD, Style
-from fenwear.report.surface import model_of
-from fenwear.report.turned import Turned, turned_map
 from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
@@ -129,7 +126,7 @@ class Places:
 def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None = None) -> str:
     """Return report.html of a run whose figures are drawn; its history is read where it is not given."""
     history, summary = read_history(directory) if history is None else history, read_summary(directory)
-    images, turned = _images(directory), _turned(history)
+    images = _images(directory)
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     return render(
         "report.html",
@@ -143,8 +140,6 @@ def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None
         tables=_tables(summary, history),
         places=_places(summary),
         figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS if name in images],
-        turned=turned and turned.html,
-        nonce=turned and turned.nonce,
         bodies=_bodies(images),
         animations=_animations(images),
         change=_change(summary),
@@ -162,16 +157,6 @@ def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
     )
-
-
-def _turned(history: xarray.Dataset) -> Turned | None:
-    """Return the map to turn of solids and rings; None without plotly, and of plane models."""
-    if model_of(history) == "plane":
-        return None
-    try:
-        return turned_map(history, chosen_half_cycles(history))
-    except (ImportError, OSError):
-        return None
 
 
 def _number(path: str, value: float, *, cut: int = 0) -> Number:

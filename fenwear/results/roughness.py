@@ -1,10 +1,8 @@
 """Roughness of worn surfaces in history.nc and summary.json: what a topography is, less what has worn off it.
 
-Numbers are those of ISO 25178 (Sa, Sq, Ssk), in the plane of ISO 4287 (Ra, Rq, Rsk), of all within the convex hull of
-what has worn, its form taken off: the polynomial of second order that is nearest by least squares, as a scar's own
-shape is no roughness. Beyond the scar that shape does not go on. Before anything has worn it is that of the whole grid.
-
-The bearing curve (Abbott and Firestone) has what share of that place lies above a height over its mean.
+Sa and Sq of ISO 25178 (Ra and Rq of ISO 4287 in the plane), of all within the convex hull of what has worn, its form
+taken off: the polynomial of second order that is nearest by least squares, as a scar's own shape is no roughness.
+Before anything has worn they are those of the whole grid.
 """
 
 from __future__ import annotations
@@ -15,18 +13,15 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.topography import roughness
 from fenwear.cycle import Block
 from fenwear.results.surfaces import Column
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
 ON_HULL = 1e-9  # spacings: rounding
-SHARES = (0.1, 0.5, 0.9)  # of the place, whose heights of the bearing curve the summary has
 NAMES = {
     "roughness_mean": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
     "roughness_rms": ("mm", "root mean square of the same heights (Sq) of the {}"),
-    "roughness_skewness": ("1", "skewness of the same heights (Ssk) of the {}"),
 }
 ENDS = {"punch": "", "strip": "_strip"}
 
@@ -65,26 +60,23 @@ def values(block: Block) -> dict[str, Array]:
     """Return them for each half-cycle of a block by name (k,)."""
     found = {}
     for body in _rough(block.system):
-        rows = [roughness(worn_heights(block, body, k)) for k in range(len(block))]
-        numbers = np.array([(one.mean, one.rms, one.skewness) for one in rows]).reshape(len(rows), 3)
-        for name, column in zip(NAMES, numbers.T, strict=True):
-            found[f"{name}{ENDS[body]}"] = column
+        rows = np.array([sa_sq(worn_heights(block, body, k)) for k in range(len(block))]).reshape(-1, 2)
+        found |= {f"{name}{ENDS[body]}": column for name, column in zip(NAMES, rows.T, strict=True)}
     return found
+
+
+def sa_sq(z: Array) -> tuple[float, float]:
+    """Return Sa and Sq of heights over their mean (n,), in their unit."""
+    return float(np.abs(z).mean()), float(np.sqrt((z**2).mean()))
 
 
 def body_numbers(last: Block, body: str) -> dict[str, float]:
     """Return the roughness of a body at the end of a run, for its part of summary.json; none of one without."""
     if body not in _rough(last.system):
         return {}
-    z = worn_heights(last, body, len(last) - 1)
-    found = roughness(z)
-    bearing = bearing_heights(z, np.array(SHARES))
-    return {
-        "roughness_Sa_mm": found.mean,
-        "roughness_Sq_mm": found.rms,
-        "roughness_Ssk": found.skewness,
-        **{f"bearing_height_{100 * share:g}_percent_mm": float(h) for share, h in zip(SHARES, bearing, strict=True)},
-    }
+    return dict(
+        zip(("roughness_Sa_mm", "roughness_Sq_mm"), sa_sq(worn_heights(last, body, len(last) - 1)), strict=True)
+    )
 
 
 def worn_heights(block: Block, body: str, row: int) -> Array:
@@ -137,8 +129,3 @@ def _within_hull(places: NDArray[np.int64], worn: NDArray[np.int64]) -> NDArray[
     sides = ConvexHull(worn).equations
     within[within] = (places[within] @ sides[:, :-1].T + sides[:, -1] <= ON_HULL).all(axis=1)
     return within
-
-
-def bearing_heights(z: Array, shares: Array) -> Array:
-    """Return the heights over the mean above which these shares of a surface lie, mm."""
-    return np.asarray(np.quantile(z, 1 - shares))

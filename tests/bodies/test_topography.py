@@ -12,21 +12,11 @@ from waves import FULL, HEIGHT, LENGTH, wavy
 from fenwear import CaseError
 from fenwear.assembly import assemble
 from fenwear.bodies.grid import RegularGrid
-from fenwear.bodies.topography import heights_on, roughness
+from fenwear.bodies.topography import heights_on
 from fenwear.case import Topography
 from fenwear.cycle import evolve
 
 GRID = RegularGrid((-0.5, -0.25), (0.01, 0.01), (101, 51), 2, 0.0)
-
-
-def test_roughness_numbers() -> None:
-    """Of a sine Sa = 2 / pi, Sq = 1 / sqrt 2, Ssk = 0; of its square Ssk from the moments of a cosine."""
-    x = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
-    found = roughness(3 + np.sin(x))
-    assert (found.mean, found.rms, found.skewness) == pytest.approx((2 / np.pi, np.sqrt(0.5), 0.0), abs=1e-5)
-    assert roughness(np.exp(np.cos(x))).skewness > 0.3
-    halves = np.repeat([1.0, 2.0], [1, 3])
-    assert roughness(halves[::2][:2], np.array([1.0, 3.0])).rms == pytest.approx(roughness(halves).rms)
 
 
 @pytest.mark.parametrize("hurst", [0.4, 0.8])

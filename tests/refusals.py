@@ -238,8 +238,12 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
 OTHERS: dict[str, tuple[str, ...]] = {
     "bodies/contact_surface.py": ("contacts that lie apart",),
     "bodies/fine.py": ("missing, but required",),
-    "bodies/imported.py": ("starts with punch_",),
-    "bodies/mesh.py": ("no facet on the boundary", "belongs to a .geo file"),
+    "bodies/mesh.py": (
+        "no facet on the boundary",
+        "belongs to a .geo file",
+        "belongs to a shape from CAD",
+        "belongs to the mesh of another",
+    ),
     "bodies/topography.py": ("a file that ends with",),
     "case/bodies.py": ("expected pairs",),
     "case/creep.py": ("or per_decade with an onset", "only then"),

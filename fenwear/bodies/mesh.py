@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -32,10 +31,14 @@ from fenwear.bodies.raw_mesh import GmshView, RawMesh, raw_mesh
 from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
+from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.files import CAD, MESHES, is_foreign, read_mesh
+from fenwear.files.cad import name_parts, read_shapes, set_sizes
+from fenwear.files.groups import GroupedMesh, grouped, into_gmsh, normal
+from fenwear.files.session import gmsh_model
 from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import on_root
-from fenwear.stack import importing
 
 BODIES = ROLES
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
@@ -139,10 +142,22 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
     if path is None:
         names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
         raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
-    if path.suffix not in (".geo", ".msh"):
-        raise CaseError(InputError("geometry.file", f"expected a .geo or a .msh file, got {geometry.file!r}"))
-    if path.suffix == ".msh" and geometry.order != 1:
-        raise CaseError(InputError("geometry.order", "a .msh file has its own; it belongs to a .geo file"))
+    ends = (".geo", ".msh", *CAD, *MESHES)
+    if path.suffix.lower() not in ends:
+        message = f"expected a file that ends in {', '.join(ends)}, got {geometry.file!r}"
+        raise CaseError(InputError("geometry.file", message))
+    meshed_here = path.suffix.lower() in (".geo", *CAD)
+    if not meshed_here and geometry.order != 1:
+        message = f"a {path.suffix} file has its own; it belongs to a .geo file or to a shape from CAD"
+        raise CaseError(InputError("geometry.order", message))
+    shape = path.suffix.lower() in CAD
+    for key in ("size", "sizes"):
+        if getattr(geometry, key) and not shape:
+            message = f"belongs to a shape from CAD ({', '.join(CAD)}); a {path.suffix} file has its own sizes"
+            raise CaseError(InputError(f"geometry.{key}", message))
+    if geometry.unit is not None and path.suffix.lower() in (".geo", ".msh"):
+        message = "belongs to the mesh of another program; a .geo has Mesh.ScalingFactor"
+        raise CaseError(InputError("geometry.unit", message))
     if path.suffix == ".msh" and geometry.parameters:
         raise CaseError(InputError("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
     return path
@@ -188,8 +203,10 @@ def _meshed(
     """Return the meshes of the punch and the strip: those kept on disk, or gmsh's, which are kept; on one rank."""
     parameters = _parameters(geometry, path, known)
     content = path.read_bytes()
-    keep = kept.limit() > 0 and not (path.suffix == ".geo" and REACHES_OUT.search(content))
-    shape = (geometry.order, geometry.degree, kind, names, path.suffix, sorted(parameters.items()))
+    keep = kept.limit() > 0 and path.suffix in (".geo", ".msh", *CAD)
+    keep = keep and not (path.suffix == ".geo" and REACHES_OUT.search(content))
+    sizes = (geometry.size, sorted(geometry.sizes.items()), geometry.unit, sorted(geometry.groups.items()))
+    shape = (geometry.order, geometry.degree, kind, names, path.suffix, sorted(parameters.items()), sizes)
     key = kept.common_key(MPI.COMM_SELF, [kept.surroundings(), *shape, content]) if keep else ""
     stored = kept.load(MPI.COMM_SELF, key) if keep and not fresh else None
     if stored is not None:
@@ -201,8 +218,9 @@ def _meshed(
             for body in BODIES
         )
         return punch, strip
+    foreign = foreign_mesh(geometry, path, kind, names)
     with gmsh_model() as gmsh:
-        contact_nodes = _load(gmsh, geometry, path, kind, parameters, names)
+        contact_nodes = _load(gmsh, geometry, path, kind, parameters, names, foreign)
         punch, strip = (raw_mesh(gmsh, body, _dim(kind)) for body in BODIES)
     if keep:
         arrays = {
@@ -222,19 +240,31 @@ def write_msh(
     geometry: Geometry,
     folder: Path | None,
     path: Path,
-    kind: Kind = "stress",
+    kind: Kind | None = "stress",
     known: Mapping[str, float] = NOTHING,
     names: Names = BY_ROLE,
-) -> None:
+) -> GroupedMesh | None:
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
+
+    Args:
+        geometry: What to mesh.
+        folder: Of the case file.
+        path: The .msh file.
+        kind: Of the model; None for the one that the file's elements or shapes are of.
+        known: Of the parameters that the geometry may have.
+        names: Of the bodies.
+
+    Returns:
+        The groups of the mesh of another program.
 
     Raises:
         CaseError: as `build_meshes`; or `path` cannot be written.
         OutputError: there is no room for it.
     """
     geo = find_geometry(geometry, folder)
+    parameters, foreign = _parameters(geometry, geo, known), foreign_mesh(geometry, geo, kind, names)
     with gmsh_model() as gmsh:
-        _load(gmsh, geometry, geo, kind, _parameters(geometry, geo, known), names)
+        _load(gmsh, geometry, geo, kind, parameters, names, foreign)
         _name_groups(gmsh, names.by_name)
         try:
             path.touch()
@@ -244,39 +274,56 @@ def write_msh(
         if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
             path.unlink()
             raise OutputError(path, "gmsh wrote only a part of it; is there room?")
+    return foreign
 
 
-def _library() -> Any:
-    """Return gmsh.
+def foreign_mesh(geometry: Geometry, path: Path, kind: Kind | None, names: Names) -> GroupedMesh | None:
+    """Return the groups that the mesh of another program gives; None of a file that gmsh meshes or writes itself.
 
     Raises:
-        StackError: it is missing, or a library that it needs.
+        CaseError: it cannot be read, or its sets do not fit.
     """
-    with importing():
-        import gmsh
-    return gmsh
+    if not is_foreign(path):
+        return None
+    mesh = read_mesh(path)
+    scale = None if geometry.unit is None else _millimetres(geometry.unit)
+    dim = mesh.dim if kind is None else _dim(kind)
+    return grouped(mesh, geometry.groups, scale, dim, _any_case(names), lambda text: convert(text, "mm"))
 
 
-@contextmanager
-def gmsh_model() -> Iterator[Any]:
-    """Open gmsh quietly, and close it unless someone else had opened it."""
-    gmsh = _library()
-    was_open = gmsh.isInitialized()
-    if not was_open:
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.model.add("fenwear")
+def _millimetres(unit: str) -> float:
+    """Return the length of a unit, mm.
+
+    Raises:
+        CaseError: it is no unit of length.
+    """
     try:
-        yield gmsh
-    finally:
-        if was_open:
-            gmsh.model.remove()
-        else:
-            gmsh.finalize()
+        return convert(f"1 {unit}", "mm")
+    except ValueError as error:
+        raise CaseError(InputError("geometry.unit", str(error))) from None
+
+
+def _any_case(names: Names) -> Callable[[str], str]:
+    """Return what gives a group's name by role, whatever its case and spaces."""
+
+    def by_role(group: str) -> str:
+        key = normal(group)
+        for role, name in names.by_roles.items():
+            if key.startswith(f"{normal(name)}_"):
+                return f"{role}{key[len(normal(name)) :]}"
+        return key
+
+    return by_role
 
 
 def _load(
-    gmsh: Any, geometry: Geometry, path: Path, kind: Kind, parameters: Mapping[str, float], names: Names
+    gmsh: Any,
+    geometry: Geometry,
+    path: Path,
+    kind: Kind | None,
+    parameters: Mapping[str, float],
+    names: Names,
+    foreign: GroupedMesh | None,
 ) -> float:
     """Read and mesh the geometry in the current gmsh model, name its groups by roles, and check the contract.
 
@@ -287,12 +334,27 @@ def _load(
     for name, value in parameters.items():
         gmsh.parser.setNumber(name, [value])
     gmsh.option.setNumber(SCALING, 1.0)  # not of a geometry that was read before
-    contact_nodes = 0.0
+    contact_nodes, shape = 0.0, path.suffix.lower() in CAD
     try:
-        _merge(gmsh, path)
+        if foreign is not None:
+            into_gmsh(gmsh, foreign)
+        elif shape:
+            read_shapes(gmsh, str(path), path.name, _millimetres(geometry.unit or "mm"))
+        else:
+            _merge(gmsh, path)
+            _rename_groups(gmsh, path, geometry, names)
+        kind = kind or ("solid" if gmsh.model.getEntities(3) else "stress")
+        dim = _dim(kind)
+        if shape:
+            parts = {_any_case(names)(name): part for name, part in geometry.groups.items()}
+            name_parts(gmsh, path.name, parts, dim, _any_case(names))
         _by_roles(gmsh, path, names)
-        if path.suffix == ".geo":
-            dim = _dim(kind)
+        if shape:
+            tags = {name: (d, tag) for d in range(4) for name, tag in _groups(gmsh, d).items()}
+            sizes = {_any_case(names)(name): size for name, size in geometry.sizes.items()}
+            set_sizes(gmsh, geometry.size, sizes, tags)
+            _check_groups_there(gmsh, path, kind)
+        if shape or path.suffix == ".geo":
             gmsh.model.mesh.generate(dim - 1)
             most = max(_contact_nodes(gmsh, geometry, body, dim - 1) for body in BODIES[: 1 if kind == "solid" else 2])
             _check_size(most, dim - 1)
@@ -308,6 +370,37 @@ def _load(
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
     _check_groups(gmsh, path, kind)
     return contact_nodes
+
+
+def _rename_groups(gmsh: Any, path: Path, geometry: Geometry, names: Names) -> None:
+    """Give groups of a .geo or .msh the names that geometry.groups has, and known ones in capitals their own.
+
+    Raises:
+        CaseError: a group does not exist.
+    """
+    for dim in range(4):
+        for name, tag in _groups(gmsh, dim).items():
+            group = _any_case(names)(name)
+            if group.startswith(tuple(f"{body}_" for body in BODIES)) and names.by_role(name) == name != group:
+                gmsh.model.removePhysicalName(name)
+                gmsh.model.setPhysicalName(dim, tag, group)
+    for wanted, value in geometry.groups.items():
+        every = {normal(name): (dim, tag, name) for dim in range(4) for name, tag in _groups(gmsh, dim).items()}
+        for text in [value] if isinstance(value, str) else value:
+            if text and normal(text) not in every:
+                message = f"{path.name} has no group {text!r}. It has {', '.join(sorted(every)) or 'none'}."
+                raise CaseError(InputError(f"geometry.groups.{wanted}", message))
+        parts = [every[normal(text)] for text in ([value] if isinstance(value, str) else value) if text]
+        old = every.get(normal(wanted))
+        if old is not None and old not in parts:
+            gmsh.model.removePhysicalGroups([old[:2]])
+        if parts:
+            own = [e for dim, tag, _ in parts for e in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
+            for dim, tag, name in parts:
+                gmsh.model.removePhysicalGroups([(dim, tag)])
+                gmsh.model.removePhysicalName(name)
+            tag = gmsh.model.addPhysicalGroup(parts[0][0], own)
+            gmsh.model.setPhysicalName(parts[0][0], tag, wanted)
 
 
 def _by_roles(gmsh: Any, path: Path, names: Names) -> None:
@@ -421,8 +514,19 @@ def _named(gmsh: Any, dim: int) -> str:
     return f"it has {', '.join(names)}" if names else f"it has no physical {ENTITIES[dim]}"
 
 
-def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
-    problems, whole = [], _dim(kind)
+def _check_groups_there(gmsh: Any, path: Path, kind: Kind) -> None:
+    """Refuse a geometry without the groups that bodies need, before or after it is meshed.
+
+    Raises:
+        CaseError: a body has no region or no contact.
+    """
+    if problems := _missing_groups(gmsh, path, _dim(kind)):
+        raise CaseError([InputError("geometry.file", text) for text in problems])
+
+
+def _missing_groups(gmsh: Any, path: Path, whole: int) -> list[str]:
+    """Return which groups of the contract are missing, in words."""
+    problems = []
     region, facet = ENTITIES[whole], ENTITIES[whole - 1]
     for body in BODIES:
         regions = [name for name in _groups(gmsh, whole) if name.startswith(f"{body}_")]
@@ -438,6 +542,12 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
             )
     if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
         problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
+    return problems
+
+
+def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
+    whole = _dim(kind)
+    problems = _missing_groups(gmsh, path, whole)
     for dim in (whole, whole - 1):
         names = _groups(gmsh, dim)
         types = {name: _element_types(gmsh, dim, tag) for name, tag in names.items()}

@@ -43,10 +43,26 @@ def _parameter(value: object) -> float:
 
 
 class Geometry(Part):
-    """Where the meshes come from: a gmsh .geo with its parameters, or a .msh."""
+    """Where the meshes come from: a gmsh .geo with its parameters, a mesh, or a shape from CAD."""
 
     file: str = Field(
-        default="punch_on_strip.geo", description=".geo or .msh beside the case file, or one of the ready geometries"
+        default="punch_on_strip.geo",
+        description="beside the case file, or one of the ready geometries: .geo or .msh of gmsh; a mesh of another "
+        "program (.inp, .med, .unv, .cgns, .bdf, .exo, .vtu, .xdmf); a shape from CAD (.step, .iges, .brep)",
+    )
+    groups: dict[str, str | tuple[str, ...]] = Field(
+        default={},
+        description='names of the file by fenwear\'s groups: punch_contact = "Group_3", a list of names, "face 3" of a '
+        'shape from CAD, a plane "y = 0 mm" of a mesh, or "" to leave a group out; case and spaces do not count',
+    )
+    unit: str | None = Field(
+        default=None, description="of the lengths in a mesh of another program, or a .brep: mm (default), m, in"
+    )
+    size: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None, description="largest elements in a shape from CAD; by default a fifteenth of the smaller body"
+    )
+    sizes: dict[str, Annotated[Length, Field(gt=0)]] = Field(
+        default={}, description='of elements at groups of a shape from CAD: punch_contact = "0.2 mm"'
     )
     parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
         default={}, description="values of parameters of the .geo, by their names"

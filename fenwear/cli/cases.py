@@ -207,42 +207,54 @@ def mesh_command(
     case: CaseArgument,
     output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
     settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
 ) -> None:
     """Write the mesh of a case with its physical groups."""
     from fenwear.bodies.mesh import write_msh
 
     loaded = load(case, settings)
-    if output.suffix != ".msh":
-        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    _check_msh(output)
     meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion, loaded.names)
-    on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
+    found = on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
+    if as_json:
+        print_json({"mesh": str(output), "groups": [] if found is None else found.rows()})
     log(f"mesh in {output}")
+
+
+def _check_msh(path: Path) -> None:
+    if path.suffix != ".msh":
+        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(path)!r}"))
 
 
 @app.command("import")
 def import_command(
-    source: Annotated[Path, typer.Argument(metavar="MESH", help="Of Abaqus (.inp) or another that meshio reads.")],
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A mesh of Abaqus, Salome, Nastran, Exodus, VTK, ... or a shape from CAD."),
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
     groups: Annotated[
         list[str],
         typer.Option("--group", metavar="GROUP=SET", help="Such as punch_contact=PAD_LOW; may be repeated."),
     ] = [],  # noqa: B006
-    unit: Annotated[str, typer.Option(help="Of the mesh's lengths, such as m.")] = "mm",
+    unit: Annotated[str | None, typer.Option(help="Of the file's lengths, such as m; by default mm.")] = None,
+    as_json: JsonOption = False,
 ) -> None:
-    """Write a mesh of another program with its named sets as a .msh file for geometry.file."""
-    from fenwear.bodies.imported import import_mesh
-    from fenwear.case.units import convert
+    """Write a mesh of another program, or a shape from CAD, as a .msh file; geometry.file takes both without it."""
+    from fenwear.bodies.mesh import write_msh
+    from fenwear.case import Geometry
 
-    if output.suffix != ".msh":
-        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    _check_msh(output)
     pairs = [text.partition("=") for text in groups]
-    wrong = next((text for text, (name, _, of) in zip(groups, pairs, strict=True) if not (name and of)), None)
+    wrong = next((text for text, (name, equals, _) in zip(groups, pairs, strict=True) if not (name and equals)), None)
     if wrong is not None:
         raise CaseError(InputError("--group", f"expected GROUP=SET, got {wrong!r}"))
-    try:
-        scale = convert(f"1 {unit}", "mm")
-    except ValueError as error:
-        raise CaseError(InputError("--unit", str(error))) from None
     named = {name.strip(): of.strip() for name, _, of in pairs}
-    found = on_root(MPI.COMM_WORLD, lambda: import_mesh(source, output, named, scale))
-    log(f"{found.text()}\nmesh in {output}")
+    geometry = Geometry(file=str(source), groups=named, unit=unit)  # type: ignore[arg-type]
+    found = on_root(MPI.COMM_WORLD, lambda: write_msh(geometry, None, output, None))
+    if as_json:
+        rows, unused, notes = ([], (), ()) if found is None else (found.rows(), found.unused, found.notes)
+        print_json({"mesh": str(output), "groups": rows, "unused": list(unused), "notes": list(notes)})
+    elif found is not None:
+        log(found.text())
+    log(f"mesh in {output}")

@@ -224,8 +224,8 @@ def test_bad_geo(old: str, new: str, expected: str, tmp_path: Path) -> None:
 def test_bad_files(tmp_path: Path) -> None:
     """No file, no mesh, no parameters of a mesh."""
     refuse(tmp_path / "nowhere.geo", f"no file 'nowhere.geo'; ready ones are .*{READY}")
-    (tmp_path / "mesh.vtu").touch()
-    refuse(tmp_path / "mesh.vtu", "expected a .geo or a .msh file")
+    (tmp_path / "mesh.stl").touch()
+    refuse(tmp_path / "mesh.stl", "expected a file that ends in")
     (tmp_path / "nonsense.msh").write_text("$Nonsense\n")
     refuse(tmp_path / "nonsense.msh", "nonsense.msh")
     (tmp_path / "binary.msh").write_bytes(bytes(range(256)))

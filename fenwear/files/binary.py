@@ -1,0 +1,204 @@
+"""Meshes in HDF5 and NetCDF: MED of Salome, Exodus of Cubit and MOOSE."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fenwear.errors import CaseError, InputError
+from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet
+
+MED_KINDS = {"PO1": 15, "SE2": 1, "SE3": 8, "TR3": 2, "TR6": 9, "QU4": 3, "QU8": 16, "QU9": 10, "TE4": 4, "T10": 11,
+             "HE8": 5, "H20": 17, "PE6": 6, "PY5": 7}  # fmt: skip
+# MED's nodes of solids in gmsh's order: MED turns the other way round the base.
+MED_ORDERS = {4: [0, 2, 1, 3], 5: [0, 3, 2, 1, 4, 7, 6, 5], 6: [0, 2, 1, 3, 5, 4], 7: [0, 3, 2, 1, 4],
+              11: [0, 2, 1, 3, 6, 5, 4, 7, 8, 9],
+              17: [0, 3, 2, 1, 4, 7, 6, 5, 11, 8, 16, 10, 19, 9, 18, 17, 15, 12, 14, 13]}  # fmt: skip
+EXODUS_KINDS = {  # by the begin of the name and the number of nodes
+    ("SPH", 1): 15, ("BAR", 2): 1, ("TRU", 2): 1, ("BEA", 2): 1, ("EDG", 2): 1, ("EDG", 3): 8, ("BAR", 3): 8,
+    ("TRI", 3): 2, ("TRI", 6): 9, ("QUA", 4): 3, ("QUA", 8): 16, ("QUA", 9): 10, ("SHE", 4): 3, ("SHE", 8): 16,
+    ("TET", 4): 4, ("TET", 10): 11, ("HEX", 8): 5, ("HEX", 20): 17, ("WED", 6): 6, ("PYR", 5): 7,
+}  # fmt: skip
+EXODUS_ORDERS = {11: [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
+                 17: [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 12, 9, 13, 10, 14, 15, 16, 19, 17, 18]}  # fmt: skip
+# Exodus' sides of solids in Abaqus' order.
+SOLID_SIDES = {4: (1, 2, 3, 0), 11: (1, 2, 3, 0), 5: (2, 3, 4, 5, 0, 1), 12: (2, 3, 4, 5, 0, 1),
+               17: (2, 3, 4, 5, 0, 1)}  # fmt: skip
+
+
+def read_med(path: Path) -> MeshFile:
+    """Return the mesh of a MED file with the groups of Salome; the first of several meshes.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            return _med(path.name, file)
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+        raise _unreadable(path, "MED", error) from None
+
+
+def _unreadable(path: Path, kind: str, error: Exception) -> CaseError:
+    text = str(error).partition("\n")[0][:120] or type(error).__name__
+    return CaseError(InputError(path.name, f"cannot be read as {kind}: {text}. Write the file anew."))
+
+
+def _med(name: str, file: Any) -> MeshFile:
+    meshes = sorted(file["ENS_MAA"])
+    group = file["ENS_MAA"][meshes[0]]
+    step = group[sorted(group)[-1]] if "NOE" not in group else group
+    coordinates = np.asarray(step["NOE"]["COO"], dtype=np.float64)
+    count = int(step["NOE"]["COO"].attrs.get("NBR", len(coordinates) // int(group.attrs.get("ESP", 3))))
+    flat = coordinates.reshape(-1, count).T
+    points = np.zeros((count, 3))
+    points[:, : flat.shape[1]] = flat
+    blocks, families, notes = [], [], []
+    for kind in step.get("MAI", {}):
+        part = step["MAI"][kind]
+        if kind not in MED_KINDS:
+            notes.append(f"elements of the kind {kind} are left out")
+            continue
+        number = MED_KINDS[kind]
+        nodes = np.asarray(part["NOD"], dtype=np.int64).reshape(KINDS[number].nodes, -1).T - 1
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < count):
+            raise ValueError(f"elements of the kind {kind} have nodes that do not exist")
+        blocks.append(Block.of(number, nodes[:, MED_ORDERS.get(number, list(range(nodes.shape[1])))]))
+        families.append(np.asarray(part["FAM"] if "FAM" in part else np.zeros(len(nodes)), dtype=np.int64))
+    if len(meshes) > 1:
+        notes.append(f"meshes left out: {', '.join(meshes[1:])}")
+    of_elements = np.concatenate(families) if families else np.zeros(0, np.int64)
+    of_nodes = np.asarray(step["NOE"]["FAM"], np.int64) if "FAM" in step["NOE"] else np.zeros(count, np.int64)
+    sets = []
+    named = file["FAS"][meshes[0]] if "FAS" in file and meshes[0] in file["FAS"] else {}
+    for word, of, values in (("ELEME", "elements", of_elements), ("NOEUD", "nodes", of_nodes)):
+        for group_name, numbers in _families(named.get(word, {})).items():
+            members = np.flatnonzero(np.isin(values, numbers))
+            if len(members):
+                sets.append(MeshSet(group_name, of, members))  # type: ignore[arg-type]
+    return MeshFile(name, points, tuple(blocks), tuple(sets), tuple(notes))
+
+
+def _families(group: Mapping[str, Any]) -> dict[str, list[int]]:
+    """Return the numbers of the families of each group."""
+    import h5py
+
+    found: dict[str, list[int]] = {}
+    for family in group.values():
+        if "GRO" not in family:
+            continue
+        kind = family["GRO"]["NOM"].id.get_type()
+        rows = np.empty(family["GRO"]["NOM"].shape[0], f"V{kind.get_size()}")
+        family["GRO"]["NOM"].id.read(h5py.h5s.ALL, h5py.h5s.ALL, rows, mtype=kind)
+        for row in rows:
+            name = row.tobytes().split(b"\0")[0].decode("utf-8", "replace").strip()
+            found.setdefault(name, []).append(int(family.attrs["NUM"]))
+    return found
+
+
+def read_exodus(path: Path) -> MeshFile:
+    """Return the mesh of an Exodus file with its blocks, side sets and node sets.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    try:
+        if path.read_bytes()[:3] == b"CDF":
+            from scipy.io import netcdf_file
+
+            with netcdf_file(path, mmap=False) as file:
+                variables = file.variables
+                return _exodus(path.name, lambda name: variables[name][:] if name in variables else None,
+                               lambda name: getattr(variables[name], "elem_type", b""))  # fmt: skip
+        import h5py
+
+        with h5py.File(path) as data:
+            return _exodus(path.name, lambda name: data[name][()] if name in data else None,
+                           lambda name: data[name].attrs.get("elem_type", b""))  # fmt: skip
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+        raise _unreadable(path, "Exodus", error) from None
+
+
+def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any]) -> MeshFile:
+    if get("coord") is not None:
+        columns = [np.asarray(row, dtype=np.float64) for row in get("coord")]
+    else:
+        columns = [np.asarray(get(f"coord{axis}"), np.float64) for axis in "xyz" if get(f"coord{axis}") is not None]
+    points = np.zeros((len(columns[0]), 3))
+    points[:, : len(columns)] = np.column_stack(columns)
+    blocks, sets, start = [], [], 0
+    ids, names = get("eb_prop1"), _texts(get("eb_names"))
+    for number in _numbered("connect", get):
+        nodes = np.asarray(get(f"connect{number}"), dtype=np.int64) - 1
+        word = _text(kind_of(f"connect{number}")).upper()
+        key = (word[:3], nodes.shape[1])
+        if key not in EXODUS_KINDS:
+            raise ValueError(f"block {number} has elements {word} with {nodes.shape[1]} nodes")
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
+            raise ValueError(f"block {number} has nodes that do not exist")
+        kind = EXODUS_KINDS[key]
+        nodes = nodes[:, EXODUS_ORDERS[kind]] if kind in EXODUS_ORDERS else nodes
+        blocks.append(Block.of(kind, nodes, start + 1))
+        members = np.arange(start, start + len(nodes))
+        sets.append(MeshSet(_name(names, ids, number, "block"), "elements", members))
+        start += len(nodes)
+    mesh = MeshFile(name, points, tuple(blocks), ())
+    ids, names = get("ss_prop1"), _texts(get("ss_names"))
+    for number in _numbered("elem_ss", get):
+        elements = np.asarray(get(f"elem_ss{number}"), dtype=np.int64) - 1
+        sides = np.asarray(get(f"side_ss{number}"), dtype=np.int64) - 1
+        if elements.size and not (elements.min() >= 0 and elements.max() < start):
+            raise ValueError(f"side set {number} has elements that do not exist")
+        sets.append(MeshSet(_name(names, ids, number, "sideset"), "sides", _own_sides(mesh, elements, sides)))
+    ids, names = get("ns_prop1"), _texts(get("ns_names"))
+    for number in _numbered("node_ns", get):
+        nodes = np.unique(np.asarray(get(f"node_ns{number}"), dtype=np.int64) - 1)
+        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
+            raise ValueError(f"node set {number} has nodes that do not exist")
+        sets.append(MeshSet(_name(names, ids, number, "nodeset"), "nodes", nodes))
+    return MeshFile(name, points, tuple(blocks), tuple(sets))
+
+
+def _own_sides(mesh: MeshFile, elements: Ints, sides: Ints) -> Ints:
+    """Return elements and sides in the order of sides that `KINDS` has."""
+    kinds = np.array([block.kind for block in mesh.blocks])[mesh.block_of(elements)]
+    found = sides.copy()
+    for kind, order in SOLID_SIDES.items():
+        own = kinds == kind
+        found[own] = np.array(order)[sides[own]]
+    most = np.array([len(KINDS[kind].sides) for kind in kinds])
+    if ((found < 0) | (found >= most)).any():
+        raise ValueError("a side set has sides that its elements do not have")
+    return np.column_stack([elements, found])
+
+
+def _numbered(stem: str, get: Callable[[str], Any]) -> Iterator[int]:
+    number = 1
+    while get(f"{stem}{number}") is not None:
+        yield number
+        number += 1
+
+
+def _text(value: Any) -> str:
+    raw = value if isinstance(value, bytes) else bytes(value) if isinstance(value, np.bytes_) else value
+    return raw.decode("utf-8", "replace").strip("\0 ") if isinstance(raw, bytes) else str(raw)
+
+
+def _texts(value: Any) -> list[str]:
+    if value is None:
+        return []
+    rows = (b"".join(bytes(np.asarray(one, dtype="S1")) for one in row) for row in value)
+    return [re.sub(r"\0.*", "", row.decode("utf-8", "replace"), flags=re.DOTALL).strip() for row in rows]
+
+
+def _name(names: list[str], ids: Any, number: int, word: str) -> str:
+    """Return the name of a set, or its word and number."""
+    if number <= len(names) and names[number - 1]:
+        return names[number - 1]
+    return f"{word} {int(ids[number - 1]) if ids is not None and number <= len(ids) else number}"

@@ -1,0 +1,46 @@
+"""Read a file by gmsh in a process of its own: gmsh ends the process on some broken files.
+
+    python3 gmsh_child.py FILE RESULT.npz     # of a mesh: its arrays
+    python3 gmsh_child.py FILE                # of shapes: only whether they can be read
+
+It imports gmsh and numpy alone, and prints what gmsh says is wrong.
+"""
+
+import json
+import sys
+
+import gmsh
+import numpy as np
+
+
+def main(path: str, result: str = "") -> None:
+    """Read the file; write what it holds."""
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("General.AbortOnError", 2)
+    if not result:
+        gmsh.model.occ.importShapes(path, highestDimOnly=True)
+        gmsh.model.occ.synchronize()
+        return
+    gmsh.merge(path)
+    model = gmsh.model
+    tags, points, _ = model.mesh.getNodes()
+    arrays: dict[str, object] = {"tags": tags, "points": points}
+    blocks: list[tuple[int, int, int, str]] = []
+    for dim, tag in model.getEntities():
+        for kind, labels, nodes in zip(*model.mesh.getElements(dim, tag), strict=True):
+            arrays[f"labels{len(blocks)}"], arrays[f"nodes{len(blocks)}"] = labels, nodes
+            blocks.append((dim, tag, int(kind), model.mesh.getElementProperties(kind)[0]))
+    groups = [
+        (dim, tag, model.getPhysicalName(dim, tag), [int(one) for one in model.getEntitiesForPhysicalGroup(dim, tag)])
+        for dim, tag in model.getPhysicalGroups()
+    ]
+    named = json.dumps({"blocks": blocks, "groups": groups})
+    np.savez(result, named=np.frombuffer(named.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except Exception as error:  # gmsh raises bare Exception only
+        sys.exit(str(error) or "no reason given")

@@ -237,7 +237,8 @@ class _Run:
     def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
         """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
         contacts = None if state is None else joined(state.contacts)
-        for warning in self._heat_watch.see(system, None if contacts is None else contacts.pressure):
+        known = (None, None) if state is None or contacts is None else (contacts.pressure, state.temperature)
+        for warning in self._heat_watch.see(system, *known):
             self.log(f"warning: {warning}")
         self.extremes.update(self._heat_watch.numbers)
 

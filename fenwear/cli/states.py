@@ -66,7 +66,7 @@ def steady_command(
     setup = time.perf_counter() - begin
     state = steady(system)
     found = state.system
-    gain = heat_gain(with_reduced_heat(found), state.phase_pressure)
+    gain = heat_gain(with_reduced_heat(found), state.phase_pressure, None if state.heat is None else state.heat.end)
     warnings = [
         *system.bodies.remarks,
         *plausibility_warnings(loaded),

@@ -280,8 +280,8 @@ def _heated(
     by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
     by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.dim))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
-    if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
-        rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
+    rise = exchange.conductance_slope(pressure)
+    if state is not None and rise.any():
         by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
     changes: Array = by_power @ (pressure[:, None] * laws.mu_s)
     changes[:, : heat.dim] += by_state

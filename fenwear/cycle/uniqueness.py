@@ -1,12 +1,17 @@
 """Whether the contact of a half-cycle with heat has one answer.
 
-The friction heat of a pressure p opens the gap by Theta p by the end of its half-cycle, and where nodes stay
-closed, with the loads balanced, an opened gap takes the pressure X away: what a pressure heats gives back G p =
--X Theta p of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is
+The friction heat of a change dp of pressure opens the gap by Theta dp by the end of its half-cycle, and where nodes
+stay closed, with the loads balanced, an opened gap takes the pressure X away: what a change heats gives back G dp =
+-X Theta dp of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is
 where R. A. Burton's waves neither grow nor decay, for heat that has had one half-cycle to flow. Beyond it a
 complementarity problem with the same nodes in contact is none with a P-matrix: it may have several answers, or
 none (J. R. Barber, J. Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap against it, by much
 less, and is left out.
+
+Where friction depends on the pressure S and Theta are derivatives: of the traction mu p by d(mu p)/dp, and so of its
+heat. One answer is certain where the derivative is one with a P-matrix at every pressure (D. Gale and H. Nikaido, Math.
+Ann. 159, 1965, 81), which is why the steepest traction up to the largest pressure counts. A conductance by the pressure
+counts with its slope at the pressures given.
 """
 
 from __future__ import annotations
@@ -17,18 +22,20 @@ import numpy as np
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
+from fenwear.heat.field import HeatState
 
 NO_JUMPS = (  # V_cr of R. A. Burton, and what becomes of the contact beyond it: hot bands that wear, cool and move
     'hot bands come and go within few of them, which jumps cannot pass over: run.integration = "implicit" follows them'
 )
+LEVELS = 200  # pressures at which the steepest traction of friction is looked for
 FEW = 50  # contact nodes up to which all eigenvalues are found
 
 
-def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | None:
-    """Return the largest share of a pressure that its friction heat of a half-cycle gives back; collective.
+def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatState | None = None) -> float | None:
+    """Return the largest share of a change of pressure that its friction heat of a half-cycle gives back; collective.
 
     The largest real part of the eigenvalues of G, in the middle phase of each half-cycle. From 1 on the contact may
     have several answers. None without heat, and where nodes stick or slip by themselves.
@@ -37,6 +44,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | Non
         system: The assembled problem.
         pressure: Of each phase (phases, n), MPa: where it is positive nodes are in contact; by default that of the
             unworn bodies without heat.
+        state: Temperatures at the start of the half-cycles; by default the initial ones.
 
     Raises:
         ConvergenceError: contact without heat did not converge.
@@ -53,21 +61,39 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | Non
         closed = carried > 0
         if not closed.any():
             continue
-        opened = opened_by_heat(system, phase, carried)[closed]
-        interface = system.interfaces[phase]
-        contact = CondensedContact([SlidingContact(interface, system.friction_ratios()[phase])], team=system.team)
+        slope = _steepest_traction(system, phase, carried, state)
+        opened = opened_by_heat(system, phase, carried, slope, state)[closed]
+        sliding = SlidingContact(system.interfaces[phase], system.phase_friction(phase, slope))
+        contact = CondensedContact([sliding], team=system.team)
         modes = contact.size - len(closed)
         found.append(contact.on_closed_contact(partial(_gain, opened, modes), closed))
     return max(found)
 
 
-def opened_by_heat(system: Tribosystem, phase: int, pressure: Array) -> Array:
-    """Return the gap that the friction heat of each pressure opens by the end of its half-cycle; collective.
+def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: HeatState | None) -> Array:
+    """Return the largest d(mu p)/dp of each node from no pressure to the largest one (n,)."""
+    exchange, friction = system.exchange, system.friction
+    surfaces = None if state is None or exchange is None else exchange.contact_temperatures(state, phase - 1)
+    conditions = system.conditions(phase, pressure, surfaces)
+    if not friction.contact.friction_asks("p", "pm"):
+        return friction.values(conditions)
+    levels = np.linspace(0.0, float(pressure.max()), LEVELS + 1)[:, None] * np.ones(len(pressure))
+    traction = np.array([p * friction.values(conditions.pressed(p)) for p in levels])
+    return np.asarray(np.diff(traction, axis=0).max(axis=0) / (levels[1] - levels[0]))
+
+
+def opened_by_heat(
+    system: Tribosystem, phase: int, pressure: Array, slope: Array | None = None, state: HeatState | None = None
+) -> Array:
+    """Return the gap that the friction heat of each change of pressure opens by the end of its half-cycle; collective.
 
     Args:
         system: With its heat prepared.
         phase: Of the motion.
         pressure: Where it is positive nodes conduct, and heat (n,), MPa.
+        slope: d(mu p)/dp (n,); by default mu at the mean pressure.
+        state: Temperatures at the start of the half-cycle, by which a conductance follows the pressure; by default that
+            of the pressures stays.
 
     Returns:
         For each unit at the k nodes in contact (n, k), over the interface's elastic length, as the contact is scaled.
@@ -75,8 +101,15 @@ def opened_by_heat(system: Tribosystem, phase: int, pressure: Array) -> Array:
     exchange = system.exchange
     if exchange is None:
         return np.zeros((len(pressure), int((pressure > 0).sum())))
+    if slope is not None:
+        heating = [heating_friction(system, slope, k) for k in range(len(system.motion.phases))]
+        exchange = exchange.with_friction(np.array(heating))
     unit = np.eye(len(pressure))[:, pressure > 0]
-    changes, _ = exchange.change(phase, exchange.conductance(pressure), pressure=unit)
+    conductance, rise = exchange.conductance(pressure), exchange.conductance_slope(pressure)
+    changes, _ = exchange.change(phase, conductance, pressure=unit)
+    if state is not None and rise.any():
+        own = exchange if system.exchange is None else system.exchange
+        changes = changes + (own.by_conductance(phase, state, pressure, conductance) * rise)[:, pressure > 0]
     return np.asarray(exchange.gap_change(changes, phase) / system.interfaces[phase].elastic_length)
 
 
@@ -91,10 +124,10 @@ def heat_warnings(gain: float | None, *, jumps: bool = False) -> list[str]:
         return []
     beyond = f"; {NO_JUMPS}" if jumps else ""
     return [
-        f"friction heats what presses, and what is heated presses more: within a half-cycle the heat gives back "
-        f"{gain:.3g} times the pressure that it is from, and from 1 on the contact may have several answers; which of "
-        "them is found depends on how and from where it is solved. Expected less friction or speed, less heat into the "
-        f"contact, or, to follow how the contact breaks up, shorter half-cycles{beyond}"
+        "Thermoelastic feedback is strong: within one half-cycle, the heat of friction answers a change of pressure by "
+        f"{gain:.3g} times that change. Above 1 the contact may have several answers, and the start decides which one "
+        "is computed. Reduce friction, speed or the heat that flows into the contact. Shorter half-cycles follow how "
+        f"the contact breaks up{beyond}"
     ]
 
 

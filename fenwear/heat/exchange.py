@@ -47,6 +47,7 @@ FEW = 300  # contact nodes up to which fluxes are worth a matrix
 AT_ONCE = 8  # columns of coordinates that are kept for the balance of heat
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
+SLOPE = 1e-4  # of the pressure: half the step of differences
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
 OVERSHOOT, DRIFT = 0.1, 1e-3
 
@@ -208,6 +209,13 @@ class HeatExchange:
         if self.heat.conducting == "closed":
             value[pressure <= 0] = np.nan
         return value
+
+    def conductance_slope(self, pressure: Array) -> Array:
+        """Return dh_c/dp of each node (n,), N/(mm s K MPa): zero where h_c is constant or none conducts."""
+        if self.of_layer is None and self.heat.conductance_per_pressure is None:
+            return np.zeros_like(pressure)
+        ends = [self.conductance((1 + sign * SLOPE) * pressure) for sign in (1, -1)]
+        return np.divide(ends[0] - ends[1], 2 * SLOPE * pressure, out=np.zeros_like(pressure), where=pressure > 0)
 
     def half_cycle(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
         """Conduct over a half-cycle at constant pressure; return the state at its end and its heat terms.

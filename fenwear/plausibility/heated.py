@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import heat_gain, heat_warnings
+from fenwear.heat.field import HeatState
 from fenwear.plausibility.fineness import fineness_remarks
 
 STEPS, CHANGE, DIFFERENCE = "heat_steps", "heat_change_by_halving_steps", "heat_difference_from_whole_mesh"
@@ -26,17 +27,19 @@ class HeatMonitor:
         self.numbers = {name: numbers[name] for name in (STEPS, CHANGE, DIFFERENCE, GAIN) if name in numbers}
         self._texts: dict[str, str] = {}
 
-    def see(self, system: Tribosystem, pressure: Array | None = None) -> list[str]:
+    def see(self, system: Tribosystem, pressure: Array | None = None, state: HeatState | None = None) -> list[str]:
         """Look at the heat of a stage and return what was not said of one before; collective.
 
         Args:
             system: With its heat prepared.
             pressure: Of each phase (phases, n), MPa, for the nodes in contact; by default that without wear and heat.
+            state: Temperatures at the end of these phases; by default the initial ones.
 
         Raises:
             ConvergenceError: contact without heat did not converge.
         """
-        gain, fineness = heat_gain(system, pressure), None if system.exchange is None else system.exchange.fineness
+        gain = heat_gain(system, pressure, state)
+        fineness = None if system.exchange is None else system.exchange.fineness
         values = {GAIN: gain}
         if fineness is not None:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)

@@ -57,8 +57,8 @@ LABELS = {
     "heat_change_by_halving_steps": "largest change of contact temperatures by halving them, relative",
     "heat_difference_from_whole_mesh": "largest difference of contact temperatures and thermal gap from the whole "
     "mesh's, relative",
-    "heat_gain": "largest share of a pressure that its friction heat of a half-cycle gives back; from 1 on contact may "
-    "have several answers",
+    "heat_gain": "largest share of a change of pressure that its friction heat of a half-cycle gives back; from 1 on "
+    "contact may have several answers",
     "wear_step_over_explicit_limit": "wear of a half-cycle over the limit of explicit steps",
     "periodicity": "periodicity: change of pressure against one cycle ago, over the pressure scale",
     "growth_rate_per_s": "growth rate of disturbances of the final state; below 0 they die out",

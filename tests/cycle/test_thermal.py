@@ -263,6 +263,11 @@ def test_growth_of_a_disturbance(assembled: Assemble, coefficient: float) -> Non
 LAWS = {
     "constant": ("wear.punch.coefficient=4e-7",),
     "h(p)": ("heat.conductance=0", "heat.conductance_per_pressure=[0.02, 0.02]", "heat.partition=0.7"),
+    "h of a layer": (
+        "heat.conductance=layer",
+        "heat.partition=0.7",
+        "contact.layer={kind='rough', roughness='1 um', asperity_radius='50 um', asperity_density='300 1/mm^2'}",
+    ),
     "mu(T)": ("contact.friction={expression='0.25*(1+0.005*T)'}", "wear.punch.coefficient=4e-7"),
     "mu(p)": ("contact.friction={expression='0.2*(1+0.5*exp(-p/16))'}",),
     "beta(T, p)": ("wear.punch.coefficient={expression='4e-7*(1+0.02*T)*(p/16)**0.5'}",),

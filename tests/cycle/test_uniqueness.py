@@ -12,7 +12,7 @@ import pytest
 
 from fenwear import ConvergenceError, Tribosystem, assemble, evolve, jump, load_case, march, run_case
 from fenwear.arrays import Array
-from fenwear.assembly import vary, with_reduced_heat
+from fenwear.assembly import heating_friction, vary, with_reduced_heat
 from fenwear.case.program import stages_of
 from fenwear.cycle import explicit_growth, heat_gain, heat_warnings
 from fenwear.cycle.program import at_stage
@@ -59,6 +59,55 @@ def test_the_gain_is_one_where_contact_and_heat_are_singular(assembled: Callable
         hot, cold, modes, rows = dense(system)
         signs.append(np.linalg.slogdet(both(hot, modes, rows))[0] * np.linalg.slogdet(both(cold, modes, rows))[0])
     assert signs[0] == -signs[1] != 0
+
+
+@pytest.mark.parametrize("name", [NAME, "example2-heat"])
+def test_the_gain_is_of_the_tangent_where_friction_depends_on_pressure(
+    assembled: Callable[..., Tribosystem], name: str
+) -> None:
+    """The derivative of contact with heat by the pressure changes its sign where the gain passes 1: mu = a + b p."""
+    small = SMALL if name == NAME else PLANE
+    system = assembled(name, *small, "contact.friction={table=[[0.0, 0.2], [1e4, 0.2]], of='p'}")
+    n, mean = len(system.pair.weights), system.rigid.mean_pressure
+    even = np.full(n, mean)
+
+    def of_friction(mu: float) -> tuple[Tribosystem, float]:
+        law = f"contact.friction={{table=[[0.0, {mu}], [{100 * mean}, {101 * mu}]], of='p'}}"
+        found = vary(system, law)
+        gain = heat_gain(found, np.array([even] * len(found.motion.phases)))
+        assert gain is not None
+        return found, gain
+
+    def determinant(own: Tribosystem, *, heated: bool) -> float:
+        phase, exchange = own.motion.positions // 2, own.exchange
+        assert exchange is not None
+        rigid = own.interfaces[phase].rigid
+
+        def force(pressure: Array) -> Array:
+            mu = own.friction.values(own.conditions(phase, pressure))
+            ratio = own.phase_friction(phase, mu)
+            gap = own.interfaces[phase].compliance(ratio).matrix() @ pressure
+            if heated:
+                heating = heating_friction(own, mu, phase)
+                made = exchange.with_friction(np.array([heating] * len(own.motion.phases)))
+                states, _ = made.change(phase, exchange.conductance(even), pressure=pressure[:, None])
+                gap = gap + made.gap_change(states, phase)[:, 0]
+            return np.concatenate([gap / own.interface.elastic_length, rigid.equilibrium(ratio) @ pressure])
+
+        step = 1e-4 * mean
+        columns = [(force(even + step * e) - force(even - step * e)) / (2 * step) for e in np.eye(n)]
+        modes = np.vstack([rigid.rigid_normal, np.zeros((rigid.rigid_normal.shape[1],) * 2)])
+        return float(np.linalg.slogdet(np.hstack([np.array(columns).T, modes]))[0])
+
+    singular = 0.2
+    for _ in range(4):
+        singular /= of_friction(singular)[1]
+    signs = []
+    for factor in (0.97, 1.03):
+        own, gain = of_friction(factor * singular)
+        assert (gain > 1) == (factor > 1)
+        signs.append(determinant(own, heated=True) * determinant(own, heated=False))
+    assert signs == [1.0, -1.0]
 
 
 def test_beyond_it_contact_has_several_answers(assembled: Callable[..., Tribosystem]) -> None:

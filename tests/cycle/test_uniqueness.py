@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fenwear import ConvergenceError, Tribosystem, assemble, evolve, jump, load_case, march, run_case
 from fenwear.arrays import Array
@@ -99,9 +100,7 @@ def test_the_gain_is_of_the_tangent_where_friction_depends_on_pressure(
         modes = np.vstack([rigid.rigid_normal, np.zeros((rigid.rigid_normal.shape[1],) * 2)])
         return float(np.linalg.slogdet(np.hstack([np.array(columns).T, modes]))[0])
 
-    singular = 0.2
-    for _ in range(4):
-        singular /= of_friction(singular)[1]
+    singular = brentq(lambda mu: of_friction(mu)[1] - 1, 0.02, 1.0, rtol=1e-3)
     signs = []
     for factor in (0.97, 1.03):
         own, gain = of_friction(factor * singular)

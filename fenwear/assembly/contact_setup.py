@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,10 +35,12 @@ from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
+from fenwear.sliding.regions import Regions, any_split, regions_opposite
 from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
+OF_SIDES = 3  # times that an optimum is found anew, at the pressures beside nodes between regions
 
 
 @dataclass(frozen=True)
@@ -146,10 +148,10 @@ class ContactSetup:
         """The phases of a cycle."""
         return self.sliding.motion
 
-    @property
+    @cached_property
     def friction(self) -> Friction:
         """The law of friction."""
-        return self.sliding.friction
+        return replace(self.sliding.friction, split=self._regions[0].split(self.sliding.friction.contact.friction))
 
     @property
     def pair(self) -> ContactPair:
@@ -223,7 +225,8 @@ class ContactSetup:
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
             slid.append(self.motion.sliding(exponent)[:, None] * self.sliding_ratio**exponent)
-        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings)
+        split = any_split(self._regions, self.sliding.wear)
+        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings, split)
 
     @property
     def strip_carries(self) -> bool:
@@ -447,11 +450,9 @@ class ContactSetup:
         return np.full(len(self.pair.weights), 0.0 if self.heat is None else self.heat.initial)
 
     @cached_property
-    def _regions(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """Shares of the regions of punch and strip at the contact nodes (n,); none where there is one region alone."""
-        punch, strip = self.bodies.regions
-        onto = self.pair.wear_interpolation
-        return punch, {name: onto @ share for name, share in strip.items()}
+    def _regions(self) -> tuple[Regions, Regions]:
+        """The regions of punch and strip at the contact nodes."""
+        return regions_opposite(self.bodies.regions, self.pair)
 
     def slid_after(self, half_cycles: float) -> float:
         """Return how far the motion has gone after half-cycles from the start of the run, mm or rad; or cycles."""
@@ -507,13 +508,14 @@ class ContactSetup:
             edge,
         )
 
-    def friction_ratio(self, direction: int) -> Array:
-        """Return tau (n, d) in the middle position at the mean pressure and speed.
+    def friction_ratio(self, direction: int, pressure: Array | None = None) -> Array:
+        """Return tau (n, d) in the middle position at the mean speed.
 
         Args:
             direction: d, the sign of the sliding.
+            pressure: (n,), MPa; by default the mean pressure.
         """
-        mu = self.friction.values(self.conditions(None))
+        mu = self.friction.values(self.conditions(None, pressure))
         return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
 
     def phase_friction(self, phase: int, mu: Array) -> Array:
@@ -563,7 +565,16 @@ class ContactSetup:
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
-        wear, ratio = self.phases_wear, self.friction_ratio(direction)
+        found = self._optimum(direction, zone, None)
+        for _ in range(OF_SIDES if any(len(one.mixed) for one in self._regions) else 0):
+            found = self._optimum(direction, zone, found.pressure)
+        return found
+
+    def _optimum(self, direction: int, zone: Mask | None, pressure: Array | None) -> Optimum:
+        """Return the optimum at the coefficients of a pressure (n,), MPa; by default of the mean."""
+        wear, ratio = self.phases_wear, self.friction_ratio(direction, pressure)
+        if pressure is not None:
+            wear = self.wear.phases([self.conditions(k, pressure) for k in range(len(self.motion.phases))])
         bodies = [body for body in (wear.punch, wear.strip) if body is not None]
         rates = tuple(body.rate.sum(axis=0) / self.motion.period for body in bodies)
         laws = tuple(body.law for body in bodies)

@@ -8,14 +8,14 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.bodies.contact_surface import facet_dofs
+from fenwear.bodies.contact_surface import CORNERS, facet_dofs
 from fenwear.bodies.elasticity import ElasticBody
 
 
 def contact_regions(body: ElasticBody) -> Mapping[str, Array]:
     """Return the share of each material region in the pressure nodes (n,), by its name; collective.
 
-    A node between two regions belongs to both by halves.
+    A node between regions belongs to each by the area of its facets there.
     """
     mesh = body.body
     local, cells = facet_dofs(mesh, body.space)
@@ -26,8 +26,11 @@ def contact_regions(body: ElasticBody) -> Mapping[str, Array]:
     blocks = body.space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64)
     order = np.argsort(body.trace.blocks)
     nodes = order[np.searchsorted(body.trace.blocks[order], blocks)]
+    corners = body.space.tabulate_dof_coordinates()[local[:, : CORNERS[body.meshed.cell]]]
+    edges = corners[:, 1:] - corners[:, :1]
+    areas = np.sqrt(np.linalg.det(edges[:, :2] @ edges[:, :2].transpose(0, 2, 1)))
     sums = np.zeros((len(order), len(mesh.regions)))
-    np.add.at(sums, nodes, np.repeat(of_cell[cells], local.shape[1], axis=0))
+    np.add.at(sums, nodes, np.repeat(of_cell[cells] * areas[:, None], local.shape[1], axis=0))
     mesh.mesh.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
     shares = body.on_surface(sums / sums.sum(axis=1, keepdims=True))[body.surface.nodes]
     return dict(zip(mesh.regions, shares.T, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
 
@@ -18,8 +18,8 @@ from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
 
 
-class Dependence(Part):
-    """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
+class OfState(Part):
+    """A number that depends on the state: an expression, or a table with straight lines."""
 
     expression: str | None = Field(
         default=None,
@@ -33,23 +33,17 @@ class Dependence(Part):
     of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm"] = Field(
         default="T", description="argument of the table"
     )
-    regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
-        default=None, description="value of each material region of the body, of the punch for friction"
-    )
-    law: str | None = Field(default=None, description="name of a law registered in Python")
-    unit: str = Field(
-        default="", description="unit of the values; by default that of the key's bare numbers, which is told"
-    )
+
+    @property
+    def _forms(self) -> dict[str, object]:
+        """The forms of which one is given, by key."""
+        return {"expression": self.expression, "table": self.table}
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        if sum(form is not None for form in (self.expression, self.table, self.regions, self.law)) != 1:
-            raise ValueError("give one of expression, table, regions and law")
-        if self.law is not None:
-            try:
-                check_law(self.law)
-            except ValueError as error:
-                raise ValueError(f"law: {error}") from None
+        if sum(form is not None for form in self._forms.values()) != 1:
+            *others, last = self._forms
+            raise ValueError(f"give one of {', '.join(others)} and {last}")
         if self.expression is not None:
             try:
                 parse_expression(self.expression)
@@ -65,9 +59,61 @@ class Dependence(Part):
         """Return whether a variable such as T, p or depth is in it."""
         if self.expression is not None:
             return name in variables_of(self.expression)
+        return self.table is not None and name == self.of
+
+    def at(self, state: Mapping[str, Any], shape: tuple[int, ...]) -> Array:
+        """Return the unchecked values (shape) at a state."""
+        if self.table is not None:
+            return np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
+        return evaluate(parse_expression(self.expression or ""), state, shape)
+
+
+def _form(value: object) -> str:
+    return "dependence" if isinstance(value, (Mapping, OfState)) else "number"
+
+
+class Dependence(OfState):
+    """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
+
+    regions: (
+        dict[
+            str,
+            Annotated[
+                Annotated[Number, Field(ge=0), Tag("number")] | Annotated[OfState, Tag("dependence")],
+                Discriminator(_form),
+            ],
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description="of each material region of the body, of the punch for friction: a number, or a table with "
+        "expression or table; all in the same unit",
+    )
+    law: str | None = Field(default=None, description="name of a law registered in Python")
+    unit: str = Field(
+        default="", description="unit of the values; by default that of the key's bare numbers, which is told"
+    )
+
+    @property
+    def _forms(self) -> dict[str, object]:
+        return {**super()._forms, "regions": self.regions, "law": self.law}
+
+    @model_validator(mode="after")
+    def _known_law(self) -> Self:
+        if self.law is not None:
+            try:
+                check_law(self.law)
+            except ValueError as error:
+                raise ValueError(f"law: {error}") from None
+        return self
+
+    def depends_on(self, name: str) -> bool:
+        """Return whether a variable such as T, p or depth is in it."""
         if self.law is not None:
             return name in variables_of_law(self.law)
-        return self.table is not None and name == self.of
+        if self.regions is not None:
+            return any(isinstance(one, OfState) and one.depends_on(name) for one in self.regions.values())
+        return super().depends_on(name)
 
     @property
     def states(self) -> Mapping[str, State]:
@@ -79,6 +125,12 @@ class Dependence(Part):
         """Whether it changes with more than the place."""
         names = [name for name in VARIABLES if name not in ("x", "y", "z")]
         return bool(self.states) or any(self.depends_on(name) for name in names)
+
+    @property
+    def unlike(self) -> bool:
+        """Whether regions differ in it."""
+        given = list((self.regions or {}).values())
+        return any(one != given[0] for one in given)
 
     @property
     def passes(self) -> bool:
@@ -95,32 +147,40 @@ class Dependence(Part):
 
     def values(
         self,
-        state: Mapping[str, Array],
+        state: Mapping[str, Any],
         shape: tuple[int, ...],
         factor: float,
         key: str,
         least: float = 0.0,
         *,
         checked: bool = True,
+        effect: Callable[[Array], Array] = np.asarray,
     ) -> Array:
-        """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
+        """Return the coefficient times `factor` at the `state` (shape), which has the shares of regions.
 
         On the way to a solution, whose own values are, they need not be `checked`.
 
+        Args:
+            state: The variables of laws by their names, and those of `fenwear.sliding.regions`.
+            shape: Of the values.
+            factor: Unit of the coefficient.
+            key: The case's key.
+            least: Smallest value that is allowed.
+            checked: Whether values are held against it.
+            effect: The function of the pressure that the coefficient multiplies; by default the pressure.
+
         Raises:
-            CaseError: it is less than `least` or not finite somewhere; `key` is the case's key.
+            CaseError: it is less than `least` or not finite somewhere.
         """
-        if self.table is not None:
-            values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
-        elif self.regions is not None:
-            values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
+        if self.regions is not None:
+            values = self._of_regions(state, shape, effect)
         elif self.law is not None:
             try:
                 values = evaluate_law(self.law, state, shape)
             except ValueError as error:
                 raise CaseError(InputError(key, str(error))) from error
         else:
-            values = evaluate(parse_expression(self.expression or ""), state, shape)
+            values = self.at(state, shape)
         if checked and not (np.minimum.reduce(values) >= least and np.maximum.reduce(values) < np.inf):
             node = int(np.flatnonzero(~(np.isfinite(values) & (values >= least)))[0])
             named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
@@ -128,6 +188,14 @@ class Dependence(Part):
             wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
             raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values if factor == 1 else values * factor
+
+    def _of_regions(self, state: Mapping[str, Any], shape: tuple[int, ...], effect: Callable[[Array], Array]) -> Array:
+        """Return the coefficient of nodes of one or several regions (shape), see `fenwear.sliding.regions`."""
+        found, effects = np.zeros(shape), state["regions"].effects(np.broadcast_to(state["p"], shape), effect)
+        for name, given in (self.regions or {}).items():
+            share = state[f"region {name}"] * effects.get(name, 1.0)
+            found += np.where(share > 0, share * (given.at(state, shape) if isinstance(given, OfState) else given), 0.0)
+        return found
 
 
 @lru_cache(maxsize=100)
@@ -144,10 +212,6 @@ def _in_unit(unit: str, other: str) -> float:
 def _of_unit(unit: str, pressure_exponent: float, speed_exponent: float) -> float:
     """Return a unit of a coefficient in the internal one of its exponents."""
     return convert(f"1 {unit}", WearLaw.coefficient_unit(pressure_exponent, speed_exponent))
-
-
-def _form(value: object) -> str:
-    return "dependence" if isinstance(value, (Mapping, Dependence)) else "number"
 
 
 def constant_or_dependence(constant: Any) -> Any:

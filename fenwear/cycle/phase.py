@@ -58,7 +58,7 @@ class PhaseStep:
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         # Explicitly, wear and what remembers follow the pressure, and do not change it.
-        friction, asks = system.friction, system.friction.contact.friction_asks
+        friction, asks = system.friction, system.friction.asks
         apart = not self._constant and not implicit and not friction.remembers and not asks("edge")
         self._wears_after = apart and friction.constant
         self._slides_before = apart and not friction.constant and not asks("p", "pm")

@@ -22,6 +22,7 @@ from fenwear.interface.placement import in_space
 from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import ALONG_X, SlidingField
 from fenwear.sliding.lubrication import asperity_share
+from fenwear.sliding.regions import Regions
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class ContactConditions:
         places: Of the nodes on the punch and on the strip's material (n, 3) each, mm.
         depths: Worn off punch and strip there (n,) each, mm.
         slid: What each node has slid from the start (n,), mm.
-        regions: Shares of the regions of punch and strip in the nodes (n,), by their names.
+        regions: Of punch and strip in the nodes.
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
         states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
@@ -51,7 +52,7 @@ class ContactConditions:
     places: tuple[Array, Array]
     depths: tuple[Array, Array]
     slid: Array
-    regions: tuple[Mapping[str, Array], Mapping[str, Array]]
+    regions: tuple[Regions, Regions]
     cycle: CycleShear | None = None
     states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     covered: tuple[Array | None, Array | None] = (None, None)
@@ -63,7 +64,7 @@ class ContactConditions:
         """Return conditions of which no more is known: at the origin, unworn, before any sliding."""
         none, places = np.zeros_like(pressure), np.zeros((len(pressure), 3))
         surfaces = (none, none) if temperatures is None else temperatures
-        return cls(pressure, speed, surfaces, (places, places), (none, none), none, ({}, {}))
+        return cls(pressure, speed, surfaces, (places, places), (none, none), none, (Regions(), Regions()))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -115,7 +116,7 @@ class ContactConditions:
             "edge": none if self.edge is None else self.edge,
             "cs": none if self.cycle is None else self.cycle.ratio[own],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
-            **{f"region {name}": share for name, share in self.regions[own].items()},
+            **self.regions[own].variables,
             **self.states[own],
         }
         return found
@@ -144,17 +145,23 @@ class Friction:
         contact: mu and mu_d.
         field: Of the sliding.
         of_coatings: mu of the coatings of punch and strip; None where there is none of its own.
+        split: Whether nodes between regions share their pressure among unlike coefficients.
     """
 
     contact: Contact
     field: SlidingField = ALONG_X
     of_coatings: tuple[float | None, float | None] = (None, None)
+    split: bool = False
+
+    def asks(self, *names: str, of_share: bool = True) -> bool:
+        """Return whether mu, or that of asperities alone, depends on one of these variables of coefficients."""
+        return (self.split and "p" in names) or self.contact.friction_asks(*names, of_share=of_share)
 
     @cached_property
     def constant(self) -> bool:
         """Whether mu depends on nothing but the place."""
         varies = isinstance(self.contact.friction, Dependence) and self.contact.friction.varies
-        return not varies and self.of_coatings == (None, None) and not self.mixed
+        return not (varies or self.split or self.mixed) and self.of_coatings == (None, None)
 
     @cached_property
     def mixed(self) -> bool:
@@ -252,7 +259,7 @@ class FollowingFriction:
         self._state, self._with_cycle = dict(conditions.of("mean")), conditions.cycle is None
         self._lubrication = lubrication = friction.contact.lubrication
         self._fluid = 0.0 if lubrication is None else lubrication.fluid_friction
-        alike = not friction.contact.friction_asks("p", "pm", of_share=False)
+        alike = not friction.asks("p", "pm", of_share=False)
         # Than the fluid, of asperities.
         self._more = friction._of_asperities(self._state, conditions) - self._fluid if alike else None
         self._last: tuple[Array, Array | float, Array] | None = None  # pressure, share and mu

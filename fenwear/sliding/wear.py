@@ -377,6 +377,7 @@ class Wear:
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
+        split: Whether nodes between regions share their pressure among unlike coefficients.
     """
 
     punch: WearLaw | None
@@ -385,11 +386,12 @@ class Wear:
     pairs: Sequence[ContactPair]
     friction: Friction
     coatings: tuple[Array | None, Array | None] = (None, None)
+    split: bool = False
 
     @cached_property
     def constant(self) -> bool:
         """Whether no coefficient depends on more than the place."""
-        return stays((self.punch, self.strip), self.friction)
+        return stays((self.punch, self.strip), self.friction) and not self.split
 
     @cached_property
     def _of_pressure(self) -> dict[str, PressureLaw]:
@@ -460,7 +462,7 @@ def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditio
     scale = law.scale if law.per_area is None else 1 / law.touching_from
     if isinstance(given, Dependence):
         body = conditions.of("punch" if key.endswith("punch") else "strip")
-        return given.values(body, n, scale, f"{key}.{law.coefficient_key}")
+        return given.values(body, n, scale, f"{key}.{law.coefficient_key}", effect=PressureLaw.of(law).value)
     if given is not None:
         return scale * given
     if law.archard is not None and law.hardness is not None:

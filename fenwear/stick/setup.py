@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mpi4py import MPI
 
@@ -13,6 +15,7 @@ from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.memory import memory_size
 from fenwear.sliding.coating import coatings_of
+from fenwear.sliding.regions import regions_opposite
 from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
@@ -101,12 +104,12 @@ def unheated_problem(
         condensed=condensed,
     )
     middle = interface.middle
-    of_punch, of_strip = bodies.regions
-    regions = of_punch, {name: middle.pair.wear_interpolation @ share for name, share in of_strip.items()}
+    regions = regions_opposite(bodies.regions, middle.pair)
     initial = 0.0 if case.heat is None else case.heat.initial
     coatings = coatings_of(middle.pair, sliding.wear)
     edges = edges_of(bodies, middle.pair.punch) if case.contact.asks("edge", sliding.wear) else None
-    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial, coatings, edges)
+    friction = replace(sliding.friction, split=regions[0].split(sliding.friction.contact.friction))
+    laws = LocalLaws(friction, sliding.wear, regions, initial, coatings, edges)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     layers = interface.layers
     conditions = laws.conditions(

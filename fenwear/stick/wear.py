@@ -21,6 +21,7 @@ from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
+from fenwear.sliding.regions import Regions, any_split
 from fenwear.sliding.wear import WornDepths, coefficient, stays
 
 States = tuple[Mapping[str, Array], Mapping[str, Array]]
@@ -88,7 +89,7 @@ class LocalLaws:
     Attributes:
         friction: The law of friction.
         wear: The wear laws of punch and strip; None where a body does not wear.
-        regions: Shares of the regions of punch and strip at the contact nodes (n,), by their names.
+        regions: Of punch and strip at the contact nodes.
         initial: Temperature without heat, K.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
         edges: Distances from the edge of the contact; None where nothing depends on them.
@@ -96,7 +97,7 @@ class LocalLaws:
 
     friction: Friction
     wear: tuple[WearLaw | None, WearLaw | None]
-    regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
+    regions: tuple[Regions, Regions] = field(default_factory=lambda: (Regions(), Regions()))
     initial: float = 0.0
     coatings: tuple[Array | None, Array | None] = (None, None)
     edges: Edges | None = None
@@ -110,7 +111,7 @@ class LocalLaws:
         """Return whether friction changes with the state, or wear does."""
         if not of_wear:
             return not self.friction.constant
-        return not stays(self.wear, self.friction)
+        return not stays(self.wear, self.friction) or any_split(self.regions, self.wear)
 
     @property
     def passes(self) -> bool:

@@ -79,19 +79,58 @@ Physical Curve("strip_contact") = {line_1 + 3, line_1 + 4}; Physical Curve("stri
 
 
 def test_two_linings_side_by_side(tmp_path: Any) -> None:
-    """Each wears as its region says: in the end three times the pressure on the lining that wears a third."""
+    """The node between two linings wears as its halves do: at first under one pressure, in the end under two.
+
+    Under even pressure its rate is the mean of both, weighted by the areas beside it. In the end the pressures are to
+    each other as 3 to 1 to rounding, on any mesh, and the node between carries the mean of both.
+    """
     system = assemble(two_linings(tmp_path))
-    x = system.pair.x
+    x, weights = system.pair.x, system.pair.weights
+    between = abs(x) < 1e-9
     rate = law_of(system)
-    np.testing.assert_allclose(rate[x < -0.1], 1e-7, rtol=1e-12)
-    np.testing.assert_allclose(rate[x > 0.1], 3e-7, rtol=1e-12)
-    np.testing.assert_allclose(rate[abs(x) < 1e-9], 2e-7, rtol=1e-12)
-    pressure = steady(system).pressure[0]
-    # k p is the same everywhere, the node between at the mean coefficient.
-    np.testing.assert_allclose(rate * pressure, (rate * pressure).mean(), rtol=1e-8)
-    assert pressure @ system.pair.weights == pytest.approx(1000, rel=1e-9)
+    exact = np.where(between, 2e-7, np.where(x < 0, 1e-7, 3e-7))
+    np.testing.assert_allclose(rate, exact, rtol=1e-12)
+    exact = np.where(between, 50.0, np.where(x < 0, 75.0, 25.0))
+    state = steady(system)
+    np.testing.assert_allclose(state.pressure[0], exact, rtol=1e-7)
+    np.testing.assert_allclose(system.optimum(1).pressure, exact, rtol=1e-8)
+    np.testing.assert_allclose(state.wear_per_cycle, state.wear_per_cycle.mean(), rtol=1e-7)
+    assert state.pressure[0] @ weights == pytest.approx(1000, rel=1e-9)
     with pytest.raises(CaseError, match=r"wear\.punch.coefficient.regions.punch_middle: no such region"):
         two_linings(tmp_path, "wear.punch.coefficient={regions={punch_left=1e-8, punch_middle=1}}")
+
+
+def test_a_node_between_linings_shares_friction_and_powers_of_the_pressure(tmp_path: Any) -> None:
+    """With p^2 the pressures are as the roots of the coefficients; friction heats by mu_i p_i of each half."""
+    system = assemble(
+        two_linings(
+            tmp_path,
+            "wear.punch={coefficient={regions={punch_left=1e-9, punch_right=9e-9}}, pressure_exponent=2}",
+            "contact.friction={regions={punch_left=0.02, punch_right=0.04}}",
+            "punch.no_turning_about=['y']",
+        )
+    )
+    between, left = (abs(system.pair.x) < 1e-9), system.pair.x < -1e-9
+    state = steady(system)
+    np.testing.assert_allclose(state.pressure[0], np.where(between, 50.0, np.where(left, 75.0, 25.0)), rtol=1e-6)
+    mu = system.friction.values(system.conditions(0, state.pressure[0]))
+    assert mu[between] == pytest.approx((0.02 * 75 + 0.04 * 25) / 100, rel=1e-6)
+
+
+def test_regions_take_expressions_and_tables(tmp_path: Any) -> None:
+    """Each region has its own function of the place, the pressure or the depth, in the unit of all."""
+    left, right = "{expression='1e-3*(1 + x*x)'}", "{table=[[0, 1e-3], [1e-2, 3e-3]], of='depth'}"
+    settings = (f"wear.punch.coefficient={{regions={{punch_left={left}, punch_right={right}}}, unit='1/GPa'}}",)
+    system = assemble(two_linings(tmp_path, *settings))
+    x, worn = system.pair.x, system.unworn()
+    worn.punch[:] = 5e-3
+    exact = np.where(x < 0, 1e-5 * (1 + x**2), 2e-5)
+    exact[abs(x) < 1e-9] = 1.5e-5
+    np.testing.assert_allclose(law_of(system, worn=worn), exact, rtol=1e-12)
+    assert not system.constant_coefficients
+    for wrong in ("{expression='1e-8*q'}", "{table=[[0, 1]]}", "{law='mine'}"):
+        with pytest.raises(CaseError, match=r"wear\.punch\.coefficient.*regions\.punch_right"):
+            two_linings(tmp_path, f"wear.punch.coefficient={{regions={{punch_left=1e-8, punch_right={wrong}}}}}")
 
 
 def test_rough_linings_of_two_materials_close_and_conduct_as_each_does(tmp_path: Any) -> None:

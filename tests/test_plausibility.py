@@ -542,6 +542,64 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
     assert not [text for text in steady_warnings(state.system, state) if "across" in text]  # five nodes, all of them
 
 
+CROWN = """
+DefineConstant[ field = 0 ];
+R = 50; w = 2; h = 40; d = R - Sqrt(R^2 - w^2);
+Point(1) = {0,0,0}; Point(2) = {w,d,0}; Point(3) = {h,d+8,0}; Point(4) = {h,h,0}; Point(5) = {0,h,0}; Point(6) = {0,R,0};
+Circle(1) = {1,6,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,5}; Line(5) = {5,1};
+Point(11) = {0,0,0}; Point(12) = {w,0,0}; Point(13) = {h,0,0}; Point(14) = {h,-h,0}; Point(15) = {0,-h,0};
+Line(11) = {11,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,15}; Line(15) = {15,11};
+Curve Loop(1) = {1:5}; Plane Surface(1) = {1}; Curve Loop(2) = {11:15}; Plane Surface(2) = {2};
+Physical Surface("punch_body") = {1}; Physical Surface("strip_body") = {2};
+Physical Curve("punch_contact") = {1}; Physical Curve("strip_contact") = {11};
+Physical Curve("punch_top") = {4}; Physical Curve("punch_sym") = {5};
+Physical Curve("strip_bottom") = {14}; Physical Curve("strip_sym") = {15};
+Transfinite Curve{1, 11} = 41; Mesh.MeshSizeMax = 4; Mesh.MeshSizeExtendFromBoundary = 1;
+If (field > 0)
+  Field[1] = Distance; Field[1].CurvesList = {1, 11}; Field[1].Sampling = 200;
+  Field[2] = MathEval; Field[2].F = "0.05 + 0.4 * F1";
+  Background Field = 2; Mesh.MeshSizeExtendFromBoundary = 0; Mesh.MeshSizeFromPoints = 0;
+EndIf
+"""
+
+
+@pytest.mark.mpi("slivers")
+@pytest.mark.parametrize("field", [0, 1], ids=["slivers", "field"])
+def test_slivers_below_a_contact_are_told(tmp_path: Path, field: int) -> None:
+    """Slivers that are fine along half a cylinder and deep below it, and the same line on elements sized by a field.
+
+    Reference: Hertz's p0 = sqrt(F E* / (pi R)) = 271.03 MPa, a = 0.2349 mm.
+    """
+    (tmp_path / "crown.geo").write_text(CROWN)
+    tables = {
+        "geometry": {"file": "crown.geo", "degree": 2, "order": 2, "parameters": {"field": field}},
+        "model": {"plane": "strain", "thickness": 10},
+        "materials": {"steel": {"young": "210 GPa", "poisson": 0.3}},
+        "punch": {
+            "regions": {"punch_body": "steel"},
+            "supports": [{"on": "punch_sym", "fix": ["x"]}],
+            "loads": [{"on": "punch_top", "force": [0, -500]}],
+        },
+        "strip": {
+            "regions": {"strip_body": "steel"},
+            "supports": [{"on": "strip_bottom", "fix": ["z"]}, {"on": "strip_sym", "fix": ["x"]}],
+        },
+        "contact": {"friction": 0},
+        "wear": {"punch": {"coefficient": "1e-9 1/MPa"}},
+        "motion": {"kind": "reciprocating", "amplitude": 1, "period": 1, "positions": 1},
+        "run": {"half_cycles": 2},
+    }
+    system = assemble(make_case(tables, tmp_path))
+    deep = [text for text in initial_warnings(system) if text.startswith("geometry: elements of the ")]
+    too_high = start(system).max() / 271.03
+    if field:
+        assert too_high == pytest.approx(1, abs=0.01)
+        assert not deep
+    else:
+        assert too_high > 2
+        assert 0.05 < float(re.findall(r"at most ([\d.]+) mm deep", deep[0])[0]) <= 0.2349
+
+
 @pytest.mark.parametrize("elements", [30, 60])
 def test_a_curve_that_is_meshed_as_a_polygon(assembled: Assembled, elements: int) -> None:
     """The waves that are told of are about those by which pressures differ from those on curved elements.

@@ -83,7 +83,11 @@ def _finer(case: Case) -> str:
         return f"grid.across = {2 * grid.across}"
     if grid is not None and grid.nodes is not None:
         return f"grid.nodes = {2 * grid.nodes - 1}"
-    return f"geometry.degree = {degree + 1}, or more elements at the contact" if degree < HIGHEST else "more elements"
+    return (
+        f"geometry.degree = {degree + 1}, or smaller elements at and below the contact"
+        if degree < HIGHEST
+        else "more elements"
+    )
 
 
 def text(system: Tribosystem, found: Uncertainty) -> str:

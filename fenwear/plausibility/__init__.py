@@ -4,6 +4,7 @@ ends      contact clipped at the end of a plane's or ring's meshed surface
 rim       contact clipped at the rim of a solid's
 chamfer   chamfers beside the contact surface that wear would bring into contact
 few       contact on a few nodes
+depth     elements below a contact deeper than it is wide
 polygon   curved contact surfaces of straight sides
 stroke    strokes that the bodies take up elastically
 thickness bodies that are worn through

@@ -13,6 +13,7 @@ from fenwear.contact.complementarity import broken_text, complementarity_error
 from fenwear.cycle import Block, SteadyState
 from fenwear.plausibility.chamfer import contact_chamfer
 from fenwear.plausibility.curved import curved_text
+from fenwear.plausibility.depth import depth_text
 from fenwear.plausibility.ends import ContactEnds, contact_ends, opened
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.grid_rim import grid_limits
@@ -139,9 +140,12 @@ def contact_limits(system: Tribosystem) -> ContactEnds | ContactRim | None:
 
 
 def few_across(system: Tribosystem, limits: ContactEnds | ContactRim | None, pressure: Array, when: str) -> str:
-    """Say that the contact of pressures (n,) has few nodes across it, see `few_text`; "" where it has enough."""
-    width = None if limits is None else limits.hertzian(float(system.pair.weights @ pressure))
-    return few_text(system.case, net_of(system), pressure, when, width)
+    """Say that elements below the contact of pressures (n,) are deep, or few nodes lie across it; "" else; collective.
+
+    A contact above deep elements is too narrow, so that few nodes across it are no cause.
+    """
+    width, net = None if limits is None else limits.hertzian(float(system.pair.weights @ pressure)), net_of(system)
+    return depth_text(system, net, pressure, when, width or 0.0) or few_text(system.case, net, pressure, when, width)
 
 
 def clipped_text(limits: ContactEnds | ContactRim, where: str, needed: float | None, case: Case) -> str:

@@ -63,10 +63,14 @@ from fenwear.results.history import (
     write_summary,
 )
 from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
+from fenwear.results.surfaces import surface_cells
 from fenwear.run_monitor import RunMonitor
 from fenwear.signals import Signals
+from fenwear.sliding.chart import sliding_chart
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 
+ACROSS = 0.3  # over what it goes along the sliding: a side of a facet that leads along it
+EVEN = 1e-2  # of the range of a profile: a change from node to node that is none
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
 
@@ -471,11 +475,11 @@ class _Run:
 
 
 def position_warnings(system: Tribosystem) -> list[str]:
-    """Return what is to be said of the positions of a strip that wears, or that is rough."""
+    """Return what is to be said of the positions of a strip that wears, or that is uneven."""
     spacing, motion = system.position_spacing, system.motion
-    rough = _standing_heights(system)
-    if rough or not system.track_changes or spacing <= FAR_APART:
-        return rough
+    stands = _standing_profile(system)
+    if stands or not system.track_changes or spacing <= FAR_APART:
+        return stands
     wanted = int(np.ceil(motion.positions * spacing))
     return [
         f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its track will have steps; "
@@ -483,24 +487,41 @@ def position_warnings(system: Tribosystem) -> list[str]:
     ]
 
 
-def _standing_heights(system: Tribosystem) -> list[str]:
-    """Return what is to be said of a rough strip that slides by: in each position its heights stand still."""
+def _standing_profile(system: Tribosystem) -> list[str]:
+    """Return what is to be said of an uneven strip that slides by: in each position it stands still."""
     slid = system.position_spacing or float(system.path.max()) / system.pair.punch.spacing()
-    if system.pair.strip.heights is None or not system.case.passes or slid <= 1:
+    rough = system.pair.strip.heights is not None
+    if not system.case.passes or slid <= 1 or not (rough or _uneven(system)):
         return []
+    key = "strip.topography" if rough else "strip.profile"
     motion = system.case.motion
     if isinstance(motion, OneWay | Rotation):
-        wanted = "sliding one way there are no positions to follow; expected a topography of the punch alone"
+        wanted = f"Sliding one way has no positions that follow it: give {key.replace('strip', 'punch')} instead"
     elif isinstance(motion, Reciprocating):
         positions = system.motion.positions
         needed = math.ceil(slid * (positions if positions > 1 else math.pi / 2))  # in the middle they are far apart
-        wanted = f"expected one for each contact node, motion.positions = {needed}"
+        wanted = f"Take one for each contact node: set motion.positions = {needed}"
     else:
-        wanted = "expected rows of the cycle as near to each other as contact nodes"
+        wanted = "Give rows of the cycle that lie as near to each other as contact nodes"
     return [
-        f"strip.topography: the strip slides over {slid:.3g} contact nodes from position to position, and in each its "
-        f"heights stand still below the punch, which takes their imprint, where they should pass it: {wanted}"
+        f"{key}: the strip slides over {slid:.3g} contact nodes from position to position, and its uneven surface "
+        f"stands still in each. The punch takes its imprint, where it should pass. {wanted}"
     ]
+
+
+def _uneven(system: Tribosystem) -> bool:
+    """Return whether the strip's profile changes along the sliding: a worn track that goes on as it is does not."""
+    strip, depth = system.pair.strip, system.pair.strip.below_mesh
+    if system.case.strip.profile is None:
+        return False
+    places = np.column_stack([strip.abscissa, np.zeros(len(depth))])
+    if strip.dim == 3:
+        places = sliding_chart(system.sliding.field, system.pair).coordinates(strip.x)
+    cells = surface_cells(strip)
+    sides = np.vstack([cells[:, [k - 1, k]] for k in range(cells.shape[1])])
+    along, across = np.abs(np.diff(places[sides], axis=1)[:, 0]).T
+    changes = np.abs(np.diff(depth[sides], axis=1)[:, 0])[across < ACROSS * along]
+    return bool(changes.max(initial=0.0) > EVEN * np.ptp(depth))
 
 
 def _warnings(number: float, growth: float | None) -> list[str]:

@@ -157,7 +157,7 @@ def in_few_steps(case: Case, system: Tribosystem, until: int) -> Case:
     run: dict[str, Any] = {"periodic_within": None}
     if case.run.integration != "jump" and until * system.motion.positions > LONGEST:
         run |= {"integration": "jump", "jump_tolerance": TOLERANCE}
-    if not system.sticks and case.leaves_positions and system.track_changes:
+    if not system.sticks and case.leaves_positions and system.track_varies:
         return changed(case, run=run, motion={"positions": system.motion.positions})
     return changed(case, run=run)
 

@@ -358,6 +358,11 @@ class ContactSetup:
         return self.strip_changes and self.sliding.to_and_fro
 
     @property
+    def track_varies(self) -> bool:
+        """Whether each position finds another track: the strip changes to and fro under the punch, or is uneven."""
+        return self.made_from is not None and self.case.strip_varies and self.sliding.to_and_fro
+
+    @property
     def passing_laws(self) -> list[str]:
         """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
         laws = zip(("punch", "strip"), self.sliding.wear, strict=True)

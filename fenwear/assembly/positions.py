@@ -1,7 +1,8 @@
 """In how many positions of each half-cycle the strip passes under the punch, where a case leaves that open.
 
 Each position is a contact of its own, and what it wears lies where the strip's material is then. Positions that are
-further apart than contact nodes leave steps in the strip's scar: what wears it is a comb, not a sliding pressure.
+further apart than contact nodes leave steps in the strip's scar: what wears it is a comb, not a sliding pressure. An
+uneven strip that stood still would leave its imprint in the punch.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def _wanted(case: Case, placed: ContactSetup) -> int:
     Of a program the longest stroke counts. None are added on contact grids, which cover what positions need, nor with
     heat, whose response is another in each.
     """
-    if not case.leaves_positions or not placed.track_changes or case.grid is not None or case.heat is not None:
+    if not case.leaves_positions or not placed.track_varies or case.grid is not None or case.heat is not None:
         return 0
     longest = max([_step(make_sliding(stage.case).motion) for stage in stages_of(case)], default=0.0)
     own = _step(placed.motion)

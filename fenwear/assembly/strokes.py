@@ -55,8 +55,8 @@ class Sliding:
 
 
 def make_sliding(case: Case, *, positions: int = DEFAULT_POSITIONS) -> Sliding:
-    """Return the sliding of a case, in so many positions of a strip that wears where the case leaves them open."""
-    motion = make_motion(case.motion, strip_wears=case.strip_changes and case.passes, positions=positions)
+    """Return the sliding of a case, in so many positions of a strip that varies where the case leaves them open."""
+    motion = make_motion(case.motion, strip_varies=case.strip_varies and case.passes, positions=positions)
     sliding_field = _sliding_field(case, motion)
     one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(

@@ -47,7 +47,8 @@ class _ToAndFro(Part):
     positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
         default=None,
         description="of the strip under the punch in each half-cycle; 1: opposite each other throughout; "
-        "by default 1 unless the strip wears, then as many as contact nodes ask for, 9 to 61; on grids and with heat 9",
+        "by default 1 unless the strip wears or has a profile or topography, then as many as contact "
+        "nodes ask for, 9 to 61; on grids and with heat 9",
     )
 
 
@@ -179,7 +180,7 @@ class Cycle(Part):
     positions: Literal["middle", "steps"] | None = Field(
         default=None,
         description="middle: the strip's material stays where it is meshed; steps: it moves, in each step to its "
-        "place in the middle of it; by default middle unless the strip wears",
+        "place in the middle of it; by default middle unless the strip wears or is uneven",
     )
 
     @model_validator(mode="after")

@@ -289,6 +289,11 @@ class Case(Part):
         return self.wear.strip is not None or self.debris_on_strip
 
     @property
+    def strip_varies(self) -> bool:
+        """Whether it matters which part of the strip is below the punch: it changes, or its surface is uneven."""
+        return self.strip_changes or self.strip.profile is not None or self.strip.topography is not None
+
+    @property
     def diffusion(self) -> dict[str, float]:
         """What ready geometries grade the strip by, see `diffusion_of`: the same for all stages of a program."""
         if self._diffusion is not None:

@@ -29,7 +29,7 @@ from fenwear.interface.placement import HERE, Placement, Vector
 from fenwear.sliding.field import ALONG_X, SlidingField
 from fenwear.sliding.screw import Screw, Slide, Way
 
-DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears, at least; odd, so that one is the middle of the stroke
+DEFAULT_POSITIONS = 9  # at least, in a half-cycle where the strip wears or is uneven; odd, with one in the middle
 
 
 @dataclass(frozen=True)
@@ -320,12 +320,12 @@ class Motion:
         return [field.placement(float(end)) for end in self.offsets(1)[:, -1]]
 
 
-def make_motion(description: Motions, *, strip_wears: bool = False, positions: int = DEFAULT_POSITIONS) -> Motion:
+def make_motion(description: Motions, *, strip_varies: bool = False, positions: int = DEFAULT_POSITIONS) -> Motion:
     """Return the motion that the case describes.
 
     Args:
         description: Of the case.
-        strip_wears: Whether the strip wears and passes under the punch, so that its positions matter by default.
+        strip_varies: Whether the strip wears or is uneven, and passes under the punch: its positions matter by default.
         positions: How many it takes then, where the case leaves them open.
 
     Raises:
@@ -337,9 +337,9 @@ def make_motion(description: Motions, *, strip_wears: bool = False, positions: i
         steady = _PiecewiseLinear((0.0, description.duration), speed, speed)
         return _motion(((1 if forward else -1, 0.0, steady),), 1)
     if isinstance(description, Cycle):
-        moves = strip_wears if description.positions is None else description.positions == "steps"
+        moves = strip_varies if description.positions is None else description.positions == "steps"
         return _table_motion(description, moves=moves)
-    count = description.positions or (positions if strip_wears else 1)
+    count = description.positions or (positions if strip_varies else 1)
     if isinstance(description, Tabulated):
         return _motion(_table_strokes(description), count)
     stroke, amplitude = _to_and_fro(description), description.amplitude

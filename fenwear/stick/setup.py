@@ -155,7 +155,7 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:
-    """Return whether the strip's surface passes under the punch: by default where it changes, and moves far enough.
+    """Return whether the strip's surface passes under the punch: by default where it varies, and moves far enough.
 
     Whether it slips so far is seen in the first cycle alone, see `placed_by_slip`.
     """
@@ -167,7 +167,7 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
         return False
     if positions is not None:
         return True
-    return case.strip_changes and far_enough(case, surface)
+    return case.strip_varies and far_enough(case, surface)
 
 
 def touches(problem: PartialSlipProblem) -> bool:

@@ -265,3 +265,26 @@ def test_positions_far_apart_are_warned_about(assembled: Callable[..., Tribosyst
     assert not position_warnings(assembled("example1", *settings, f"motion.positions={named}"))
     assert not position_warnings(many)
     assert not position_warnings(assembled("example1", *COARSE))
+
+
+UNEVEN = ("strip.profile={points=[[-40, 2e-3], [-4, 2e-3], [0, 0.0], [4, 2e-3], [40, 2e-3]]}",)
+
+
+def test_an_uneven_strip_passes_under_the_punch(assembled: Callable[..., Tribosystem]) -> None:
+    """A ridge goes to and fro under the punch by default, as in many positions: it does not stay where it is."""
+    ridge = (*COARSE, "geometry.parameters.overlap=6", "motion.amplitude='4.5 mm'", *UNEVEN)
+    found = []
+    for positions in ((), ("motion.positions=15",)):
+        system = assembled("example2", *ridge, *positions)
+        assert position_warnings(system) == []
+        *_, block = jump(system, 400, tolerance=1e-2)
+        inner = np.abs(system.pair.x) < 25
+        found.append((block.pressure[-1][inner].max(), np.ptp(block.wear[-1][inner])))
+    np.testing.assert_allclose(found[0], found[1], rtol=0.05)
+    (warning,) = position_warnings(assembled("example2", *ridge, "motion.positions=1"))
+    assert "strip.profile" in warning
+    one_way = "motion={kind='one-way', direction='rightward', speed='30 mm/s', duration='0.3 s'}"
+    (warning,) = position_warnings(assembled("example2", *COARSE, *UNEVEN, one_way))
+    assert "punch.profile" in warning
+    even = "strip.profile={points=[[-40, 2e-3], [40, 2e-3]]}"
+    assert position_warnings(assembled("example2", *COARSE, even, one_way)) == []

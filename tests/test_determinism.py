@@ -38,7 +38,7 @@ AGAIN_ON_ONE = tuple(name for name in CASES if name not in AGAIN_ON_TWO)
 # Results equal to the last bit on any number of ranks.
 EVERYWHERE = {
     "plane with heat": ("example1-heat", "run.half_cycles=30", *SMALL, "setup.reproducible=true"),
-    "columns": ("example2", "run.half_cycles=30", *SMALL, "setup.reproducible=true", "setup.way=columns"),
+    "columns": ("example2", "run.half_cycles=30", *SMALL, "setup.reproducible=true"),
     "solid": (
         "ball-on-flat",
         "run.half_cycles=2",

@@ -33,9 +33,7 @@ from fenwear.assembly.growing import (
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.placing import place, place_at_rest
 from fenwear.assembly.positions import place_case_bodies
-from fenwear.assembly.resource_report import body_lines, resources_text
-from fenwear.assembly.resources import Resources, body_resources
-from fenwear.assembly.solver_choice import choose_solvers
+from fenwear.assembly.resources import Resources, setup_resources
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
@@ -71,12 +69,9 @@ __all__ = [
     "answers_anywhere",
     "assemble",
     "at_rim",
-    "body_lines",
-    "body_resources",
     "build_bodies",
     "build_conduction",
     "carried",
-    "choose_solvers",
     "elastic",
     "elastic_body",
     "expansions",
@@ -106,8 +101,8 @@ __all__ = [
     "relaid",
     "renewed",
     "resources_of",
-    "resources_text",
     "set_up_by",
+    "setup_resources",
     "steady_exchange",
     "taken_at",
     "vary",

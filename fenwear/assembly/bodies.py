@@ -69,13 +69,8 @@ class Bodies:
 
     @property
     def solved_by(self) -> list[str]:
-        """What is to be said of operators that contacts decided on, and of columns that no usual factor solves for."""
-        names = {"low-rank": "a factor with blocks of low rank", "multigrid": "conjugate gradients with a multigrid"}
-        return [body.taken for body in (self.punch, self.strip) if body.taken] + [
-            f"{body.body.name}: condensed by {names[body.solver]}, as no other factor fits or setup.way says so"
-            for body in (self.punch, self.strip)
-            if body.solver in names
-        ]
+        """The operators that contacts decided on, in words."""
+        return [body.taken for body in (self.punch, self.strip) if body.taken]
 
     @property
     def last_resorts(self) -> list[str]:

@@ -32,8 +32,7 @@ from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.patches import facet_side
 from fenwear.interface.transfer import dual_transfer
-from fenwear.memory import free_memory, memory_size
-from fenwear.parallel import agreed
+from fenwear.memory import check_memory
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
 PER_NODE = 300.0  # bytes that a node takes in each position of the strip (measured, 129 and 257 nodes in 3 and 21)
@@ -91,13 +90,9 @@ def _check_memory(comm: MPI.Comm, grid: RegularGrid, sliding: Sliding) -> None:
         CaseError: it does not.
     """
     nodes, positions = math.prod(grid.counts), len({phase.offset for phase in sliding.motion.phases})
-    free, taken = agreed(comm, free_memory()), PER_NODE * nodes * positions
-    if free is None or taken <= free:
-        return
     counts = " by ".join(f"{count:,}" for count in grid.counts)
-    message = f"{counts} nodes in {positions} positions of the strip take about {memory_size(taken)}, but "
-    message += f"{memory_size(free)} are free; expected fewer, or fewer motion.positions"
-    raise CaseError(InputError("grid.nodes", message))
+    what = f"a contact of {counts} nodes in {positions} positions of the strip"
+    check_memory(comm, PER_NODE * nodes * positions, "grid.nodes", what, "Use fewer, or fewer `motion.positions`.")
 
 
 def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> None:

@@ -16,8 +16,7 @@ from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.creep import Creep, creep_of
 from fenwear.assembly.grids import check_felt
-from fenwear.assembly.resources import Resources, needs
-from fenwear.assembly.solver_choice import choose_solvers, chosen, free_on_ranks
+from fenwear.assembly.resources import Resources, setup_resources
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import Relocatable, SurfaceOperator, operators_for
@@ -201,22 +200,18 @@ class Tribosystem(ContactSetup):
         )
 
 
-def resources_of(placed: ContactSetup, free: float | None = None) -> Resources:
-    """Return what the set-up of placed bodies will take, in the way that fits into the memory; collective.
-
-    Args:
-        placed: The bodies.
-        free: Bytes that all ranks together may take; by default those that are free.
-    """
-    free = free_on_ranks(placed.comm) if free is None else free
-    return chosen(_needs_as_is(placed), placed.bodies.punch.setup, placed.comm, free)
-
-
-def _needs_as_is(placed: ContactSetup) -> Resources:
-    return needs(placed, _frame(placed))
+def resources_of(placed: ContactSetup) -> Resources:
+    """Return what condensing the bodies and joining them will ask for; collective."""
+    moves, fixed, flat = _frame(placed)
+    nodes, dim = len(placed.pair.weights), placed.pair.punch.dim
+    on_strip = len(placed.pair.strip.trace) if moves else nodes
+    axes = 1 if fixed else dim, 1 if not moves or (fixed and flat) else dim
+    asked = (nodes, nodes * axes[0]), (on_strip, on_strip * axes[1])
+    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
+    return setup_resources(placed.bodies, nodes, asked, interfaces * dim + 2 * len(placed.pairs) + 1)
 
 
-def elastic(placed: ContactSetup, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
+def elastic(placed: ContactSetup, *, fresh: bool = False) -> Tribosystem:
     """Condense both bodies and join them in every phase; collective.
 
     Factors both stiffnesses, unless the bodies are kept on disk.
@@ -224,29 +219,26 @@ def elastic(placed: ContactSetup, *, fresh: bool = False, free: float | None = N
     Args:
         placed: The bodies.
         fresh: Factor whatever is kept.
-        free: Bytes that all ranks together may take; by default those that are free.
 
     Raises:
         CaseError: there is not memory enough.
     """
-    return joined(placed, condense_bodies(placed, fresh=fresh, free=free))
+    return joined(placed, condense_bodies(placed, fresh=fresh))
 
 
-def condense_bodies(placed: ContactSetup, *, fresh: bool = False, free: float | None = None) -> Condensed:
-    """Condense both bodies onto what the phases of the motion ask for, in the way that fits the memory; collective.
+def condense_bodies(placed: ContactSetup, *, fresh: bool = False) -> Condensed:
+    """Condense both bodies onto what the phases of the motion ask for; collective.
 
     They are kept on disk, but with properties of temperatures that no other run has.
 
     Args:
         placed: The bodies.
         fresh: Factor whatever is kept.
-        free: Bytes that all ranks together may take; by default those that are free.
 
     Raises:
         CaseError: there is not memory enough.
     """
-    loaded = {id(one): one for one in (placed.bodies, *placed.loaded)}
-    choose_solvers(list(loaded.values()), _needs_as_is(placed), free)
+    resources_of(placed).check()
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
     if bodies.heat is not None:

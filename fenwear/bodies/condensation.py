@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 from petsc4py import PETSc
@@ -22,11 +21,11 @@ from fenwear.arrays import Array, Nodes
 from fenwear.bodies import kept
 from fenwear.bodies.assembly import transposed_times
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import entries, make_together, solve_together
-from fenwear.bodies.response import Request, respond_together
-from fenwear.bodies.substructure import make_substructures
+from fenwear.bodies.factor import entries, make_together, operations, solve_together
+from fenwear.bodies.response import Request, by_surface, respond_together
 from fenwear.parallel import total
 
+BOUNDARY_SHARE = 1.0  # of the factor's operations that joining the ranks' boundaries may take
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
 
 
@@ -153,7 +152,7 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     """Factor and solve; collective.
 
     One rank has nothing to do at once. A large factor beside a response to temperature is freed: what prepares the
-    heat takes as much memory, and none of it needs the factor. Nor does anything need more than one of a body then.
+    heat takes as much memory, and none of it needs the factor.
     """
     if not requests:
         return []
@@ -161,8 +160,6 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
         return [_condensed([one])[0] for one in requests]
     _eliminate(requests)
     found = respond_together(requests)
-    for one in requests:
-        one.elastic.leave_factor_to_owner()
     loads = _under_loads([one.elastic for one in requests])
     condensed = []
     for one, (response, warm), load in zip(requests, found, loads, strict=True):
@@ -192,31 +189,15 @@ def _guided(one: Request, response: Array, by_temperature: Array | None) -> tupl
 
 
 def _eliminate(requests: Sequence[Request]) -> None:
-    """Eliminate bodies in substructures by all ranks, or factor each on ranks of its own, all at once; collective."""
-    substructures, factors = [], []
-    comm, ordered = requests[0].elastic.body.mesh.comm, list(reversed(requests))  # the first rank gets the last one
-    dealt = deal([one.elastic.holders for one in ordered], comm.size)
-    for number, (one, holders) in enumerate(zip(ordered, dealt, strict=True)):
-        if one.in_substructures:
-            substructures.append(one.elastic.begin_substructures(backwards=number % 2 == 1))
-        else:
-            factors.append(one.elastic.begin_factor(holders, with_surface=one.by_surface))
-    make_substructures(substructures)
-    make_together(factors)
-
-
-def deal(counts: Sequence[int], ranks: int) -> list[list[int]]:
-    """Return the ranks that hold the factor of each body: an owner each, then as many others as asked for.
-
-    Args:
-        counts: How many for each body.
-        ranks: Number of ranks; where there are less bodies than ranks, each rank holds one factor at most.
-    """
-    dealt = [[owner % ranks] for owner in range(len(counts))]
-    left = iter(range(len(counts), ranks))
-    for holders, count in zip(dealt, counts, strict=True):
-        holders.extend(islice(left, count - 1))
-    return dealt
+    """Factor each body on a rank of its own, or in substructures on all ranks, all at once; collective."""
+    factors = []
+    for owner, one in enumerate(reversed(requests)):  # the first rank gets the last one
+        elastic = one.elastic
+        surface = one.thermal_coupling is None and by_surface(elastic)  # temperatures act inside the body
+        together = surface and elastic.body.mesh.comm.size > 1 and not elastic.setup.reproducible
+        together = together and elastic.boundary.size**3 <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
+        factors.append(elastic.begin_factor(owner, with_surface=surface, together=together))
+    make_together([factor for factor in factors if not factor.is_made])
 
 
 def _symmetric(response: Array, along: Array) -> Array:
@@ -229,23 +210,11 @@ def _symmetric(response: Array, along: Array) -> Array:
 
 def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
     """Return the displacement of each body's trace nodes under its loads (N, d), mm, all solved at once; collective."""
-    found: dict[int, Array] = {}
-    by_factor = []
-    for number, body in enumerate(bodies):
-        substructures = body.substructures
-        if substructures is not None:
-            found[number] = substructures.surface_solution(body.load[:, None]).reshape(-1, body.dim)
-        else:
-            by_factor.append(number)
-    if by_factor:
-        loads = [bodies[number].load for number in by_factor]
-        for number, solution in zip(
-            by_factor, solve_together([bodies[number].factor for number in by_factor], loads), strict=True
-        ):
-            found[number] = bodies[number].trace.pick(solution[:, None])[:, :, 0]
+    solutions = solve_together([body.factor for body in bodies], [body.load for body in bodies])
+    found = [body.trace.pick(one[:, None])[:, :, 0] for body, one in zip(bodies, solutions, strict=True)]
     for number, body in enumerate(bodies):
         answer = body.guide_answer
         if answer is not None:
             work = total(body.body.mesh.comm, answer.moved.T @ body.load)
             found[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
-    return [found[number] for number in range(len(bodies))]
+    return found

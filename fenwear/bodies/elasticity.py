@@ -6,7 +6,7 @@ import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import basix.ufl
 import numpy as np
@@ -22,13 +22,11 @@ from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
-from fenwear.bodies.factor import Factor, make_together
+from fenwear.bodies.factor import Factor, Solver, make_together, solve_together
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer, Guides, Loose, make_guides
-from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.bodies.multigrid import Multigrid
 from fenwear.bodies.substructure import Boundary, Substructures
 from fenwear.bodies.supports import Supports
 from fenwear.case import AUTO, CONDENSED, Body, Load, Setup
@@ -36,8 +34,6 @@ from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
 PREFIX = "fenwear_elasticity_"
-# A factor on one rank, or over all where it is large; over all in any case; compressed; conjugate gradients.
-Solver = Literal["factor", "spread factor", "low-rank", "multigrid"]
 BY_SIZE = Setup()
 
 
@@ -81,8 +77,6 @@ class ElasticBody:
         reading: Of a grid, what takes values at the trace nodes of the mesh to its nodes (N, N_mesh); else None.
         reach: How far that grid may grow; None where it stays.
         setup: How it is condensed.
-        solver: What solves for its columns; set before the first solution, by the memory that there is.
-        holders: How many ranks have its factor at once and share its columns; set likewise.
     """
 
     def __init__(
@@ -112,10 +106,6 @@ class ElasticBody:
         self.decides, self.taken = description.operator == AUTO, ""  # on a grid; what is to be said of the decision
         self.mortar: Callable[[], csr_array] | None = None
         self.creep = description.creep
-        self.solver: Solver = "factor"
-        self.holders = 1
-        if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")
-            self.solver = setup.way
         mesh = body.mesh
         dim = mesh.geometry.dim
         self.dim = dim
@@ -142,8 +132,7 @@ class ElasticBody:
         # None or one of each, of all bodies that differ by their loads.
         self._answers: list[GuideAnswer] = []
         self.known: dict[bytes, Any] = {}  # what an operator has solved for that does not depend on the grid
-        self._factors: list[Factor] = []
-        self._substructures: list[Substructures] = []
+        self._factors: list[Solver] = []
 
     def _fixed_by_means(self, loose: Sequence[Loose], loads: Sequence[Load]) -> Guides | None:
         """Return what guides hold, and where free motions are measured; None where supports hold all; collective."""
@@ -278,7 +267,7 @@ class ElasticBody:
 
     def solve(self, right: Array) -> Array:
         """Return K^-1 times right-hand sides on the owned degrees of freedom, (owned,) or (owned, k); collective."""
-        return (self.substructures or self.factor).solve(right)
+        return solve_together([self.factor], [right])[0]
 
     def couple_of(self, forces: Array) -> Array:
         """Return the moments about what guides hold (g, k) of forces (owned, k), those on supports too; collective."""
@@ -315,74 +304,46 @@ class ElasticBody:
         return displacement + answer.change(answer.guides.rotations, answer.moved, couple, work)
 
     @property
-    def substructures(self) -> Substructures | None:
-        """K as substructures, where they are made."""
-        return next((one for one in self._substructures if one.is_made), None)
-
-    @property
     def is_factored(self) -> bool:
         """Whether what solves for its columns is made."""
-        return self.substructures is not None or any(factor.is_made for factor in self._factors)
+        return any(factor.is_made for factor in self._factors)
 
     @cached_property
     def boundary(self) -> Boundary:
         """What this rank's cells share with others and with the contact surface; collective at first use."""
         return Boundary(self.space, self.surface_dofs)
 
-    def begin_substructures(self, *, backwards: bool = False) -> Substructures:
-        """Return K as substructures, made or yet to be made; collective at first use.
-
-        Args:
-            backwards: Whether the last rank is their owner, and not the first.
-        """
-        if not self._substructures:
-            comm, surface = self.body.mesh.comm, self.surface_dofs
-            parts = (self._form, self._bcs, self.boundary, surface)
-            self._substructures.append(Substructures(*parts, prefix=PREFIX, comm=comm, backwards=backwards))
-        return self._substructures[0]
-
     @property
-    def factor(self) -> Factor:
+    def factor(self) -> Solver:
         """The Cholesky factor of K, made once; collective at first use."""
         factor = self.begin_factor()
         if not factor.is_made:
             make_together([factor])
         return factor
 
-    def begin_factor(self, holders: Sequence[int] = (0,), *, with_surface: bool = False) -> Factor:
+    def begin_factor(self, owner: int = 0, *, with_surface: bool = False, together: bool = False) -> Solver:
         """Return the factor of K, made or yet to be made; collective at first use.
 
         Args:
-            holders: The ranks that get it at first use, its owner first.
+            owner: The rank that gets it at first use.
             with_surface: Whether it keeps the Schur complement of the surface's degrees of freedom.
+            together: Whether every rank eliminates its own cells (see `substructure`).
         """
         if not self._factors:
-            kept = "stiffness" in self.__dict__
-            matrix = self.stiffness
-            surface = self.surface_dofs if with_surface else None
-            comm = self.body.mesh.comm
-            if self.solver in ("multigrid", "low-rank"):
-                del self.stiffness
-                low = self.solver == "low-rank"
-                self._factors.append(
-                    LowRank(matrix, PREFIX, comm) if low else Multigrid(matrix, self._held.rigid_basis(), PREFIX, comm)
-                )
+            comm, surface = self.body.mesh.comm, self.surface_dofs
+            if together:
+                parts = (self._form, self._bcs, self.boundary, surface)
+                self._factors.append(Substructures(*parts, prefix=PREFIX, comm=comm, owner=owner % comm.size))
                 return self._factors[0]
-            spread = self.solver == "spread factor"
-            factor = Factor(
-                matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, holders=holders, surface=surface, spread=spread
-            )
+            kept, matrix = "stiffness" in self.__dict__, self.stiffness
+            known = surface if with_surface else None
+            factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=known)
             self._factors.append(factor)
             if not kept:  # all that needs it has it now
                 del self.stiffness
                 if factor.is_moved:
                     matrix.destroy()
         return self._factors[0]
-
-    def leave_factor_to_owner(self) -> None:
-        """Free its factor on all ranks but its owner, or those that share it."""
-        for factor in self._factors:
-            factor.leave_to_owner()
 
     def free_factor(self) -> None:
         """Free its factor, of all bodies that differ by their loads; the next solution makes it again; collective."""

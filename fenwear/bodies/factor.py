@@ -3,15 +3,14 @@
 A factor that is spread over the ranks adds up what they send as it arrives, so that its last bits are
 others in every run. A matrix whose factor fits one rank is moved to one, its owner, and factored there,
 which is also faster for it; larger ones are spread. Factors of different owners are made at once, and
-solve at once. Where there are many columns to solve for, several ranks hold the factor: each makes it by itself,
-from the same numbers in the same order, so that it does not matter to the bits which of them solves for a column.
+solve at once.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -50,7 +49,8 @@ class Factor:
         is_spread: Whether all ranks share it; else its owner has it.
         is_moved: Whether the matrix is another one than that which was given.
         is_made: Whether it is computed.
-        holders: The ranks that have it, its owner first, unless all share it.
+        owner: The rank that has it, unless all share it.
+        has_schur: Whether it solves on the surface alone.
         schur: On its owner the Schur complement of the surface (m, m), where it was asked for; else None.
     """
 
@@ -63,9 +63,8 @@ class Factor:
         comm: MPI.Comm,
         dim: int,
         repeated: bool = False,
-        holders: Sequence[int] = (0,),
+        owner: int = 0,
         surface: NDArray[np.int64] | None = None,
-        spread: bool = False,
     ) -> None:
         """Move a matrix to those that are to hold its factor; collective.
 
@@ -76,33 +75,25 @@ class Factor:
             comm: Its ranks: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
             repeated: Whether it solves thousands of times.
-            holders: The ranks that have it, its owner first, unless it is spread; a rank that has the whole matrix
-                is the owner.
+            owner: The rank that has it, unless it is spread; a rank that has the whole matrix is the owner.
             surface: Rows whose Schur complement is kept (m,), by the owner alone.
-            spread: Over all ranks, however small it is.
         """
         self.comm, self._sizes = comm, matrix.getSizes()[0]
         self._rows: NDArray[np.int64] = np.asarray(matrix.getOwnershipRanges(), dtype=np.int64)
         having = np.flatnonzero(np.diff(self._rows))
         whole = len(having) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
         self._prefix, self._kind = prefix, kind
-        self.owner = int(having[0]) if whole else holders[0] % self.comm.size
-        others = () if surface is not None else (rank % self.comm.size for rank in holders[1:])
-        self.holders = tuple(dict.fromkeys((self.owner, *others)))
+        self.owner = int(having[0]) if whole else owner % self.comm.size
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
-        self.is_spread = self.comm.size > 1 and not whole and (spread or needed > SPREAD)
+        self.is_spread = self.comm.size > 1 and not whole and needed > SPREAD
         self._repeated = repeated and not self.is_spread
         self._surface = None if self.is_spread else surface
+        self.has_schur = self._surface is not None
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
-        self._matrix: PETSc.Mat | None = _moved(matrix, self.holders, kind) if self.is_moved else matrix
+        self._matrix: PETSc.Mat | None = _moved(matrix, self.owner, kind) if self.is_moved else matrix
         self._solver: PETSc.Mat | None = None
         self.schur: Array | None = None
         self._schur_factor: Array | None = None
-
-    @property
-    def is_here(self) -> bool:
-        """Whether this rank has it, or a part of it."""
-        return self.is_spread or self.comm.rank in self.holders
 
     @property
     def answers(self) -> bool:
@@ -125,6 +116,9 @@ class Factor:
             self.schur = schur_complement(self._solver, len(surface))
         if self.is_moved:
             matrix.destroy()
+
+    def join(self) -> None:
+        """Do nothing: no other rank has a part."""
 
     def solve(self, right: Array) -> Array:
         """Return the solutions for right-hand sides on this rank's own rows, (owned,) or (owned, k); collective."""
@@ -185,12 +179,6 @@ class Factor:
                 raise without_factor(self._prefix, "not positive") from error
         return np.asarray(scipy.linalg.cho_solve((self._schur_factor, True), right))
 
-    def leave_to_owner(self) -> None:
-        """Free its memory on all other ranks that have it; what shares the columns is done."""
-        if self.is_here and not self.answers:
-            self.free()
-        self.holders = self.holders[:1]
-
     def free(self) -> None:
         """Free its memory: it solves no more; collective where it is spread."""
         for one in (self._solver, self._matrix if self.is_moved else None):
@@ -218,40 +206,57 @@ def factored(
     return factor
 
 
-class Approximate(Factor):
-    """What solves like a factor that all ranks share, but comes near only, and so needs the matrix to improve on it."""
+class Solver(Protocol):
+    """What solves for right-hand sides of a matrix, on a rank of its own or on all: made and asked together."""
 
-    def __init__(self, matrix: PETSc.Mat, prefix: str, comm: MPI.Comm) -> None:
-        """Take what it is made from.
+    comm: MPI.Comm
+    owner: int
+    is_spread: bool
+    is_moved: bool
+    is_made: bool
+    has_schur: bool
 
-        Args:
-            matrix: Symmetric and positive definite; kept.
-            prefix: Of PETSc's options.
-            comm: The ranks.
-        """
-        self.comm, self.owner, self.holders, self._prefix = comm, 0, (0,), prefix
-        self._sizes = matrix.getSizes()[0]
-        self.is_spread, self.is_moved, self.is_made = True, False, False
-        self.schur = None
-        self._matrix = matrix
+    @property
+    def answers(self) -> bool:
+        """Whether this rank solves where all ask."""
+
+    def compute(self) -> None:
+        """Make this rank's part."""
+
+    def join(self) -> None:
+        """Join the parts; collective."""
+
+    def gather(self, right: Array) -> Array:
+        """Return right-hand sides (owned, k) where they are solved; collective."""
+
+    def solve_here(self, right: Array) -> Array:
+        """Return the solutions where they are solved."""
+
+    def scatter(self, found: Array, columns: int) -> Array:
+        """Return this rank's part of solutions (owned, k); collective."""
+
+    def solve_on_surface(self, right: Array) -> Array:
+        """Return the surface's part of the solutions for right-hand sides there (m, k), where they are solved."""
+
+    def free(self) -> None:
+        """Free its memory; collective where it is spread."""
 
 
-def make_together(factors: Sequence[Factor]) -> None:
+def make_together(factors: Sequence[Solver]) -> None:
     """Compute factors, each where it is solved, at once; collective.
 
     Raises:
         ConvergenceError: a matrix has no factor; on every rank.
     """
-    if not factors:
-        return
-    all_together(factors[0].comm)
-    error: ConvergenceError | None = None
-    for factor in factors:
-        try:
-            factor.compute()
-        except ConvergenceError as caught:  # raised below, on all ranks
-            error = error or caught
-    raised_together(factors[0].comm, error)
+    for make in ("compute", "join"):
+        error: ConvergenceError | None = None
+        for factor in factors:
+            try:
+                getattr(factor, make)()
+            except ConvergenceError as caught:  # raised below, on all ranks
+                error = error or caught
+        if factors:
+            raised_together(factors[0].comm, error)
 
 
 def without_factor(prefix: str, reason: str) -> ConvergenceError:
@@ -297,7 +302,7 @@ def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None
     return solution
 
 
-def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[Array]:
+def solve_together(factors: Sequence[Solver], rights: Sequence[Array]) -> list[Array]:
     """Return the solutions of each factor for its right-hand sides (owned,) or (owned, k), at once; collective."""
     for factor in factors:
         all_together(factor.comm)
@@ -310,10 +315,9 @@ def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[A
     ]
 
 
-def moved(matrix: PETSc.Mat, ranks: Sequence[int]) -> PETSc.Mat | None:
-    """Return the whole of a distributed matrix on some ranks; None on others; collective."""
-    comm = matrix.comm.tompi4py()
-    here = comm.rank in ranks
+def moved(matrix: PETSc.Mat, rank: int) -> PETSc.Mat | None:
+    """Return the whole of a distributed matrix on one rank; None on others; collective."""
+    here = matrix.comm.tompi4py().rank == rank
     # General index sets: those of a stride give wrong values.
     rows, columns = (
         PETSc.IS().createGeneral(np.arange(size if here else 0, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
@@ -328,8 +332,8 @@ def moved(matrix: PETSc.Mat, ranks: Sequence[int]) -> PETSc.Mat | None:
     return None
 
 
-def _moved(matrix: PETSc.Mat, ranks: Sequence[int], kind: str) -> PETSc.Mat | None:
-    whole = moved(matrix, ranks)
+def _moved(matrix: PETSc.Mat, rank: int, kind: str) -> PETSc.Mat | None:
+    whole = moved(matrix, rank)
     if whole is not None:
         whole.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
     return whole

@@ -37,7 +37,7 @@ from fenwear.files import CAD, MESHES, is_foreign, read_mesh
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
 from fenwear.files.groups import GroupedMesh, grouped, into_gmsh, normal
 from fenwear.files.session import gmsh_model
-from fenwear.memory import free_memory, memory_size
+from fenwear.memory import check_memory
 from fenwear.parallel import on_root
 
 BODIES = ROLES
@@ -357,7 +357,7 @@ def _load(
         if shape or path.suffix == ".geo":
             gmsh.model.mesh.generate(dim - 1)
             most = max(_contact_nodes(gmsh, geometry, body, dim - 1) for body in BODIES[: 1 if kind == "solid" else 2])
-            _check_size(most, dim - 1)
+            _check_size(most)
             contact_nodes = most if kind == "solid" else 0.0
             gmsh.model.mesh.generate(dim)
             gmsh.model.mesh.setOrder(geometry.order)
@@ -435,21 +435,14 @@ def _contact_nodes(gmsh: Any, geometry: Geometry, body: str, dim: int) -> float:
     return nodes
 
 
-def _check_size(contact_nodes: float, dim: int = 2) -> None:
+def _check_size(contact_nodes: float) -> None:
     """Refuse what would not fit into memory with its contact alone, a line or a surface, before bodies are meshed.
 
     Raises:
         CaseError: it has too many contact nodes.
     """
-    free = free_memory()
-    least = MATRICES * 8 * contact_nodes**2
-    if free is None or least <= free:
-        return
-    message = (
-        f"about {contact_nodes:,.0f} contact nodes take {memory_size(least)} at least, but {memory_size(free)} are "
-        f"free; elements {(least / free) ** (0.5 / dim):.2g} times as large at the contact might fit"
-    )
-    raise CaseError(InputError("geometry", message))
+    what, advice = f"a contact of some {contact_nodes:,.0f} nodes", "Use larger elements at the contact, or a `grid`."
+    check_memory(MPI.COMM_SELF, MATRICES * 8 * contact_nodes**2, "geometry", what, advice)
 
 
 def _merge(gmsh: Any, path: Path) -> None:

@@ -11,7 +11,7 @@ from fenwear.case.plausible import plausibility_warnings
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, heat_of, load_case, make_case
 from fenwear.case.schema import Case
-from fenwear.case.setup import Setup, Way
+from fenwear.case.setup import Setup
 from fenwear.case.thermal import Heat, Track
 from fenwear.case.topography import Topography
 
@@ -45,7 +45,6 @@ __all__ = [
     "Tabulated",
     "Topography",
     "Track",
-    "Way",
     "Wear",
     "WearLaw",
     "builtin_cases",

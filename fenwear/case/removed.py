@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from fnmatch import fnmatchcase
 
-REMOVED: dict[str, str] = {}
+REMOVED: dict[str, str] = {
+    "setup.way": "Leave it out: each body is factored on a rank of its own, or over all ranks where its factor takes "
+    "more than 4 GiB.",
+}
 
 
 def replacement(key: str, word: object = None) -> str | None:

@@ -89,7 +89,7 @@ def check_command(
     full: Annotated[bool, typer.Option("--full", help="Print the case with all defaults, as a case file.")] = False,
 ) -> None:
     """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
-    from fenwear.assembly import elastic, law_named, place_case, resources_of, resources_text, with_reduced_heat
+    from fenwear.assembly import elastic, law_named, place_case, resources_of, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
     from fenwear.heat.periodic import cycle_memory
     from fenwear.law_choice import choose_law, with_law
@@ -102,9 +102,7 @@ def check_command(
         _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy, full=full)
         return
     placed = place_case(loaded)
-    wanted = resources_of(placed)
-    for line in (wanted.text(), *resources_text(placed, wanted)):
-        log(line)
+    log(resources_of(placed).text())
     system = elastic(placed)
     if loaded.contact.law == "auto":
         choice = choose_law(system)

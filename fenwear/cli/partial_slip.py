@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, body_lines
+from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
 from fenwear.plausibility.few import few_text
@@ -38,7 +38,7 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     system.check_touching()
     problem = system.law_state.problem
     both = meshed(problem.interface)
-    setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
+    setup = both.needs.text()
     sizes = size_warnings(case, system.bodies, system.rigid)
     records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
     thick, weights = case.model.thickness, problem.weights

@@ -14,12 +14,11 @@ from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
-from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory
 from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
-from fenwear.memory import GIB, free_memory, memory_size
-from fenwear.parallel import agreed
+from fenwear.memory import check_memory
 from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
@@ -53,17 +52,10 @@ def check_cycle_memory(system: Tribosystem) -> None:
         CaseError: they do not.
     """
     exchange = with_reduced_heat(system).exchange
-    free = agreed(system.comm, free_memory())
-    if exchange is None or free is None or (taken := cycle_memory(exchange)) <= max(free, GIB):
-        return
-    raise CaseError(
-        InputError(
-            "heat",
-            f"jumps and steady states keep what each step of the heat in a cycle does to all of it: "
-            f"{memory_size(taken)}, but {memory_size(free)} are free; expected fewer motion.positions or heat.steps, "
-            'larger elements at the contact, or run.integration = "implicit"',
-        )
-    )
+    if exchange is not None:
+        what = "what jumps and steady states keep of each step of the heat in a cycle"
+        advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
+        check_memory(system.comm, cycle_memory(exchange), "heat", what, advice)
 
 
 @dataclass(frozen=True)

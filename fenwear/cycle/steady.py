@@ -43,7 +43,7 @@ from fenwear.cycle.jump import jump
 from fenwear.cycle.own_properties import with_own_properties
 from fenwear.cycle.program import at_step
 from fenwear.cycle.state import RunState, pressure_scale
-from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_memory, rigid_of_phases
+from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_heat_memory, rigid_of_phases
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.field import HeatState
@@ -188,7 +188,7 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
     _check_exists(system)
     prepared = with_reduced_heat(system)
     _check_sinks(prepared)
-    check_memory(system)
+    check_heat_memory(system)
     check_cycle_memory(prepared)
 
     def found() -> SteadyState:

@@ -16,13 +16,12 @@ from fenwear.contact.gridded import PhasesGrid
 from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.worn_shape import ShapeEquations
-from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.errors import ConvergenceError
 from fenwear.interface.convolution import Convolution
 from fenwear.layers import Evolution
 from fenwear.layers.step import LayerEvolution
-from fenwear.memory import GIB, free_memory, memory_size
+from fenwear.memory import check_memory
 from fenwear.optimum import Optimum
-from fenwear.parallel import agreed
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import StepWear
 
@@ -31,7 +30,6 @@ GRAZING = 1e-7  # of the wear by the mean pressure: a motion of open nodes that 
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
 GRIDDED = 1000  # nodes of a grid from which on products take the place of matrices
 NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
-SMALL = GIB  # below which no estimate refuses anything
 STEPS = 0.1, 1.0  # wear by the mean pressure over the elastic gap, of steps from afar
 LONGER = 10.0, 1e2, 1e3, 1e4, 1e5  # and of those before the last one, which has no end
 UNBALANCED = 0.3  # of the mean pressure times the surface: from there on a start is far
@@ -388,21 +386,14 @@ def rigid_of_phases(system: Tribosystem) -> Array:
     return np.array(found)
 
 
-def check_memory(system: Tribosystem) -> None:
+def check_heat_memory(system: Tribosystem) -> None:
     """Make sure that what the heat of all phases opens in all phases fits into the memory; collective.
 
     Raises:
         CaseError: it does not.
     """
     m, n = len(system.motion.phases), len(system.pair.weights)
-    free, taken = agreed(system.comm, free_memory()), COUPLED * NUMBER * float(m * n) ** 2
-    if system.heat is None or free is None or taken <= max(free, SMALL):
-        return
-    raise CaseError(
-        InputError(
-            "geometry",
-            f"the steady state with heat of {n:,} contact nodes in {m} phases takes {memory_size(taken)}, but "
-            f"{memory_size(free)} are free; expected larger elements at the contact, fewer motion.positions, or the "
-            "wear followed by `run`",
-        )
-    )
+    if system.heat is not None:
+        what = f"the steady state with heat of {n:,} contact nodes in {m} phases"
+        advice = "Use larger elements at the contact or fewer `motion.positions`, or follow the wear by `run`."
+        check_memory(system.comm, COUPLED * NUMBER * float(m * n) ** 2, "geometry", what, advice)

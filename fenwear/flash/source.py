@@ -31,8 +31,8 @@ from fenwear.cycle import march
 from fenwear.errors import CaseError, InputError
 from fenwear.flash.course import Course, past_of
 from fenwear.flash.heating import Heating, Window, grid_of
-from fenwear.memory import free_memory, memory_size
-from fenwear.parallel import agreed, on_root
+from fenwear.memory import check_memory
+from fenwear.parallel import on_root
 from fenwear.results import checkpoint
 from fenwear.stick.coulomb import Steps
 from fenwear.stick.records import TimeStepRecords
@@ -139,12 +139,8 @@ def _check_memory(comm: MPI.Comm, cells: float) -> None:
     Raises:
         CaseError: they do not.
     """
-    free, taken = agreed(comm, free_memory()), PER_CELL * cells
-    if free is not None and taken > free:
-        message = (
-            f"temperatures of the cycle take about {memory_size(taken)}, but {memory_size(free)} are free; expected"
-        )
-        raise CaseError(InputError("grid.nodes", f"{message} fewer, or a shorter stroke"))
+    what = f"a cycle's temperatures in {cells:,.0f} cells"
+    check_memory(comm, PER_CELL * cells, "grid.nodes", what, "Use fewer nodes, or a shorter stroke.")
 
 
 def _of_time_steps(case: Case, directory: Path) -> Heating:

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.assembly import Bodies, Resources, Sliding, body_resources, choose_solvers
-from fenwear.assembly.resources import condensed
+from fenwear.assembly import Bodies, Resources, Sliding, setup_resources
 from fenwear.bodies.creep import Retardation
 from fenwear.bodies.operators import SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
@@ -138,12 +137,12 @@ class StickInterface(OppositeBodies):
             check_distance(middle)
         onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
         self.patterns = middle.punch.spread, onto
+        self.needs = self._needs(len(middle.weights), onto.shape[1])
         if condensed is None:
-            self.needs = choose_solvers([bodies], self._needs(len(middle.weights), onto.shape[1]))
+            self.needs.check()
             wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
             self.punch, self.strip = operators_for(wanted, keep=keep, fresh=fresh)
         else:
-            self.needs = self._needs(len(middle.weights), onto.shape[1])
             self.punch, self.strip = condensed
         self.creep = self._creep()
         self._positions = {0.0: self._position(middle)}
@@ -159,10 +158,8 @@ class StickInterface(OppositeBodies):
         """
         d, both = self.dim, self.bodies
         positions = 1 + (steps_of(self.case) if self.moves and self.case is not None else 0)
-        punch, strip = (
-            body_resources(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
-        )
-        return Resources(punch, strip, nodes, positions * d, d**2, both.comm.size, condensed(both))
+        asked = (nodes, d * nodes), (on_strip, d * on_strip)
+        return setup_resources(both, nodes, asked, positions * d**2 + 2 * d**2 + 1)
 
     def _creep(self) -> StickCreep | None:
         """Return what creeps; None where nothing does; collective."""

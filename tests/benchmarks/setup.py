@@ -38,7 +38,7 @@ PHASES = {  # what is looked at, by modules and functions that do not call one a
     "stiffness": [("assembly.py", "assembled_here"), ("assembly.py", "assembled")],
     "moving it to an owner": [("factor.py", "moved")],
     "elimination": [("factor.py", "_factored")],
-    "joining ranks": [("substructure.py", "send"), ("substructure.py", "receive"), ("substructure.py", "finish")],
+    "joining ranks": [("substructure.py", "join")],
     "columns": [("response.py", "respond_together")],
     "loads": [("condensation.py", "_under_loads")],
 }

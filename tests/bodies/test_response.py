@@ -7,15 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.assembly import place_case
-from fenwear.bodies import factor, response, substructure
+from fenwear.bodies import condensation, factor, response, substructure
 from fenwear.bodies.assembly import times
-from fenwear.bodies.condensation import CondensedBody, condense_together
-from fenwear.bodies.response import Request
+from fenwear.bodies.condensation import CondensedBody
 from fenwear.errors import ConvergenceError
 
 SMALL = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
@@ -33,7 +30,7 @@ def condensed(
 ) -> tuple[Tribosystem, list[CondensedBody]]:
     share, boundary, spread = WAYS[way]
     monkeypatch.setattr(response, "SURFACE_SHARE", share)
-    monkeypatch.setattr(response, "BOUNDARY_SHARE", boundary)
+    monkeypatch.setattr(condensation, "BOUNDARY_SHARE", boundary)
     monkeypatch.setattr(factor, "SPREAD", spread)
     settings = SMALL if name.startswith("example") else BALL if name.startswith("ball") else ()
     system = assemble(load_case(name, (*settings, *changes)), heat="none")
@@ -87,42 +84,11 @@ def test_each_rank_has_the_same_bits(way: str, monkeypatch: pytest.MonkeyPatch) 
             assert len(set(system.comm.allgather(values.tobytes()))) == 1
 
 
-@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
-@pytest.mark.parametrize("name", ["example1-heat", "ball-on-flat"])
-@pytest.mark.mpi
-def test_who_solves_for_a_column_does_not_matter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All ranks hold the factor of one body, or one does: the same to the last bit, in as many solutions."""
-    monkeypatch.setattr(response, "BLOCK", 5)
-    settings = SMALL if name.startswith("example") else BALL
-    solved: list[int] = []
-    solve = factor.Factor.solve_sparse
-    monkeypatch.setattr(factor.Factor, "solve_sparse", lambda self, rows: (solved.append(1), solve(self, rows))[1])
-    found = []
-    for holders in (1, MPI.COMM_WORLD.size):
-        placed = place_case(load_case(name, (*settings, "setup.way=columns")))
-        strip, heat = placed.bodies.strip, placed.bodies.heat
-        strip.holders = holders
-        coupling = None if heat is None else strip.thermal_coupling(heat[1].space)
-        normals = np.broadcast_to(np.eye(strip.dim)[-1], strip.surface.x.shape)
-        mine = None if heat else np.arange(placed.comm.rank, len(normals), placed.comm.size)  # ranks share the response
-        solved.clear()
-        (one,) = condense_together([Request(strip, strip.surface.spread, normals, coupling, mine)])
-        shares = placed.comm.allgather(len(solved))
-        assert sum(shares) == -(-len(strip.surface.x) // 5)
-        assert sum(share > 0 for share in shares) == holders
-        assert max(shares) - min(shares) <= 1 or holders == 1
-        found.append((one, strip.solve(strip.load)))
-    (one, displacement), (other, same) = found
-    for name_of, values in one.arrays().items():
-        np.testing.assert_array_equal(values, other.arrays()[name_of])
-    np.testing.assert_array_equal(displacement, same)
-
-
 @pytest.mark.parametrize("way", ["substructures", "columns"])
 def test_one_factor_for_the_loads_of_all_phases(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bodies that differ by their loads share it, whichever is asked first."""
     made: list[object] = []
-    for kind, name in ((factor.Factor, "compute"), (substructure.Substructures, "eliminate")):
+    for kind, name in ((factor.Factor, "compute"), (substructure.Substructures, "compute")):
         compute = getattr(kind, name)
         monkeypatch.setattr(kind, name, lambda self, compute=compute: (made.append(self), compute(self))[1])
     table = "[[0, 0.5], [0.5, 1], [1, 0.5]]"
@@ -136,7 +102,7 @@ def test_substructures_solve_for_any_forces(name: str, monkeypatch: pytest.Monke
     """Inside, on the boundaries between ranks and on supports: K times the solution is the forces again."""
     system, _ = condensed(name, "substructures", monkeypatch)
     for body in (system.bodies.punch, system.bodies.strip):
-        assert body.substructures is not None
+        assert isinstance(body.factor, substructure.Substructures) == (system.comm.size > 1)
         first, last = body.stiffness.getOwnershipRange()
         forces = np.sin(np.outer(np.arange(first, last), (1.0, 2.0)))
         forces[body.supported] = 0.0
@@ -158,12 +124,12 @@ def test_a_body_without_a_factor_is_told_on_every_rank(
 
     def fails(self: factor.Factor) -> None:
         self.is_made = True
-        if self.is_here:
+        if self.answers:
             raise ConvergenceError("no factor")
 
     monkeypatch.setattr(factor.Factor, "compute", fails)
     for owner in range(system.comm.size):
         matrix = system.bodies.punch.stiffness
-        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.comm, dim=2, holders=(owner,))
+        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.comm, dim=2, owner=owner)
         with pytest.raises(ConvergenceError, match="no factor"):
             factor.make_together([one])

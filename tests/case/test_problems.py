@@ -27,10 +27,6 @@ def problems(*settings: str, name: str = "example1-heat") -> list[str]:
         ("heat=3", "heat: expected a table, got 3"),
         ("heat.ambient=[1]", "heat.ambient: expected a number or a string with a unit such as '1 K', got a list"),
         ("heat.convecting_faces=maybe", "heat.convecting_faces: expected true or false, got 'maybe'"),
-        ("setup.way=elimination", "setup.way: expected one of 'automatic', 'columns', 'low-rank', 'multigrid' with "
-                                  "heat: temperatures act inside the bodies"),
-        ("setup={reproducible = true, way = 'multigrid'}", "setup.reproducible: expected another way than 'multigrid', "
-                                                           "whose sums go over the ranks"),
         ("run.half_cycles=true", "run.half_cycles: expected a whole number, got true"),
         ("punch.loads=x", "punch.loads: expected a list, got 'x'"),
         ("punch.loads.0.force=[1]", "punch.loads.0.force: expected at least 2 entries, got 1"),

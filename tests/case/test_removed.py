@@ -20,3 +20,9 @@ def test_a_removed_key_or_word_says_what_takes_its_place(monkeypatch: pytest.Mon
         with pytest.raises(CaseError) as refused:
             load_case("example1", [setting])
         assert str(refused.value).splitlines() == [f"{key}: removed. Set `run.other`."]
+
+
+def test_removed_keys_of_the_set_up() -> None:
+    """They were in case files once."""
+    with pytest.raises(CaseError, match=r"^setup.way: removed\. Leave it out"):
+        load_case("example1", ["setup.way=multigrid"])

@@ -60,15 +60,27 @@ If(layer > 0 && disc_height / whole > layer)
 EndIf
 growths[] = {growth, top_growth};
 
+// How far the circles of the margins lie from the pad.
+beside[] = {0};
+For k In {1 : margin_elements}
+  beside[] += (margin_growth == 1) ? margin * k / margin_elements
+              : margin * (margin_growth^k - 1) / (margin_growth^margin_elements - 1);
+EndFor
+
 For body In {0 : 1}
   // Radii and angles of the grid, and the elements between them.
   x[] = {}; y[] = {}; nx[] = {}; ny[] = {};
+  // In the margins each element has lines of its own: those of order 2 then follow their circles.
   If(body == 1 && margin > 0)
-    x[] += {inner_radius - margin}; nx[] += margin_elements;
+    For k In {0 : margin_elements - 1}
+      x[] += {inner_radius - beside[margin_elements - k]}; nx[] += 1;
+    EndFor
   EndIf
   x[] += {inner_radius, outer_radius}; nx[] += across;
   If(body == 1 && margin > 0)
-    x[] += {outer_radius + margin}; nx[] += margin_elements;
+    For k In {1 : margin_elements}
+      x[] += {outer_radius + beside[k]}; nx[] += 1;
+    EndFor
   EndIf
   If(body == 1 && margin_angle > 0)
     y[] += {-angle / 2 - margin_angle}; ny[] += margin_elements;
@@ -102,10 +114,8 @@ For body In {0 : 1}
         l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + 1 + mx * (j + my * k)]};
         If(x[i] == inner_radius && edge_grading != 1)
           Transfinite Curve{l} = nx[i] + 1 Using Bump 1 / edge_grading;
-        ElseIf(x[i] == inner_radius)
-          Transfinite Curve{l} = nx[i] + 1;
         Else
-          Transfinite Curve{l} = nx[i] + 1 Using Progression (x[i] < inner_radius) ? 1 / margin_growth : margin_growth;
+          Transfinite Curve{l} = nx[i] + 1;
         EndIf
         lx[] += l;
       EndFor

@@ -12,12 +12,18 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from fenwear.case.reading import builtin_cases, make_case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
+
+if TYPE_CHECKING:
+    import jinja2
 
 BETWEEN = "\n+++\n"
 REMARK = re.compile(r"^([^#\n]*\S) {2,}(# .*)$", re.MULTILINE)  # behind a key, put in line with the others
@@ -29,7 +35,7 @@ class Dimension:
     """A number that a template asks for.
 
     Attributes:
-        value: The usual one, as a case file has it.
+        value: The usual one, as a case file has it; or how it follows from those above it, for jinja2.
         unit: It is converted to, and read in where it has none; "" for a pure number.
         about: What it is, and whose value.
     """
@@ -97,22 +103,36 @@ def fill_in(template: Template, settings: Sequence[str] = ()) -> str:
     Raises:
         CaseError: a dimension that it does not have, or a value that is none; lists all.
     """
-    import jinja2
-
-    given: dict[str, str | float] = {name: one.value for name, one in template.dimensions.items()}
+    given: dict[str, str | float] = {}
     problems = []
     for setting in settings:
-        name, equals, text = setting.partition("=")
-        name = name.strip()
-        if not equals or name not in given:
+        name, equals, text = (part.strip() for part in setting.partition("="))
+        if not equals or name not in template.dimensions:
             problems.append(InputError("--set", _unknown(template, setting)))
             continue
         try:
-            given[name] = _checked(text.strip().strip("\"'"), template.dimensions[name].unit)
+            given[name] = _checked(text.strip("\"'"), template.dimensions[name].unit)
         except ValueError as error:
             problems.append(InputError(f"--set {name}", str(error)))
     if problems:
         raise CaseError(problems)
+    text = _environment().from_string(template.text).render(values(template, given))
+    return REMARK.sub(lambda found: f"{found[1]:<{COLUMN - 2}}  {found[2]}", text)
+
+
+def values(template: Template, given: Mapping[str, str | float] = MappingProxyType({})) -> dict[str, str | float]:
+    """Return the values of all dimensions of a template: the given ones, and the usual ones of the rest."""
+    found: dict[str, str | float] = {}
+    for name, one in template.dimensions.items():
+        usual = _environment().from_string(one.value).render(found) if isinstance(one.value, str) else one.value
+        found[name] = given.get(name, usual)
+    return found
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    import jinja2
+
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False, keep_trailing_newline=True)
     environment.globals.update(
         pi=math.pi,
@@ -121,8 +141,7 @@ def fill_in(template: Template, settings: Sequence[str] = ()) -> str:
         whole=lambda value: max(1, round(value)),
         g=lambda value: f"{value:.10g}",
     )
-    text = environment.from_string(template.text).render(given)
-    return REMARK.sub(lambda found: f"{found[1]:<{COLUMN - 2}}  {found[2]}", text)
+    return environment
 
 
 def _checked(text: str, unit: str) -> str | float:
@@ -161,7 +180,8 @@ def dimensions_text(name: str) -> str:
     Raises:
         CaseError: there is no such template.
     """
-    return "\n".join(f"{k:18} {d.value!s:>10}  {d.about}" for k, d in find_template(name).dimensions.items())
+    template = find_template(name)
+    return "\n".join(f"{k:18} {v!s:>10}  {template.dimensions[k].about}" for k, v in values(template).items())
 
 
 def write_case_of(name: str, path: Path, settings: Sequence[str] = ()) -> None:

@@ -35,12 +35,24 @@ PerfectOrConductance = Annotated[
 class Track(Part):
     """The rest of a disc or ring whose material passes under the punch, warms up and comes back."""
 
-    heat_capacity: Annotated[float, *quantity("N*mm/K"), Field(gt=0)] = Field(
-        description="of what is not meshed, its mass times c; 1 J/K = 1000"
+    volume: Annotated[float, *quantity("mm^3"), Field(ge=0)] = Field(
+        default=0.0, description="of what is not meshed: its heat capacity is that of the strip's material"
+    )
+    area: Annotated[float, *quantity("mm^2"), Field(ge=0)] = Field(
+        default=0.0, description="of its free surface, which loses heat by heat.convection"
+    )
+    heat_capacity: Annotated[float, *quantity("N*mm/K"), Field(ge=0)] = Field(
+        default=0.0, description="of what is not meshed, in place of volume; 1 J/K = 1000"
     )
     loss: Annotated[float, *quantity("N*mm/(s*K)"), Field(ge=0)] = Field(
-        default=0.0, description="to the surroundings, its area times h; 1 W/K = 1000"
+        default=0.0, description="to the surroundings, beside that of area; 1 W/K = 1000"
     )
+
+    @model_validator(mode="after")
+    def _one_capacity(self) -> Track:
+        if (self.volume > 0) == (self.heat_capacity > 0):
+            raise ValueError("expected either volume or heat_capacity, above zero")
+        return self
 
 
 class Heat(Part):

@@ -35,6 +35,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor, factored
 from fenwear.bodies.material import measure
 from fenwear.case import Body, Heat, Kind
+from fenwear.case.thermal import Track
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.material import ConductionLaw
 from fenwear.interface.placement import ZERO
@@ -167,6 +168,15 @@ class HeatBody:
     def on_free_boundary(self, integrand: Any) -> Any:
         """Return the form of an integral over the free boundary, per thickness."""
         return self._ds(integrand, FREE)
+
+    def bulk(self, track: Track) -> tuple[float, float]:
+        """Return the heat capacity (mJ/K) and the loss (mW/K) of a closed track beyond the mesh; collective."""
+        capacity = track.heat_capacity
+        if track.volume:
+            parts = [fem.assemble_scalar(fem.form(self._dx(value))) for value in (self.law.capacity, 1.0)]
+            stored, volume = total(self.body.mesh.comm, np.array(parts, dtype=float))
+            capacity = track.volume * float(stored / volume)
+        return capacity, track.loss + track.area * self.heat.convection
 
     def _dx(self, integrand: Any) -> Any:
         return self._measure * integrand * ufl.dx(self.body.mesh, metadata=self._quadrature)

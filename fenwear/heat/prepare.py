@@ -339,7 +339,7 @@ def _on_track(
     entering = unit_step.entering / abs(fastest)
     unit_step.free()
     fluxes, flow = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], entering.sum()]))
-    away = track.heat_capacity / thickness / (flow * abs(fastest))
+    away = body.bulk(track)[0] / thickness / (flow * abs(fastest))
     section = section_modes(body, around.sliding, float(np.sign(fastest)), away)
     steady = body.step(fastest, np.inf, around, at_once=True)
     heated = steady.respond(inflow @ (trial.entering[-1][:, :2]))  # even, and growing along the contact

@@ -87,7 +87,7 @@ class TrackField:
         self._inlets = modes + 1
         comm, lift, columns = body.body.mesh.comm, inner.basis.lift, inner.basis.columns
         self.basis = TrackBasis(body, lift, columns, reference, modes, CELLS)
-        self.capacity, self.loss = track.heat_capacity / thickness, track.loss / thickness
+        self.capacity, self.loss = (value / thickness for value in body.bulk(track))
         read = total(comm, section.leaving.T @ np.column_stack([columns, lift - reference]))
         lost = np.tile(np.append(np.zeros(modes), self.loss / CELLS * (reference - body.heat.ambient)), CELLS)
         self._couplings: list[_Coupling] = []

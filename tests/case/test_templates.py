@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from fenwear import assemble, jump, load_case, make_case, march, steady
-from fenwear.case.templates import fill_in, find_template, template_names, write_case_of
+from fenwear.case.templates import fill_in, find_template, template_names, values, write_case_of
 from fenwear.errors import CaseError
 
 USUAL = [
@@ -55,8 +55,7 @@ def test_reads_and_explains(name: str) -> None:
 @pytest.mark.parametrize(("name", "setting"), [(n, d) for n in USUAL for d in find_template(n).dimensions])
 def test_every_dimension_counts(name: str, setting: str) -> None:
     """Another value makes another case."""
-    usual = find_template(name).dimensions[setting]
-    value = str(usual.value)
+    value = str(values(find_template(name))[setting])
     number, _, unit = value.partition(" ")
     other = f"{float(number) * 0.9:g} {unit}".strip() if setting not in ("revolutions", "turns", "cycles") else "777"
     assert case_of(name, f"{setting}={other}") != case_of(name)
@@ -168,6 +167,51 @@ def test_ring_wears_over_its_circumference() -> None:
     depth = last.wear_strip[-1]
     assert np.ptp(depth) < 1e-12 * depth.max()
     assert 2 * np.pi * radius * depth.max() == pytest.approx(0.1 * (system.pair.weights @ last.wear[-1]), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["upper_diameter=0.45 mm", "lower_diameter=0.45 mm"],
+        ["upper_diameter=0.45 mm", "lower_diameter=0.45 mm", "contact_width=0.25 mm"],
+        ["lower_diameter=0.45 mm"],
+        ["upper_diameter=20 mm", "lower_diameter=0.5 mm", "contact_width=0.3 mm"],
+    ],
+)
+def test_thin_wires_are_meshed(settings: list[str]) -> None:
+    """The flat is narrower than the wire, whatever its diameter and the width of the contact (issue 51, line 24)."""
+    tables = tomllib.loads(fill_in(find_template("crossed-cylinders"), settings))
+    tables["geometry"]["degree"] = 1
+    tables["geometry"]["parameters"] |= {"across": 12, "core": 0, "core_elements": 0}
+    system = assemble(make_case(tables))
+    mesh = system.bodies.strip.body.mesh
+    assert np.ptp(mesh.geometry.x[:, 1]) < 2 * make_case(tables).geometry.parameters["flat_radius"]
+
+
+def test_a_narrow_margin_of_a_disc_is_meshed() -> None:
+    """Elements beside a pad with a margin of 4 mm follow their circles: none is twisted (issue 51, line 24)."""
+    tables = tomllib.loads(fill_in(find_template("brake-pad"), ["inner_radius=76.5 mm", "outer_radius=113.5 mm"]))
+    tables["geometry"]["degree"] = 1
+    tables["geometry"]["parameters"] |= {"margin": 4, "along": 4, "across": 4}
+    assemble(make_case(tables), heat="none")
+
+
+def test_a_track_has_the_capacity_of_its_material() -> None:
+    """An edited material changes the rest of the disc as well (issue 51, line 24): volume times rho c, area times h."""
+    tables = tomllib.loads(fill_in(find_template("brake-pad")))
+    tables["geometry"]["degree"] = 1
+    tables["geometry"]["parameters"] |= {"along": 2, "across": 2, "pad_layers": 1, "disc_layers": 1}
+    track = make_case(tables).heat.track
+    for capacity in ("500 J/(kg*K)", "900 J/(kg*K)"):
+        tables["materials"]["iron"]["heat_capacity"] = capacity
+        case = make_case(tables)
+        heat = assemble(case, heat="reduced").bodies.heat[1]
+        stored, lost = heat.bulk(case.heat.track)
+        assert stored == pytest.approx(7.2e-6 * 1e3 * float(capacity.split()[0]) * track.volume, rel=1e-6)
+        assert lost == pytest.approx(0.05 * track.area)
+    for wrong in ({}, {"volume": "1 mm^3", "heat_capacity": "1 J/K"}):
+        with pytest.raises(CaseError, match="either volume or heat_capacity"):
+            make_case({**tables, "heat": {**tables["heat"], "track": wrong}})
 
 
 def test_crossed_cylinders_touch_in_hertz_ellipse() -> None:

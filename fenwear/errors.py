@@ -39,6 +39,10 @@ class ConvergenceError(FenwearError):
     """A solver did not converge; names the solver, the reason and what may help."""
 
 
+class CoefficientError(CaseError, ConvergenceError):
+    """A coefficient is not finite or too small at a state: the case is wrong, or the state is only an iterate."""
+
+
 class HeatError(ConvergenceError):
     """Temperatures that no friction and no boundary can make: the heat, not the contact, has failed."""
 

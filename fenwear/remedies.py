@@ -13,6 +13,7 @@ SOFTER_START = "contact solved by way of softer bodies"
 PIVOTS = "contact solved by pivots"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
+MARCHED = "cycle marched in place of a jump"
 NONE: Counter[str] = Counter()
 GRAZING = "nodes conduct whose pressure tends to nothing"
 

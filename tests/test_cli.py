@@ -18,6 +18,7 @@ from fenwear import Tribosystem, steady
 from fenwear.case import Dependence, builtin_cases
 from fenwear.cli.states import steady_command
 from fenwear.cycle import RunningIn
+from fenwear.errors import HeatError
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -81,6 +82,22 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     assert "after about 7 ± 1 cycles" in rest
     assert "196.0 s in all: " in rest
     assert "the way there 196.0 s" in rest
+
+
+def test_steady_that_is_found_is_reported_whatever_follows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The state is printed, also as JSON; that the way to it failed is a warning."""
+
+    def failing(*_arguments: object) -> RunningIn:
+        raise HeatError("too hot by far")
+
+    monkeypatch.setattr("fenwear.cycle.running_in", failing)
+    steady_command("example2", list(options()[1::2]), as_json=True)
+    out, err = capsys.readouterr()
+    assert max(json.loads(out)["pressure_plus"]) == pytest.approx(100 / 3, rel=1e-3)
+    assert json.loads(out)["cycles_to_1_percent"] is None
+    assert "too hot by far" in err
 
 
 def test_check_doubts(fenwear: Run) -> None:

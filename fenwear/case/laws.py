@@ -15,7 +15,7 @@ from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression
 from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
 from fenwear.case.quantities import Force, Hardness, Length, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, CoefficientError, InputError
 
 
 class OfState(Part):
@@ -170,7 +170,8 @@ class Dependence(OfState):
             effect: The function of the pressure that the coefficient multiplies; by default the pressure.
 
         Raises:
-            CaseError: it is less than `least` or not finite somewhere.
+            CaseError: a law fails.
+            CoefficientError: it is less than `least` or not finite somewhere.
         """
         if self.regions is not None:
             values = self._of_regions(state, shape, effect)
@@ -186,7 +187,7 @@ class Dependence(OfState):
             named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
             wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
-            raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
+            raise CoefficientError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values if factor == 1 else values * factor
 
     def _of_regions(self, state: Mapping[str, Any], shape: tuple[int, ...], effect: Callable[[Array], Array]) -> Array:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 import sys
 import time
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from fenwear.case import Case, plausibility_warnings
 from fenwear.case.program import held_at
 from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
     from fenwear.cycle import RunningIn, SteadyState
 
 
+T = TypeVar("T")
 StepOption = Annotated[
     int | None,
     typer.Option(
@@ -78,11 +80,15 @@ def steady_command(
         log(f"warning: {warning}")
     if not as_json:
         _print_steady(case, found, state, of_step[1] if of_step else "")
-    uncertain = _uncertain(state) if accuracy else {}
+    uncertain: dict[str, Any] = {}
+    if accuracy:
+        uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), uncertain)
     way = time.perf_counter()
-    rate = growth_rate(found, state)
+    rate = _unless_failed("its stability", lambda: growth_rate(found, state), math.nan)
     short = len(found.motion.phases) <= FOLLOWED
-    cycles = running_in(found, state, 0.01) if rate < 0 and short else None
+    cycles = None
+    if rate < 0 and short:
+        cycles = _unless_failed("the way there", lambda: running_in(found, state, 0.01), cycles)
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     if not as_json:
         _print_way(rate, short, cycles, seconds, time.perf_counter() - begin)
@@ -100,7 +106,7 @@ def steady_command(
             "temperature_strip": None if state.heat is None else degrees.of(state.heat.strip[-1]).tolist(),
             "temperature_unit": None if state.heat is None else degrees.unit,
             "property_passes": state.passes,
-            "growth_rate_per_s": rate,
+            "growth_rate_per_s": None if math.isnan(rate) else rate,
             "complementarity_error": state.complementarity_error,
             "heat_gain": gain,
             "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
@@ -114,6 +120,15 @@ def steady_command(
             "warnings": warnings,
         }
     )
+
+
+def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
+    """Return what is computed from a state that is found, or what stands for it where that fails; collective."""
+    try:
+        return compute()
+    except (CaseError, ConvergenceError) as error:
+        log(f"warning: the state is found, {name} is not: {error}")
+        return missing
 
 
 def _uncertain(state: SteadyState) -> dict[str, Any]:
@@ -192,7 +207,9 @@ def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str)
 
 def _print_way(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float], in_all: float) -> None:
     """Print how the state is reached, and where the time went."""
-    if rate > 0:
+    if math.isnan(rate):
+        show("  its stability and the way there are not known, see the warning")
+    elif rate > 0:
         show(
             f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state; "
             "it may be one of several"
@@ -200,7 +217,7 @@ def _print_way(rate: float, followed: bool, cycles: RunningIn | None, seconds: d
     elif not followed:
         show('  the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so')
     elif cycles is None:
-        show("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
+        show("  pressure within 1 % of the pressure scale: not found within ten million cycles from the initial shape")
     else:
         digit = 10 ** math.floor(math.log10(max(cycles.uncertainty, 1)))  # no more are known
         number, wrong = (digit * round(one / digit) for one in (cycles.cycles, cycles.uncertainty))

@@ -42,6 +42,7 @@ from fenwear.assembly.variants import same_conduction
 from fenwear.case import Case
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat
 from fenwear.cycle.driver import Loading, Watch
+from fenwear.cycle.jump_error import Estimate
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
@@ -49,7 +50,7 @@ from fenwear.cycle.state import RunState, carried_by, known_pressures
 from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
-from fenwear.remedies import SHORTER_JUMPS
+from fenwear.remedies import MARCHED, SHORTER_JUMPS
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
@@ -108,11 +109,32 @@ class Jumps:
     def __init__(self, stepper: Stepper, tolerance: float) -> None:
         self.stepper, self.tolerance = stepper, tolerance
         self.system = stepper.system
+        self._half_cycles: HalfCycles | None = None
         stepper.system.team.serve(self)
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
         return self.stepper.beginning()
+
+    def prepare(self) -> None:
+        """Make the steps of half-cycles; collective."""
+        self._half_cycles = HalfCycles(self.system, self.stepper.watch, self.stepper.loading, implicit=True)
+
+    def _marched(self, state: RunState) -> tuple[RunState, Estimate, list[HalfCycle]]:
+        """Return the state after one cycle of half-cycles, an estimate that says nothing of its error, and its record.
+
+        Raises:
+            ConvergenceError: a half-cycle did not converge.
+        """
+        if self._half_cycles is None:
+            self.system.team.each(self, "prepare")
+        assert self._half_cycles is not None
+        after, recorded = state, list[HalfCycle]()
+        for _ in range(self.system.motion.half_cycles):
+            after, own = self._half_cycles(after, after.half_cycle + 1)
+            recorded += own
+        self.system.remedies.note(MARCHED)
+        return after, Estimate(np.inf, np.inf, np.inf), recorded
 
     def change(self, temperature: HeatState | None) -> float:
         """Return the largest change of a property at temperatures; collective."""
@@ -128,11 +150,11 @@ class Jumps:
             try:
                 end, estimate, recorded = stepper.attempt(state, tried)
             except ConvergenceError:
-                if tried == 1:
-                    raise
-                stepper.system.remedies.note(SHORTER_JUMPS)
-                length = max(1, tried // 4)
-                continue
+                if tried > 1:
+                    stepper.system.remedies.note(SHORTER_JUMPS)
+                    length = max(1, tried // 4)
+                    continue
+                end, estimate, recorded = self._marched(state)
             if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
                 length = max(1, tried // 2)
                 continue

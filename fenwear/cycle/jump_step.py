@@ -48,13 +48,11 @@ from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
 from fenwear.layers import Evolution
-from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import NOTHING, WornDepths
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
-PARTS = 8  # of a cycle that does not converge as a whole
 ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which the stages of a jump are solved, and its end
 LOOSEST = 5e-3  # tolerance that these are of: contact of a rough run, too, is told to fulfil its conditions
 
@@ -181,48 +179,38 @@ class Stepper:
         """Return the state `cycles` cycles later, by two steps, an estimate of its error, and the last cycle.
 
         Raises:
-            ConvergenceError: it did not converge; a single cycle not in smaller steps either.
+            ConvergenceError: it did not converge.
         """
-        try:
-            known, self._half, self._whole = self._half, None, None
-            if known is None or known[0] is not state:
-                known = None
-            trend = _Trend() if known is None else known[3].copy()
-            half = self.step(state, cycles / 2, near=trend)
-            self._half = (state, cycles / 2, half, trend.copy())
-            whole = None if known is None or known[1] != cycles else known[2]
-            comes = _comes(state, half, half)
-            if whole is None and not comes:  # else begun near the halves, whose steps are not as long
-                whole = self.step(state, cycles, near=trend.copy())
-            comes = comes or (whole is not None and _comes(state, half, whole))
-            last = LAST * cycles if comes else 0.0
-            halves = self.step(half, cycles / 2 - last, cycles / 2, trend, ROUGH if comes else FINE)
-            if comes:
-                halves = self._last_step(halves, last, cycles - last, trend)
-            recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
-            if whole is None:
-                whole = self.step(state, cycles, near=trend.copy())
-            estimate, bent = estimated(self.system, state, whole, halves), None
-            if comes:
-                first, second = half.worn - state.worn, whole.worn - half.worn
-                # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
-                bent = (second - first).times(2 * LAST**2)
-                share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
-                estimate = replace(estimate, depth=max(estimate.depth, share))
-            self._whole = whole, trend, bent
-            if self._follows:
-                missed = self._missed(state, half, halves, cycles)
-                estimate = replace(estimate, depth=max(estimate.depth, missed))
-            return halves, estimate, recorded
-        except ConvergenceError as error:
-            if cycles > 1:
-                raise
-            try:
-                parts = self.steps(state, cycles, PARTS)
-            except ConvergenceError:
-                raise error from None
-            self.system.remedies.note(SMALLER_STEPS.format(PARTS))
-            return parts, Estimate(np.inf, np.inf, np.inf), self._last_cycle(state, parts, cycles)
+        known, self._half, self._whole = self._half, None, None
+        if known is None or known[0] is not state:
+            known = None
+        trend = _Trend() if known is None else known[3].copy()
+        half = self.step(state, cycles / 2, near=trend)
+        self._half = (state, cycles / 2, half, trend.copy())
+        whole = None if known is None or known[1] != cycles else known[2]
+        comes = _comes(state, half, half)
+        if whole is None and not comes:  # else begun near the halves, whose steps are not as long
+            whole = self.step(state, cycles, near=trend.copy())
+        comes = comes or (whole is not None and _comes(state, half, whole))
+        last = LAST * cycles if comes else 0.0
+        halves = self.step(half, cycles / 2 - last, cycles / 2, trend, ROUGH if comes else FINE)
+        if comes:
+            halves = self._last_step(halves, last, cycles - last, trend)
+        recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
+        if whole is None:
+            whole = self.step(state, cycles, near=trend.copy())
+        estimate, bent = estimated(self.system, state, whole, halves), None
+        if comes:
+            first, second = half.worn - state.worn, whole.worn - half.worn
+            # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
+            bent = (second - first).times(2 * LAST**2)
+            share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
+            estimate = replace(estimate, depth=max(estimate.depth, share))
+        self._whole = whole, trend, bent
+        if self._follows:
+            missed = self._missed(state, half, halves, cycles)
+            estimate = replace(estimate, depth=max(estimate.depth, missed))
+        return halves, estimate, recorded
 
     def finer(self, state: RunState, fine: RunState, end: RunState, cycles: int) -> RunState:
         """Return where jumps of next to no length lead, from where they had led before the last attempt.
@@ -301,12 +289,6 @@ class Stepper:
         if evolution is not None:
             conditions = evolution.around(system.layers.held(state.worn))
         return system.wear.phases(conditions).begun(state.worn).worn(pressures)
-
-    def steps(self, state: RunState, cycles: float, count: int) -> RunState:
-        """Return the state `cycles` cycles later, by that many equal steps."""
-        for number in range(count):
-            state = self.step(state, cycles / count, number * cycles / count, digits=FINE)
-        return state
 
     def _solve_to(self, share: float) -> None:
         """Solve contact to a share of the tolerance, where its digits cost."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +15,9 @@ from fenwear.errors import StackError
 QuantitiesOption = Annotated[
     list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
 ]
+OutputOption = Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")]
+OnlyOption = Annotated[list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")]
+ListOption = Annotated[bool, typer.Option("--list", help="Print the names of the cases and end.")]
 KeysOption = Annotated[
     list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
 ]
@@ -22,22 +25,18 @@ KeysOption = Annotated[
 
 @app.command("verify")
 def verify_command(
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
-    only: Annotated[
-        list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")
-    ] = [],  # noqa: B006
-    list_cases: Annotated[bool, typer.Option("--list", help="Print the names of the cases and end.")] = False,
+    output: OutputOption = None,
+    only: OnlyOption = [],  # noqa: B006
+    list_cases: ListOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
-    choose, titles, verify = _verification()
-    cases, paper = choose(only)
+    verification = _beside("command")
+    cases, paper = verification.choose(only)
     if list_cases:
-        for name, title in titles().items():
-            if not only or name in only:
-                show(f"{name:24} {title}")
+        _show_titles(verification.titles(), only)
         return
-    found, directory = verify(cases, paper, output, log if as_json else print)
+    found, directory = verification.verify(cases, paper, output, log if as_json else print)
     page = f"page in {directory}/verification.html"
     if as_json:
         show_results(found, page)
@@ -48,8 +47,34 @@ def verify_command(
         raise typer.Exit(1)
 
 
-def _verification() -> tuple[Callable[..., Any], Callable[[], dict[str, str]], Callable[..., Any]]:
-    """Return what the package beside this one offers: it is installed, or in the checkout that this one is run from.
+@app.command("validate")
+def validate_command(
+    output: OutputOption = None,
+    only: OnlyOption = [],  # noqa: B006
+    list_cases: ListOption = False,
+    short: Annotated[bool, typer.Option("--short", help="On coarse meshes: a fifth of the time.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute measured experiments and compare: numbers with their uncertainty, and a figure of each."""
+    gallery = _beside("validation.command")
+    if list_cases:
+        _show_titles(gallery.titles(), only)
+        return
+    found, directory = gallery.validate(only, output, log if as_json else print, "short" if short else "full")
+    if as_json:
+        show_results(found, f"figures in {directory}")
+    else:
+        log(f"figures in {directory}")
+
+
+def _show_titles(titles: dict[str, str], only: list[str]) -> None:
+    for name, title in titles.items():
+        if not only or name in only:
+            show(f"{name:24} {title}")
+
+
+def _beside(module: str) -> Any:
+    """Return a module of the package beside this one: it is installed, or in the checkout that this one is run from.
 
     Raises:
         StackError: it is neither.
@@ -58,12 +83,12 @@ def _verification() -> tuple[Callable[..., Any], Callable[[], dict[str, str]], C
     if beside.is_dir():
         sys.path.append(str(beside))
     try:
-        from fenwear_verify.command import choose, titles, verify
+        return import_module(f"fenwear_verify.{module}")
     except ModuleNotFoundError as error:
         if error.name != "fenwear_verify":
             raise
-        raise StackError('verify: the problems of known answer are missing: pip install "fenwear[verify]"') from error
-    return choose, titles, verify
+        text = 'the package with the problems of verify and validate is missing: pip install "fenwear[verify]"'
+        raise StackError(text) from error
 
 
 @app.command("sensitivity")

@@ -75,6 +75,11 @@ def _code() -> bytes:
     return found.digest()
 
 
+def code_key() -> str:
+    """Return a checksum of what any notebook or experiment may use."""
+    return hashlib.sha256(_code()).hexdigest()
+
+
 def _kept(page: Path) -> str:
     """Return the key under which a notebook was executed, or nothing."""
     try:

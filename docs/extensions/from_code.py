@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
 from docutils import nodes
+from executed import code_key
 from pydantic import BaseModel
 from sphinx.util.docutils import SphinxDirective
 
@@ -18,6 +21,8 @@ from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
 from fenwear.results import history, roughness, sheet, steps, surfaces, table_cycle
 from fenwear_verify.suite import registered
+from fenwear_verify.validation import Experiment, experiments
+from fenwear_verify.validation.command import draw, markdown
 
 
 class Written(SphinxDirective):
@@ -215,6 +220,41 @@ class Verification(Written):
         return _table(("name", "problem", "reference"), rows)
 
 
+class Experiments(Written):
+    """The measured experiments, with their one number each."""
+
+    def lines(self) -> Iterable[str]:
+        """Return one table."""
+        rows = ((f"[{one.title}]({one.name}.md)", _finding(one, self.env)["number"]) for one in experiments())
+        return _table(("experiment", "how far fenwear is from it"), rows)
+
+
+class Measured(Written):
+    """A measured experiment beside its prediction."""
+
+    required_arguments = 1
+    optional_arguments = 0
+
+    def lines(self) -> Iterable[str]:
+        """Return its text, figure and tables."""
+        (one,) = experiments(self.arguments)
+        return _finding(one, self.env)["lines"]
+
+
+def _finding(one: Experiment, env: Any) -> dict[str, Any]:
+    """Return what an experiment comes to on coarse meshes: kept beside its figure until the code changes."""
+    folder = Path(env.srcdir) / "validation" / "made"
+    kept, key = folder / f"{one.name}.json", code_key()
+    if kept.is_file() and (found := json.loads(kept.read_text("utf-8")))["key"] == key:
+        return dict(found)
+    finding = one.compute("short")
+    folder.mkdir(exist_ok=True)
+    (folder / f"{one.name}.png").write_bytes(draw(finding))
+    made = {"key": key, "number": finding.number, "lines": [*markdown(one, finding, f"made/{one.name}.png")]}
+    kept.write_text(json.dumps(made), "utf-8")
+    return made
+
+
 def _as_written(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
     """Make a docstring, which is plain text, the reStructuredText that shows it as it is written."""
     found: list[str] = []
@@ -266,6 +306,8 @@ def setup(app: Any) -> dict[str, bool]:
         ("refusals", Refusals),
         ("geometries", Geometries),
         ("verification", Verification),
+        ("experiment", Measured),
+        ("experiments", Experiments),
     ):
         app.add_directive(name, directive)
     app.connect("autodoc-process-docstring", _as_written, priority=400)

@@ -33,8 +33,8 @@ from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError, OutputError
-from fenwear.files import CAD, MESHES, is_foreign, read_mesh
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
+from fenwear.files.formats import CAD, MESHES, is_foreign, read_mesh
 from fenwear.files.groups import GroupedMesh, grouped, into_gmsh, normal
 from fenwear.files.session import gmsh_model
 from fenwear.memory import check_memory

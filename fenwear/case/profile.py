@@ -9,7 +9,7 @@ from typing import Any
 from fenwear.case.csv_table import read_csv
 from fenwear.errors import CaseError, InputError
 
-COLUMNS = {"x": "mm", "r": "mm", "s": "mm", "y": "mm", "z": "mm", "depth": "mm"}
+COLUMNS = {"x": "mm", "r": "mm", "s": "mm", "y": "mm", "z": "mm", "depth": "mm", "height": "mm"}
 PLACES = (("x",), ("r",), ("s",), ("x", "y"), ("x", "y", "z"))
 BODIES = ("punch", "strip")
 
@@ -39,7 +39,7 @@ def read_profile(path: Path, key: str) -> dict[str, Any]:
     """Return the table of a profile in a CSV file: the points of its rows, mm, and along what they go.
 
     Args:
-        path: Of the file; each heading has its unit, as in "depth (um)".
+        path: Of the file; each heading has its unit, as in "depth (um)"; height is minus the depth.
         key: Of the case, for messages.
 
     Raises:
@@ -47,13 +47,16 @@ def read_profile(path: Path, key: str) -> dict[str, Any]:
     """
     table = read_csv(path, key, COLUMNS, least=2)
     names = table.names
-    places = [name for name in names if name != "depth"]
-    if tuple(sorted(places)) not in PLACES or names.count("depth") != 1:
-        expected = "x and depth, r and depth of rings, s and depth along a curve, or x, y, (z) and depth of solids"
+    places = [name for name in names if name not in ("depth", "height")]
+    if tuple(sorted(places)) not in PLACES or len(places) + 1 != len(names):
+        expected = "x and depth (or height), r and depth of rings, s and depth along a curve, or x, y, (z) and depth"
         raise table.wrong(f"expected the columns {expected}")
-    order = [names.index(name) for name in (*sorted(places), "depth")]
+    order = [names.index(name) for name in sorted(places)]
+    measured = next(k for k, name in enumerate(names) if name not in places)
+    sign = 1.0 if names[measured] == "depth" else -1.0
     along = "arc" if "s" in places else "x"
-    return {"points": [[row[k] for k in order] for row in table.rows], "along": along}
+    points = [[*(row[k] for k in order), sign * row[measured] + 0.0] for row in table.rows]
+    return {"points": points, "along": along}
 
 
 def profile_text(kind: str, profile: Mapping[str, Any]) -> str:

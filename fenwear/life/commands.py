@@ -102,6 +102,8 @@ def run_calibrate(
     """
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    for one in data:
+        log(one.listing)
     _tell_of_stick(case, log, comm)
     found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log)
     folder = _folder(output, "calibrate", name, comm)
@@ -138,10 +140,12 @@ def run_calibrate_each(
     """Calibrate every file alone; write calibration.json with the scatter between them; collective."""
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    for one in data:
+        log(one.listing)
     _tell_of_stick(case, log, comm)
     found = []
     for one in data:
-        log(one.name)
+        log(f"calibrating on {one.name}")
         found.append(calibrate(case, [one], asked, baseline=baseline, comm=comm, progress=log))
     scatter = between(found)
     folder = _folder(output, "calibrate", name, comm)

@@ -17,8 +17,6 @@ follow each other with a column after.
 
 from __future__ import annotations
 
-import csv
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,9 +25,11 @@ from pathlib import Path
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.case import Case, changed_case
+from fenwear.case import Case, Rotation, changed_case
+from fenwear.case.program import cycle_of
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
+from fenwear.files.table import TableError, read_table
 from fenwear.life.noise import Noise
 from fenwear.life.quantities import UNITS, Quantity, of_case, parse_amount
 
@@ -40,7 +40,10 @@ MEASURED = {
 PLACES = {"x": "mm"}
 DIRECTIVES = ("set", "after", "body", "sigma", "density", "scatter")
 LEAST_ROWS = 3
-_HEADING = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*([(\[]\s*(?P<unit>[^)\]]*?)\s*[)\]])?\s*")
+_COUNTED = re.compile(
+    r"(?P<number>[-+]?\d[\d.]*(?:[eE][-+]?\d+)?)\s*(?:(?P<half>half[ _-]?cycles?)|rev(?:olution)?s?|turns?)",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -82,11 +85,13 @@ class DataSet:
         name: Of the file.
         settings: Overrides `key.path=value` of the case it was measured under.
         series: One of each profile and of each column.
+        listing: What was read, in lines.
     """
 
     name: str
     settings: tuple[str, ...]
     series: tuple[Series, ...]
+    listing: str = ""
 
 
 def read_data(path: str | Path, case: Case) -> DataSet:
@@ -110,18 +115,26 @@ def measured_folder() -> Path:
 class _Reader:
     def __init__(self, path: Path, case: Case) -> None:
         self.path, self.case = path, case
-        self.settings: list[str] = []
-        self.directives: dict[str, str] = {}
+        known = [*PLACES, "after", *MEASURED, "sigma"]
+        try:
+            self.table = read_table(path, known, DIRECTIVES)
+            self._check_heads()
+        except TableError as error:
+            raise self._fail(error.where, error.message) from None
+        self.settings = [
+            f"{name.split()[1]}={value}" for _, name, value in self.table.directives if name.startswith("set ")
+        ]
+        self.directives = {name: value for _, name, value in self.table.directives if not name.startswith("set ")}
 
     def _fail(self, where: str, message: str) -> CaseError:
         return CaseError(InputError(f"{self.path}{where and ': ' + where}", message))
 
     def read(self) -> DataSet:
-        rows = self._rows()
-        names, units = self._headings(rows[0][1])
+        names = self.table.names
         body = self._body()
-        columns = self._numbers(names, rows[1:])
-        lines = tuple(line for line, _ in rows[1:])
+        after, counted = self._after()
+        self._without_start(after)
+        lines, after = self.table.lines, after[after != 0] if "after" in names else after
         # Without a standard deviation the scatter of the rows has to tell it.
         least = 1 if "sigma" in {*names, *self.directives} else LEAST_ROWS
         if len(lines) < least:
@@ -130,48 +143,49 @@ class _Reader:
                              f"got {len(lines)}")  # fmt: skip
         measured = [name for name in names if name in MEASURED]
         case = changed_case(self.case, *self.settings) if self.settings else self.case
-        after, counted = self._after(names, units, columns, lines)
         series: list[Series] = []
         for name in measured:
-            values, sigma, quantity = self._measured(name, units, columns, lines, only=len(measured) == 1)
+            values, sigma, quantity = self._measured(name, only=len(measured) == 1)
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", UNITS[quantity], body)
             of_case(wanted, case, str(self.path))
-            x = self._converted("x", units["x"], "mm", columns["x"]) if "x" in names else None
+            x = self._column("x", "mm") if "x" in names else None
             whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity, x))
             if x is not None:
                 series += self._profiles(whole, x)
             else:
                 self._check_rising(after, lines, strictly=True)
                 series.append(whole)
-        return DataSet(self.path.name, tuple(self.settings), tuple(series))
+        return DataSet(self.path.name, tuple(self.settings), tuple(series), self.table.listing())
 
-    def _rows(self) -> list[tuple[int, list[str]]]:
-        """Return heading and rows with their line numbers; take the directives."""
+    def _column(self, name: str, unit: str) -> Array:
+        """Return a column in a unit (n,)."""
         try:
-            text = self.path.read_bytes().decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise self._fail("", f"not a UTF-8 text (byte {error.start})") from None
-        except OSError as error:
-            raise self._fail("", f"cannot be read: {error.strerror}") from None
-        rows: list[tuple[int, list[str]]] = []
-        for number, line in enumerate(text.splitlines(), 1):
-            if line.lstrip().startswith("#"):
-                self._directive(line.lstrip()[1:].strip())
-            elif line.strip():
-                rows.append((number, next(csv.reader([line]))))
-        if not rows:
-            raise self._fail("", "holds nothing; expected a heading such as 'x (mm), depth (um)' and rows of numbers")
-        return rows
+            return self.table.numbers(self.table.names.index(name), unit)
+        except TableError as error:
+            raise self._fail(error.where, error.message) from None
 
-    def _directive(self, text: str) -> None:
-        match = re.fullmatch(r"(?P<name>set\s+\S+|\w+)\s*=\s*(?P<value>.+)", text)
-        if match is None:
-            return  # words for people
-        name, value = match["name"], match["value"].strip()
-        if name.startswith("set"):
-            self.settings.append(f"{name.split()[1]}={value}")
-        elif name in DIRECTIVES:
-            self.directives[name] = value
+    def _without_start(self, after: Array) -> None:
+        """Leave out rows at the start, where nothing has worn.
+
+        Raises:
+            CaseError: such a row has another value than zero.
+        """
+        if "after" not in self.table.names or not (after == 0).any():
+            return
+        for name in (name for name in self.table.names if name in MEASURED and name not in ("friction", "temperature")):
+            values = self._column(name, MEASURED[name])
+            wrong = np.flatnonzero((after == 0) & (values != 0))
+            if len(wrong):
+                row = self.table.lines[int(wrong[0])]
+                message = "expected more than zero, or a zero beside it: nothing has worn before"
+                raise self._fail(f"row {row}, column 'after'", message)
+        kept = np.flatnonzero(after != 0)
+        self.table = replace(
+            self.table,
+            lines=tuple(self.table.lines[k] for k in kept),
+            rows=tuple(self.table.rows[k] for k in kept),
+            left_out=(*self.table.left_out, *(self.table.lines[k] for k in np.flatnonzero(after == 0))),
+        )
 
     def _body(self) -> str:
         default = "strip" if self.case.wear.punch is None else "punch"
@@ -181,82 +195,57 @@ class _Reader:
             raise self._fail("# body", names.told(f"expected punch or strip, got {body!r}"))
         return body
 
-    def _headings(self, cells: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-        """Return the columns' names and units."""
-        names: list[str] = []
-        units: dict[str, str] = {}
-        known = [*PLACES, "after", *MEASURED, "sigma"]
-        for cell in cells:
-            match = _HEADING.fullmatch(cell)
-            if match is None or match["name"] not in known:
-                message = f"not known; expected some of {', '.join(known)}, each with its unit, such as 'depth (um)'"
-                if ";" in cell:
-                    message = "has a semicolon; expected commas between columns, and points in numbers"
-                raise self._fail(f"column {cell.strip()!r}", message)
-            name = match["name"]
-            if name in names:
-                raise self._fail(f"column {name!r}", "given twice")
-            if match["unit"] is None:
-                example = {"x": "mm", "after": "m", "friction": "1", "temperature": "K"}.get(name, "um")
-                raise self._fail(
-                    f"column {name!r}", f"has no unit; expected one in brackets, such as '{name} ({example})'"
-                )
-            names.append(name)
-            units[name] = "" if match["unit"] in ("1", "-") else match["unit"]
+    def _check_heads(self) -> None:
+        """Raise where a column has no unit, or columns do not go together."""
+        for head in self.table.heads:
+            if not head.has_unit:
+                example = {"x": "mm", "after": "m", "friction": "1", "temperature": "K"}.get(head.name, "um")
+                message = f"has no unit; expected one in brackets, such as '{head.name} ({example})'"
+                raise TableError(f"column {head.name!r}", message)
+        names = self.table.names
         measured = [name for name in names if name in MEASURED]
         if not measured:
-            raise self._fail("", f"no measured column; expected one of {', '.join(MEASURED)}")
+            raise TableError("", f"no measured column; expected one of {', '.join(MEASURED)}")
         if "x" in names and (len(measured) > 1 or measured[0] not in ("depth", "height")):
-            raise self._fail("column 'x'", "expected with one column depth or height, and no other measurement")
-        return names, units
+            raise TableError("column 'x'", "expected with one column depth or height, and no other measurement")
 
-    def _numbers(self, names: Sequence[str], rows: Sequence[tuple[int, list[str]]]) -> dict[str, Array]:
-        """Return the columns' numbers, as they stand."""
-        table = np.empty((len(rows), len(names)))
-        for r, (line, cells) in enumerate(rows):
-            if len(cells) != len(names):
-                raise self._fail(f"row {line}", f"expected {len(names)} columns, got {len(cells)}")
-            for c, (name, cell) in enumerate(zip(names, cells, strict=True)):
-                try:
-                    table[r, c] = float(cell)
-                except ValueError:
-                    raise self._fail(
-                        f"row {line}, column {name!r}", f"expected a number, got {cell.strip()!r}"
-                    ) from None
-                if not math.isfinite(table[r, c]):
-                    raise self._fail(f"row {line}, column {name!r}", f"expected a finite number, got {cell.strip()!r}")
-        return {name: table[:, c] for c, name in enumerate(names)}
-
-    def _converted(self, name: str, unit: str, to: str, values: Array) -> Array:
-        try:
-            if not unit and to:
-                raise ValueError(f"expected a unit such as {to}, got a pure number")
-            zero, one = (convert(f"{number} {unit}".strip(), to) for number in (0, 1))
-        except ValueError as error:
-            message = str(error).replace(f"got '0 {unit}'", f"got {unit!r}")  # no row has that number
-            raise self._fail(f"column {name!r}", f"unit: {message}") from None
-        return values * (one - zero) + zero
-
-    def _after(
-        self, names: Sequence[str], units: dict[str, str], columns: dict[str, Array], lines: Sequence[int]
-    ) -> tuple[Array, str]:
-        given = self.directives.get("after")
-        if "after" not in names:
+    def _after(self) -> tuple[Array, str]:
+        given, lines = self.directives.get("after"), self.table.lines
+        if "after" not in self.table.names:
             if given is None:
                 raise self._fail("", "does not say after how much sliding it was measured; expected a column "
                                  "'after (m)' or a line '# after = 3600 m'")  # fmt: skip
-            amount, counted = parse_amount(given, f"{self.path}: # after")
+            amount, counted = self._amount(given, "# after")
             return np.full(len(lines), amount), counted
         if given is not None:
             raise self._fail("# after", "given together with a column after; expected one of them")
-        unit = re.sub(r"^cycles?$", "", units["after"])
-        one, counted = parse_amount(f"1 {unit}".strip(), f"{self.path}: column 'after'")
-        values = columns["after"] * one
-        if (values <= 0).any():
-            row = lines[int(np.flatnonzero(values <= 0)[0])]
+        unit = self.table.heads[self.table.names.index("after")].unit
+        one, counted = self._amount(f"1 {unit}".strip(), "column 'after'")
+        try:
+            values = replace(self.table, heads=tuple(replace(head, unit="") for head in self.table.heads)).numbers(
+                self.table.names.index("after"), ""
+            )
+        except TableError as error:
+            raise self._fail(error.where, error.message) from None
+        values = values * one
+        if (values < 0).any():
+            row = lines[int(np.flatnonzero(values < 0)[0])]
             raise self._fail(f"row {row}, column 'after'", "expected more than zero: nothing has worn before")
         self._check_rising(values, lines, strictly=False)
         return values, counted
+
+    def _amount(self, text: str, where: str) -> tuple[float, str]:
+        """Return an amount of sliding, with what it is; half-cycles and revolutions are numbers of cycles."""
+        match = _COUNTED.fullmatch(text.strip())
+        if match is None:
+            return parse_amount(text, f"{self.path}: {where}")
+        _, slid, halves = cycle_of(self.case)
+        if match["half"]:
+            return parse_amount(f"{float(match['number']) / halves!r}", f"{self.path}: {where}")
+        if not isinstance(self.case.motion, Rotation):
+            message = "counts revolutions, but the strip does not turn. Write cycles, a distance or a time."
+            raise self._fail(where, message)
+        return parse_amount(f"{float(match['number']) * 2 * np.pi / slid!r}", f"{self.path}: {where}")
 
     def _check_rising(self, after: Array, lines: Sequence[int], *, strictly: bool) -> None:
         steps = np.diff(after)
@@ -266,9 +255,7 @@ class _Reader:
                 f"row {lines[int(wrong[0]) + 1]}, column 'after'", "expected amounts that rise from row to row"
             )
 
-    def _measured(
-        self, name: str, units: dict[str, str], columns: dict[str, Array], lines: Sequence[int], *, only: bool
-    ) -> tuple[Array, Array | None, str]:
+    def _measured(self, name: str, *, only: bool) -> tuple[Array, Array | None, str]:
         """Return values, standard deviations and the name of the quantity."""
         unit, quantity, factor = MEASURED[name], name, 1.0
         if name == "height":
@@ -284,21 +271,21 @@ class _Reader:
             except (ValueError, ZeroDivisionError) as error:
                 raise self._fail("# density", str(error)) from None
             quantity = "volume"
-        values = factor * self._converted(name, units[name], unit, columns[name])
+        lines = self.table.lines
+        values = factor * self._column(name, unit)
         if name == "friction" and (values < 0).any():
             row = lines[int(np.flatnonzero(values < 0)[0])]
             raise self._fail(f"row {row}, column 'friction'", "expected zero or more")
-        sigma = self._sigma(units, columns, lines, unit, only=only)
+        sigma = self._sigma(unit, only=only)
         return values, None if sigma is None else np.abs(factor) * sigma, quantity
 
-    def _sigma(
-        self, units: dict[str, str], columns: dict[str, Array], lines: Sequence[int], unit: str, *, only: bool
-    ) -> Array | None:
+    def _sigma(self, unit: str, *, only: bool) -> Array | None:
+        names, lines = self.table.names, self.table.lines
         given = self.directives.get("sigma")
-        if ("sigma" in columns or given is not None) and not only:
+        if ("sigma" in names or given is not None) and not only:
             raise self._fail("sigma", "belongs to one measured column; expected a file for each of several")
-        if "sigma" in columns:
-            sigma = self._converted("sigma", units["sigma"], unit, columns["sigma"])
+        if "sigma" in names:
+            sigma = self._column("sigma", unit)
             if (sigma <= 0).any():
                 row = lines[int(np.flatnonzero(sigma <= 0)[0])]
                 raise self._fail(f"row {row}, column 'sigma'", "expected more than zero")

@@ -148,8 +148,8 @@ def parse_amount(text: str, option: str) -> tuple[float, str]:
     stripped = re.sub(r"\s*cycles?$", "", text.strip())
     for unit, what in (("", "cycles"), ("mm", "distance"), ("s", "time")):
         try:
-            if unit and re.fullmatch(r"[-+\d.eE]+", stripped):
-                continue  # a number alone is a number of cycles
+            if (unit == "") != bool(re.fullmatch(r"[-+\d.eE]+", stripped)):
+                continue  # a number alone is a number of cycles, and nothing else is: neither ppm nor percent
             amount = convert(stripped, unit)
         except ValueError:
             continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ import numpy as np
 
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
+from fenwear.files.table import TableError
+from fenwear.files.table import read_table as read_rows
 from fenwear.life.keys import numeric_keys, settings_of, value_of
 
 OPTION = "--over"
@@ -170,19 +171,13 @@ def read_table(path: Path) -> list[Axis]:
         CaseError: it cannot be read, or rows have another length than the heading.
     """
     try:
-        rows = [row for row in csv.reader(path.read_text("utf-8-sig").splitlines()) if any(map(str.strip, row))]
-    except OSError as error:
-        raise CaseError(InputError(str(path), f"cannot be read: {error.strerror}")) from None
-    except (UnicodeDecodeError, csv.Error):
-        raise CaseError(InputError(str(path), "not a table with commas between its values, in UTF-8")) from None
-    if len(rows) < 2:
+        table = read_rows(path, (), keys=True)
+    except TableError as error:
+        raise CaseError(InputError(str(path), str(error))) from None
+    if not table.rows:
         raise CaseError(InputError(str(path), "expected a heading of keys and a row for each variant"))
-    heading, units = zip(*map(_key_and_unit, rows[0]), strict=True)
-    for number, row in enumerate(rows[1:], 2):
-        if len(row) != len(heading):
-            expected = f"expected {len(heading)} values as in the heading, with commas between them, got {len(row)}"
-            raise CaseError(InputError(str(path), f"row {number}: {expected}"))
-    values = [[f"{text.strip()} {unit}".strip() for text, unit in zip(row, units, strict=True)] for row in rows[1:]]
+    heading, units = zip(*(_key_and_unit(head.name) for head in table.heads), strict=True)
+    values = [[f"{text} {unit}".strip() for text, unit in zip(row, units, strict=True)] for row in table.rows]
     return [Axis(key, column) for key, column in zip(heading, zip(*values, strict=True), strict=True)]
 
 

@@ -51,9 +51,9 @@ def test_order_of_angles() -> None:
     ("changes", "told"),
     [
         ({"rows": [[0, 0, -1], [0.5, 30, -2], [0.4, 0, -1]]}, "row 3 of rows: time goes back or stands still"),
-        ({"columns": ["time (s)", "angel_y (deg)", "force_z (kN)"]}, "did you mean 'angle_y'"),
-        ({"columns": ["time (s)", "angle_y (mm)", "force_z (kN)"]}, "the column angle_y: "),
-        ({"columns": ["time (s)", "angle_y", "force_z (kN)"]}, "the column angle_y has no unit"),
+        ({"columns": ["time (s)", "angel_y (deg)", "force_z (kN)"]}, "Did you mean 'angle_y'"),
+        ({"columns": ["time (s)", "angle_y (mm)", "force_z (kN)"]}, "column 'angle_y': unit: "),
+        ({"columns": ["time (s)", "angle_y", "force_z (kN)"]}, "column 'angle_y': has no unit"),
         ({"columns": ["angle_y (deg)", "time (s)", "force_z (kN)"]}, "expected one of time and percent"),
         ({"rows": [[0, 0, -1], [0.5, 30], [1, 0, -1]]}, "row 2 of rows: expected 3 values, got 2"),
         ({"rows": [[0, 0, -1], [0.5, 200, -2], [1, 0, -1]]}, "row 2 of rows: angle_y goes on by 200 degrees"),

@@ -14,7 +14,7 @@ from decks import BASE, RIGHT, SAME, WRONG
 from fenwear import CaseError, assemble, make_case
 from fenwear.bodies.mesh import write_msh
 from fenwear.case import Geometry
-from fenwear.files import read_mesh
+from fenwear.files.formats import read_mesh
 from fenwear.files.mesh import KINDS, Block, MeshFile, completed, measure
 
 SIZES = {"across": 6, "punch_layers": 3, "strip_layers": 4}

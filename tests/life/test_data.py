@@ -58,11 +58,11 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
     ("text", "expected"),
     [
         ("", "holds nothing"),
-        ("after (m), wear (mm)\n" + ROWS, r"column 'wear \(mm\)': not known; expected some of x, after, depth"),
+        ("after (m), wear (mm)\n" + ROWS, r"column 'wear': not known.*some of x, after, depth"),
         ("after (m), volume\n" + ROWS, "column 'volume': has no unit"),
         ("after (m), volume (kg)\n" + ROWS, "column 'volume': unit: .*another kind"),
         ("after (m), volume (mmm)\n" + ROWS, "column 'volume': unit: .*, got 'mmm', whose unit is not known"),
-        ("after (cycles); volume (mm^3)\n1; 0,3\n", "has a semicolon; expected commas between columns"),
+        ("after (cycles), volume (mm^3)\n1, 0,3\n2, 0.7\n", r"row 3: .0.7. has a decimal point"),
         ("after (m), volume (1)\n" + ROWS, "column 'volume': unit: expected a unit such as mm"),
         ("after (m), volume (mm^3), volume (mm^3)\n1,1,1\n", "column 'volume': given twice"),
         ("after (m), x (mm)\n" + ROWS, "no measured column"),
@@ -70,7 +70,7 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
             "after (m), volume (mm^3)\n1, 1\n2, nan\n3, 3\n",
             "row 3, column 'volume': expected a finite number, got 'nan'",
         ),
-        ("after (m), volume (mm^3)\n1, 1\n2, x\n3, 3\n", "row 3, column 'volume': expected a number, got 'x'"),
+        ("after (m), volume (mm^3)\n1, 1\n2, x\n3, 3\n", "row 3, column 'volume': expected a finite number, got 'x'"),
         ("after (m), volume (mm^3)\n1, 1\n2\n3, 3\n", "row 3: expected 2 columns, got 1"),
         ("after (m), volume (mm^3)\n1, 1\n2, 2\n", "at least 3 rows of numbers, or sigma, how sure they are, got 2"),
         ("# sigma = 1 mm^3\nafter (m), volume (mm^3)\n", "at least 1 row of numbers, got 0"),
@@ -96,6 +96,6 @@ def test_faults_are_named(case: Case, file: Callable[[str], Path], text: str, ex
 def test_a_file_that_is_not_there_or_no_text(case: Case, tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="cannot be read"):
         read_data(tmp_path / "none.csv", case)
-    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(CaseError, match="not a UTF-8 text"):
+    (tmp_path / "binary.csv").write_bytes(b"PK\x00\x01\x02")
+    with pytest.raises(CaseError, match="is no text"):
         read_data(tmp_path / "binary.csv", case)

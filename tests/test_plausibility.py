@@ -545,7 +545,8 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
 CROWN = """
 DefineConstant[ field = 0 ];
 R = 50; w = 2; h = 40; d = R - Sqrt(R^2 - w^2);
-Point(1) = {0,0,0}; Point(2) = {w,d,0}; Point(3) = {h,d+8,0}; Point(4) = {h,h,0}; Point(5) = {0,h,0}; Point(6) = {0,R,0};
+Point(1) = {0,0,0}; Point(2) = {w,d,0}; Point(3) = {h,d+8,0}; Point(4) = {h,h,0};
+Point(5) = {0,h,0}; Point(6) = {0,R,0};
 Circle(1) = {1,6,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,5}; Line(5) = {5,1};
 Point(11) = {0,0,0}; Point(12) = {w,0,0}; Point(13) = {h,0,0}; Point(14) = {h,-h,0}; Point(15) = {0,-h,0};
 Line(11) = {11,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,15}; Line(15) = {15,11};

@@ -21,6 +21,7 @@ Where properties of materials depend on the temperature, state and bodies follow
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -42,7 +43,7 @@ from fenwear.cycle.coupled import Coupled, Solved, check_cycle_memory
 from fenwear.cycle.jump import jump
 from fenwear.cycle.own_properties import with_own_properties
 from fenwear.cycle.program import at_step
-from fenwear.cycle.state import RunState, pressure_scale
+from fenwear.cycle.state import RunState, beginning, pressure_scale
 from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_heat_memory, rigid_of_phases
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
@@ -53,6 +54,7 @@ from fenwear.layers.memory import Held
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
 ZERO = 1e-12  # of the largest: a velocity that is rounding
 JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
+BESIDE = 0.05  # of the cycles: how far the last two ends are apart between which they are interpolated
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
 NOTHING_WEARS = (
     "no cyclic steady state of its own exists: pressures below the pressure_threshold balance the loads, so that "
@@ -412,57 +414,102 @@ class RunningIn:
     """How long the pressures take to come near to those of a steady state.
 
     Attributes:
-        cycles: From the initial shape.
+        cycles: From the initial shape; no whole number, so that it has derivatives.
         uncertainty: Of these, by the tolerance of the jumps and by the curve that is laid through them.
+        ends: Cycles at whose ends jumps on the way ended; the level lies at about the last but one.
     """
 
-    cycles: int
-    uncertainty: int
+    cycles: float
+    uncertainty: float
+    ends: tuple[int, ...] = ()
 
 
 def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> int | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end, see `running_in`."""
     found = running_in(system, state, fraction, limit)
-    return None if found is None else found.cycles
+    return None if found is None else round(found.cycles)
 
 
-def running_in(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> RunningIn | None:
+def running_in(
+    system: Tribosystem,
+    state: SteadyState,
+    fraction: float,
+    limit: int = 10_000_000,
+    *,
+    jumps: float = JUMPS,
+    ends: Sequence[int] = (),
+) -> RunningIn | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end; collective.
 
     Found by a run of cycle jumps. Between two of them the distance is taken to decay exponentially; the jump across it
-    is made again to where that leads, until that no longer changes. Pressures that are off by the tolerance of the
-    jumps, a share s of the distance, put the cycles off by s over the rate of decay.
+    is made again to where that leads, until that no longer changes. A last jump goes a little further, so that the
+    cycle at which the level is reached is interpolated between two that are near to it. Pressures that are off by the
+    tolerance of the jumps, a share s of the distance, put the cycles off by s over the rate of decay.
 
     Args:
         system: The assembled problem. Its properties stay: where they depend on the temperature take the state's own.
         state: The steady state.
         fraction: Of the pressure scale.
         limit: Cycles tried; None is returned beyond.
+        jumps: Tolerance of the jumps over the fraction.
+        ends: Of a problem nearby, whose jumps this one is to follow: the result is then smooth in what they differ by.
     """
     phases = len(state.directions)
+    if ends:
+        return _along(system, state, fraction, tuple(ends))
+    on_the_way: list[int] = []
     goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
     low: _Passed | None = None
-    for block in jump(system, limit * phases, tolerance=JUMPS * fraction, block=phases):
+    for block in jump(system, limit * phases, tolerance=jumps * fraction, block=phases):
         high = _Passed.of(block, state)
         if high.distance < goal:
             break
         low = high
+        on_the_way.append(low.cycles)
     else:
         return None
     if low is None or high.distance == 0:
         return RunningIn(high.cycles, high.cycles)
+    tolerance, first = jumps * fraction, low
     cycles = before = system.team.lead(partial(low.until, high, goal))  # a logarithm may have other bits on other ranks
     for _ in range(REFINED):
         if not low.cycles < round(cycles) < high.cycles:
             break
-        *_, block = jump(system, round(cycles) * phases, tolerance=JUMPS * fraction, block=phases, start=low.end)
+        *_, block = jump(system, round(cycles) * phases, tolerance=tolerance, block=phases, start=low.end)
         between, before = _Passed.of(block, state), cycles
         low, high = (low, between) if between.distance < goal else (between, high)
         cycles = system.team.lead(partial(low.until, high, goal))
         if abs(cycles - before) < SETTLED * cycles:
             break
     life = (high.cycles - low.cycles) / max(np.log(low.distance / max(high.distance, 1e-300)), 1e-300)
-    return RunningIn(round(cycles), round(JUMPS * life + abs(cycles - before)))
+    near = max(round(cycles), first.cycles + 1)
+    stops = (near, near + max(1, round(BESIDE * cycles)))
+    blocks = jump(
+        system,
+        stops[1] * phases,
+        tolerance=tolerance,
+        block=phases,
+        start=first.end,
+        stops=frozenset(phases * stop for stop in stops),
+    )
+    passed = [_Passed.of(block, state) for block in blocks]
+    reached = system.team.lead(partial(passed[-2].meets, passed[-1], goal))
+    if not np.isfinite(reached):
+        return RunningIn(cycles, jumps * life + abs(cycles - before))
+    ways = (*on_the_way, *(one.cycles for one in passed))
+    return RunningIn(reached, jumps * life + abs(cycles - before), ways)
+
+
+def _along(system: Tribosystem, state: SteadyState, fraction: float, ends: tuple[int, ...]) -> RunningIn:
+    """Return the same by the jumps of a problem nearby, of which the last two are near to the level; collective."""
+    phases = len(state.directions)
+    goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
+    heat = None if system.exchange is None else system.exchange.initial()
+    start = replace(beginning(system, heat), jump_length=ends[-1])
+    stops = frozenset(phases * end for end in ends)
+    blocks = jump(system, ends[-1] * phases, tolerance=np.inf, block=phases, start=start, stops=stops)
+    *_, low, high = (_Passed.of(block, state) for block in blocks)
+    return RunningIn(system.team.lead(partial(low.meets, high, goal)), np.inf, ends)
 
 
 @dataclass(frozen=True)
@@ -484,6 +531,13 @@ class _Passed:
         """Return the end of a jump."""
         distance = float(np.abs(block.pressure - state.pressure).max())
         return cls(int(block.half_cycle[-1]) // len(state.directions), distance, block.end)
+
+    def meets(self, later: _Passed, goal: float) -> float:
+        """Return where the exponential through here and a later end nearby is the goal; NaN where it does not decay."""
+        if not 0 < later.distance < self.distance:
+            return float("nan")
+        rate = np.log(self.distance / later.distance) / (later.cycles - self.cycles)
+        return float(self.cycles + np.log(self.distance / goal) / rate)
 
     def until(self, later: _Passed, goal: float) -> float:
         """Return after how many cycles the distance is this one, where it decays exponentially from here to later."""

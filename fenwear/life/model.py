@@ -17,14 +17,14 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case, Dependence
-from fenwear.cycle import Block, Renewal, critical_speed, cycles_to_reach, follow, jump, steady
+from fenwear.cycle import Block, Renewal, critical_speed, follow, jump, running_in, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.cycle.totals import SUMS, Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
-from fenwear.life.snapshot import Snapshot, WornSurface, contacts_of
+from fenwear.life.snapshot import Snapshot, WornSurface, contacts_of, edge_moved
 from fenwear.plausibility.stroke import stroke_warnings
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
@@ -35,6 +35,7 @@ RECENT = 8  # systems kept, as a run and its measures ask for the same one
 KEPT = 32  # runs whose ends are kept
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
 WITHIN = 1e-9  # relative: what properties of the temperature may still change by in a steady state, for differences
+FINE_JUMPS = 0.03  # of the fraction: tolerance of jumps on the way to the end, whose derivatives are then good to 3 %
 NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
 
 
@@ -59,11 +60,11 @@ class Course:
 
 @dataclass(frozen=True)
 class RunSamples:
-    """A run: its first and last snapshots, and its course."""
+    """A run: its last snapshot, its course, and whether an edge of contact or scar moved in it within the mesh."""
 
-    first: Snapshot
     last: Snapshot
     course: Course
+    moved: bool
 
 
 @dataclass
@@ -233,7 +234,7 @@ class Model:
             while len(self._runs) >= KEPT:
                 self._runs.pop(next(iter(self._runs)))
             taken = list(self.run(values, cycles, settings=settings, course=course))
-            self._runs[key] = RunSamples(taken[0], taken[-1], Course.of(taken))
+            self._runs[key] = RunSamples(taken[-1], Course.of(taken), edge_moved(taken))
         return self._runs[key]
 
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
@@ -251,8 +252,12 @@ class Model:
         state = steady(system, properties_within=WITHIN if self.warming else None)
         return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
 
-    def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
+    def run_in(
+        self, values: Mapping[str, float], settings: Sequence[str] = (), course: Course | None = None
+    ) -> tuple[float, Course | None]:
         """Return after how many cycles the pressure is within 1 % of the pressure scale of its end; infinite if never.
+
+        And the course of its jumps, which values nearby are to follow.
 
         Raises:
             ConvergenceError: there is no steady state.
@@ -262,8 +267,10 @@ class Model:
         system = self._sliding("run_in", values, settings)
         self.evaluations += 1
         state = steady(system)
-        cycles = cycles_to_reach(state.system, state, NEAR_THE_END)
-        return np.inf if cycles is None else float(cycles)
+        found = running_in(
+            state.system, state, NEAR_THE_END, jumps=FINE_JUMPS, ends=() if course is None else course.ends
+        )
+        return (np.inf, None) if found is None else (found.cycles, Course(found.ends))
 
     def critical_speed(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
         """Return the speed above which full contact is thermo-elastically unstable in either direction, mm/s.

@@ -22,7 +22,7 @@ from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.life.model import Course, Model
-from fenwear.life.snapshot import Snapshot, WornSurface
+from fenwear.life.snapshot import Snapshot, WornSurface, edge_moved
 from fenwear.results.scar import extents
 
 LIMIT = 10_000_000  # cycles after which a level counts as never reached
@@ -371,7 +371,7 @@ def evaluate(
         return quantity.of_snapshot(state), Path(rough=of_nodes, grain=_grain(quantity, state))
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
-        return _whole(model, quantity, values, settings, distance), Path()
+        return _whole(model, quantity, values, settings, distance, path)
     if quantity.kind == "life":
         found, path = _until(model, (quantity,), values, settings, path, limit, (distance, period))
         return float(found[0]), path
@@ -383,7 +383,7 @@ def evaluate(
     course = None if path is None else path.course
     last = max(1, round(wanted)) if course is None else course.ends[-1]
     run = model.samples(values, last, settings, course)
-    made = Path(run.course, run.last.grown_from(run.first), _grain(quantity, run.last))
+    made = Path(run.course, run.moved, _grain(quantity, run.last))
     return quantity.of_snapshot(run.last.at_cycle(wanted)), made
 
 
@@ -392,12 +392,17 @@ def _grain(quantity: Quantity, snapshot: Snapshot) -> float:
 
 
 def _whole(
-    model: Model, quantity: Quantity, values: Mapping[str, float], settings: Sequence[str], distance: float
-) -> float:
+    model: Model,
+    quantity: Quantity,
+    values: Mapping[str, float],
+    settings: Sequence[str],
+    distance: float,
+    path: Path | None,
+) -> tuple[float, Path]:
     if quantity.name == "critical speed":
-        return model.critical_speed(values, settings)
-    cycles = model.run_in(values, settings)
-    return cycles * distance if quantity.name == "run-in distance" else cycles
+        return model.critical_speed(values, settings), Path()
+    cycles, course = model.run_in(values, settings, None if path is None else path.course)
+    return cycles * distance if quantity.name == "run-in distance" else cycles, Path(course)
 
 
 def lives(model: Model, quantities: Sequence[Quantity], values: Mapping[str, float], limit: int = LIMIT) -> Array:
@@ -434,7 +439,7 @@ def _until(
             rows.append((snapshot.cycle, one.of_snapshot(snapshot), one.rate(snapshot)))
         passed += np.array([rows[-1][1] for rows in taken]) >= levels
         run.append(snapshot)
-    made = Path(Course.of(run), run[-1].grown_from(run[0]))
+    made = Path(Course.of(run), edge_moved(run))
     factors = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}
     found = [
         _crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)

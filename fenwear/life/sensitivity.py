@@ -6,7 +6,11 @@ grids and properties of materials are made anew after the same half-cycles. Ever
 difference is taken with two steps, h and h / 2, and extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the
 error that is told is |D(h/2) - D(h)|, of the coarser order. Where it is too large the step is reduced.
 
-Where contact or scar grows over the mesh such steps are too small: as long as the same nodes are in contact a computed
+The error that differences and implicit derivatives tell is that of this step alone: not of the mesh, the positions and
+the jumps, which are those of the value itself (`run` tells them as numerical uncertainty). A derivative and an error of
+exactly zero are held against the change of the quantity by a tenth of the key.
+
+Where contact or scar moves over the mesh such steps are too small: as long as the same nodes are in contact a computed
 quantity changes with a key in another way than from node to node. There it is computed at keys over a window that
 the edge crosses several nodes in, see `fenwear.life.window`.
 """
@@ -32,6 +36,7 @@ from fenwear.life.window import over_window
 
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small
 GOOD = 1e-6  # relative error of a derivative at which the step stays
+SURELY = 0.1  # relative change of a key that a quantity without any derivative is held against
 NONE = 1e-3  # elasticity below which a derivative may have the error of this one
 Method = Literal["implicit", "differences", "window"]
 
@@ -45,7 +50,7 @@ class Derivative:
         key_value: In `key_unit`.
         key_unit: The internal one.
         derivative: Of the quantity, in its unit over the key's.
-        error: What two steps differ by, or what a fit over a window leaves open, in the same unit.
+        error: What two steps differ by, or what a fit over a window leaves open, in the same unit; see `error_of`.
         elasticity: Relative change of the quantity over that of the key; NaN where one of them is zero.
         low, high: The quantity with the key smaller and larger by the spread; NaN where that is not possible.
         method: implicit, differences, or window.
@@ -60,6 +65,11 @@ class Derivative:
     low: float
     high: float
     method: Method
+
+    @property
+    def error_of(self) -> str:
+        """What the error contains: the roughness of the mesh over a window, or the step of the difference alone."""
+        return "mesh over a window" if self.method == "window" else "step of the difference"
 
 
 @dataclass(frozen=True)
@@ -83,7 +93,10 @@ class Sensitivity:
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints: NaN as null."""
         rows = [
-            {name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in asdict(row).items()}
+            {
+                **{name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in asdict(row).items()},
+                "error_of": row.error_of,
+            }
             for row in self.derivatives
         ]
         return {"quantity": self.quantity, "unit": self.unit, "value": self.value, "spread": self.spread,
@@ -101,6 +114,8 @@ class Sensitivity:
                 f"  {row.key:36} {row.elasticity:9.4f} {row.derivative:13.5e} {row.error:9.1e}  "
                 f"{row.low:11.5g} {row.high:11.5g}  {row.method}"
             )
+        if any(row.method != "window" for row in self.derivatives):
+            lines.append("  error: of the step of the difference alone, not of mesh, positions and jumps (see `run`)")
         return "\n".join(lines)
 
     def ranked(self) -> list[Derivative]:
@@ -212,9 +227,22 @@ def _derivative(
         slope, error = _refined(lambda relative: nearby.slope(quantity, relative), scale)
     else:
         slope, error = _differences(lambda x: at(x, path), model.case, key, scale)
+    wide = spread or (SURELY if slope == error == 0 else 0.0)
+    ends = [_end(model, quantity, key, factor) if wide > 0 else float("nan") for factor in (1 - wide, 1 + wide)]
+    if slope == error == 0 and any(abs(end - value) > GOOD * abs(value) for end in ends):
+        slope, error = _coarse(ends, value, wide * abs(key.value))
     elasticity = slope * key.value / value if key.value != 0 and value != 0 else float("nan")
-    ends = [_end(model, quantity, key, factor) if spread > 0 else float("nan") for factor in (1 - spread, 1 + spread)]
     return Derivative(key.path, key.value, key.unit, slope, error, elasticity, ends[0], ends[1], by)
+
+
+def _coarse(ends: Sequence[float], value: float, width: float) -> tuple[float, float]:
+    """Return the derivative by the change of a quantity over a wide step, with an error as large."""
+    known = [(sign * width, end) for sign, end in zip((-1, 1), ends, strict=True) if np.isfinite(end)]
+    if len(known) < len(ends):
+        known.append((0.0, value))
+    (first, low), (last, high) = sorted(known)
+    slope = (high - low) / (last - first)
+    return slope, max(abs(high - value), abs(value - low)) / width
 
 
 def _end(model: Model, quantity: Quantity, key: Key, factor: float) -> float:

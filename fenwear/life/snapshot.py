@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
@@ -122,17 +124,17 @@ class Snapshot:
         """Whether the surfaces are apart at some nodes in some phase."""
         return bool((self.pressure == 0).any())
 
-    def grown_from(self, first: Snapshot) -> bool:
-        """Return whether the edge of contact or scar has moved since, and lies within the mesh."""
-        masks = [(own.pressure > 0).any(axis=0) for own in (first, self)]
-        pairs = [(masks[0], masks[1])]
-        for body, own in self.surfaces.items():
-            before = first.surfaces[body].depth
-            if own.depth is not None and before is not None:
-                pairs.append((before > 0, own.depth > 0))
-        return any(bool((late & ~early).any()) and not bool(late.all()) for early, late in pairs)
-
     def at_cycle(self, cycle: float) -> Snapshot:
         """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""
         moved = {body: own.later(cycle - self.cycle) for body, own in self.surfaces.items()}
         return replace(self, cycle=cycle, surfaces=moved)
+
+
+def edge_moved(run: Sequence[Snapshot]) -> bool:
+    """Return whether an edge of contact or scar has moved within the mesh in a run, be it there and back."""
+    if len({len(one.x) for one in run}) > 1:  # a grid has grown with the scar
+        return True
+    masks = [np.array([(one.pressure > 0).any(axis=0) for one in run])]
+    for body in run[-1].surfaces:
+        masks.append(np.array([depth > 0 for one in run if (depth := one.surfaces[body].depth) is not None]))
+    return any(bool((mask != mask[0]).any()) for mask in masks)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import cast
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -11,6 +15,8 @@ from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case
 from fenwear.cycle import Block, follow
 from fenwear.cycle.state import RunState
 from fenwear.life import Model, evaluate, parse_quantity, sensitivity
+from fenwear.life.quantities import Path
+from fenwear.life.snapshot import Snapshot, edge_moved
 
 ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
             "motion.amplitude")  # fmt: skip
@@ -218,3 +224,39 @@ def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
         slopes.append((ends[1] - ends[0]) / (2 * h * value))
     assert slopes[0] == pytest.approx(slopes[1], rel=1e-5)
     assert 0.5 < slopes[0] < 1.0  # a warmer surface conducts better
+
+
+def test_run_in_has_derivatives(small: Callable[..., Case]) -> None:
+    """Cycles of the run-in are interpolated: loads and moduli times a factor leave the shapes, and wear goes by it.
+
+    So the elasticities to all of these add up to that to the coefficient, which is -1 but for the jumps.
+    """
+    keys = ("wear.punch.coefficient", "punch.loads.0.force.1", "materials.steel.young", "materials.composite.young")
+    (found,) = sensitivity(small("example1"), ["run-in cycles"], keys, spread=0)
+    coefficient, *others = (row.elasticity for row in found.derivatives)
+    assert coefficient == pytest.approx(-1, abs=0.03)
+    assert coefficient == pytest.approx(sum(others), rel=1e-5)
+    assert others[-1] == pytest.approx(-0.45, abs=0.02)  # by runs of other moduli
+
+
+def test_a_jagged_quantity_is_held_against_a_wide_step(
+    small: Callable[..., Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of whole numbers small steps give exactly nothing; the change over a tenth of the key tells otherwise."""
+    monkeypatch.setattr(sys.modules["fenwear.life.sensitivity"], "evaluate", lambda model, quantity, values, **_: (
+        float(np.floor(100 * values.get("contact.friction", 0.25) + 0.5)), Path()))  # fmt: skip
+    (row,) = sensitivity(small("example1"), ["run-in cycles"], ["contact.friction"], spread=0)[0].derivatives
+    assert row.derivative == pytest.approx(100, rel=0.2)
+    assert row.error >= abs(row.derivative) / 2
+    assert row.error_of == "step of the difference"
+
+
+def test_an_edge_that_comes_back_has_moved() -> None:
+    """A contact that narrows and closes again is as rough as one that grows."""
+
+    def run(*closed: list[int]) -> list[Snapshot]:
+        return [cast("Snapshot", SimpleNamespace(x=c, surfaces={}, pressure=np.array([c]))) for c in closed]
+
+    assert edge_moved(run([1, 1, 1], [0, 1, 1], [1, 1, 1]))
+    assert edge_moved(run([0, 1], [0, 1], [1, 1]))
+    assert not edge_moved(run([0, 1, 1], [0, 1, 1]))

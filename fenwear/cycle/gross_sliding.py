@@ -144,7 +144,7 @@ class Jumps:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
         stepper, tolerance = self.stepper, self.tolerance
         strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
-        length, left = state.jump_length, (until - state.half_cycle) // strokes
+        length, left = int(state.jump_length), (until - state.half_cycle) // strokes
         while True:
             tried = min(length, left)
             try:

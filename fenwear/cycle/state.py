@@ -26,7 +26,7 @@ class RunState:
         contacts: The last contact of each phase; None where there was none yet.
         temperature: Of both bodies; None without heat.
         totals: What all half-cycles so far add up to.
-        jump_length: Cycles that the next jump tries.
+        jump_length: Cycles that the next jump tries; below 1 a part of one, with stick alone.
         periodic_phases: Half-cycles in a row that repeated.
         memory: What the law of contact must remember besides; a data class of arrays, numbers and such classes.
         finer: Where jumps of next to no length would have led, to the next order, see `fenwear.cycle.jump`; None where
@@ -38,7 +38,7 @@ class RunState:
     contacts: tuple[ContactState | None, ...]
     temperature: HeatState | None
     totals: Totals
-    jump_length: int = 1
+    jump_length: float = 1
     periodic_phases: int = 0
     memory: Any = None
     finer: RunState | None = None

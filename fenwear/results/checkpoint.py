@@ -327,7 +327,8 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
-    length, periodic = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
+    length, periodic = float(arrays["jump_length"]), int(arrays["periodic_phases"])
+    length = int(length) if length >= 1 else length
     worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
     totals = Totals(*(arrays[name] for name in TOTALS))
     memory = _memory(folder, system, arrays)

@@ -419,8 +419,7 @@ class Jumps(_Run):
         begun = None if state.finer is None else state.finer.worn
         begin = replace(now, length=state.jump_length, finer=begun)
         then = jumped(problem, begin, until // strokes, self.tolerance, self._load, self._fits)
-        cycles = then.number - now.number
-        number = then.number * strokes
+        cycles, number = then.number - now.number, round(then.number) * strokes
         totals = state.totals + self._adds(now, then, cycles)
         parts, old = _in_order(problem, then), _in_order(problem, now)
         stuck = np.array([part[1].stuck for part in parts])

@@ -12,6 +12,7 @@ What lies between goes on with the depths: y has its state, too. Of coated bodie
 lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
 through their end (`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere.
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
+A cycle whose error is too large goes in parts, of which each is such a jump: N is below 1.
 Loads that change are those of each rate's own time: alone they would leave that rule nothing to see, so that the wear
 halfway is looked at, too.
 Both look at begin and end alone: where coefficients change with the depth, as where a coating's friction ends,
@@ -48,6 +49,7 @@ GAMMA = 1 + np.sqrt(0.5)
 CREPT = 1e-2  # of all that has crept: near its end errors are no longer measured by what a jump adds
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
+SHORTEST = 1 / 256  # of a cycle: the shortest part of one
 
 
 def jumped(
@@ -58,7 +60,7 @@ def jumped(
     load: Callable[[float], float] = lambda _: 1.0,
     fits: Callable[[FrettingCycle], bool] = lambda _: True,
 ) -> FrettingCycle:
-    """Return the cycle after the next jump that is accurate enough.
+    """Return the cycle after the next jump that is accurate enough: of many cycles, or of one in parts.
 
     Args:
         problem: The bodies and what is done to them.
@@ -69,28 +71,38 @@ def jumped(
         fits: Whether the nodes suffice for the cycle after it: it is halved where they do not.
 
     Raises:
-        ConvergenceError: the shortest jump did not converge.
+        ConvergenceError: the shortest part of a cycle did not converge.
     """
-    length = now.length
+    begin, length, error = now, now.length, 0.0
     while True:
-        tried = min(length, cycles - now.number)
+        left = cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
+        tried = left if left < min(length, 1) + SHORTEST else min(length, left)
         try:
-            then = _attempt(problem, now, tried, load)
+            then = _attempt(problem, now, tried, load, begin)
         except ConvergenceError:
-            if tried == 1:
+            if tried <= SHORTEST:
                 raise
-            length = max(1, tried // 4)
+            length = _length(tried / 4)
             continue
         if tried > 1 and not fits(then):
-            length = tried // 2
+            length = _length(tried / 2)
             continue
-        factor = SAFETY * np.sqrt(tolerance / max(then.error, 1e-300))
-        if then.error > tolerance and tried > 1:
-            length = max(1, int(tried * min(0.5, max(LEAST, factor))))
+        factor = float(SAFETY * np.sqrt(tolerance / max(then.error, 1e-300)))
+        if then.error > tolerance and tried > SHORTEST:
+            length = _length(tried * min(0.5, max(LEAST, factor)))
             continue
+        error = max(error, then.error)
         if tried == length or factor < 1:
-            length = max(1, int(np.ceil(tried * min(MOST, max(LEAST, factor)))))
-        return replace(then, length=length)
+            longer = tried * min(MOST, max(LEAST, factor))
+            length = _length(longer if longer < 1 else np.ceil(longer))
+        if tried == left or tried >= 1:
+            return replace(then, number=round(then.number), length=length, error=error)
+        now = then
+
+
+def _length(cycles: float) -> float:
+    """Return a length of jumps: whole cycles, or a part of one."""
+    return int(cycles) if cycles >= 1 else max(float(cycles), SHORTEST)
 
 
 def first_cycle(
@@ -104,7 +116,7 @@ def _rate(
     problem: PartialSlipProblem,
     at: PartialSlipState,
     worn: WornDepths,
-    number: int,
+    number: float,
     before: FrettingCycle | None = None,
     warm: Array | None = None,
 ) -> FrettingCycle:
@@ -125,8 +137,8 @@ def _rate(
     if heat is None or before is None or before.warm is None or before.end.temperature is None:
         return _recorded(problem, at, worn, number)
     cycles, rate = number - before.number, before.end.temperature - before.warm
-    if cycles == 1:  # nothing is jumped over: the temperatures are those after the cycle before
-        return _recorded(problem, replace(at, temperature=before.end.temperature), worn, number)
+    if cycles <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
+        return _recorded(problem, replace(at, temperature=before.warm + cycles * rate), worn, number)
     over = heat.through(_course(before, len(program.steps)))
     warm = over.after(before.warm, cycles)
     for _ in range(MOST_HEATINGS):
@@ -141,7 +153,7 @@ def _rate(
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
 
-def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: int) -> FrettingCycle:
+def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float) -> FrettingCycle:
     layers, creep = problem.interface.layers, problem.interface.creep
     at = problem.shaped(at, layers.flown_as(worn, at.worn))
     first, warm, begin = at.next_step, at.temperature, at
@@ -161,9 +173,13 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
 
 
 def _attempt(
-    problem: PartialSlipProblem, now: FrettingCycle, cycles: int, load: Callable[[float], float]
+    problem: PartialSlipProblem,
+    now: FrettingCycle,
+    cycles: float,
+    load: Callable[[float], float],
+    begin_of_heat: FrettingCycle,
 ) -> FrettingCycle:
-    """Return the cycle after a jump."""
+    """Return the cycle after a jump; its temperatures go on from those of the last whole cycle."""
     problem = problem.worn_like(now.records, now.first_step)
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
     between, layers = depths + now.worn.between.size, problem.interface.layers
@@ -192,16 +208,16 @@ def _attempt(
     off = None if now.finer is None else begin - whole(problem.coatings.measured(now.finer))
     first = solve(rate)
     start = _slid_on(now, cycles, load)
-    middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
+    middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, begin_of_heat)
     second = solve(rate_of(middle) - 2 * first)
     worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     end = whole(problem.coatings.measured(worn))
-    then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
+    then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, begin_of_heat)
     missing = solve(end - begin - cycles / 2 * (rate + rate_of(then)))
     if cycles > 1 and (start.load != now.end.load or problem.losses.changes_between(now.worn, worn)):
         halfway = (begin + end) / 2 + cycles / 8 * (rate - rate_of(then))  # cubic by Hermite
         shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
-        between_them = _rate(problem, _slid_on(now, cycles / 2, load), shape, now.number + cycles // 2, now)
+        between_them = _rate(problem, _slid_on(now, cycles / 2, load), shape, now.number + cycles / 2, begin_of_heat)
         simpson = cycles / 6 * (rate + 4 * rate_of(between_them) + rate_of(then))
         seen = solve(end - begin - simpson)
         missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
@@ -294,7 +310,7 @@ class _Implicit:
         ConvergenceError: T is beyond all numbers.
     """
 
-    def __init__(self, problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> None:
+    def __init__(self, problem: PartialSlipProblem, now: FrettingCycle, cycles: float) -> None:
         self.problem, self.now, self.cycles = problem, now, cycles
         self._size = len(now.worn.punch) + len(now.worn.strip) + now.worn.between.size + now.worn.carried.size
         self.groups, itself = derivative(problem, now)
@@ -363,4 +379,4 @@ def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) 
     slid, end = now.end.slid, replace(now.end, load=load(now.number + cycles))
     if slid is None:
         return end
-    return replace(end, slid=slid + max(cycles - 1, 0) * now.records.slip_magnitude.sum(axis=0))
+    return replace(end, slid=slid + (cycles - 1) * now.records.slip_magnitude.sum(axis=0))

@@ -135,12 +135,12 @@ class FrettingCycle:
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
         end: State at its end. What comes next follows from it.
-        length: Cycles of the next jump, as wished.
+        length: Cycles of the next jump, as wished; below 1 a part of one.
         warm: Temperatures at the start of its records (dim,); None without heat.
         finer: Depths to which jumps of next to no length would have led, to the next order; None where nobody asks.
     """
 
-    number: int
+    number: float
     worn: WornDepths
     half_cycles: list[TimeStepRecords]
     rate: WornDepths
@@ -148,7 +148,7 @@ class FrettingCycle:
     error: float
     first_step: int
     end: PartialSlipState
-    length: int = 1
+    length: float = 1
     warm: Array | None = None
     finer: WornDepths | None = None
 

@@ -13,6 +13,8 @@ from fenwear.cycle import evolve
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.fineness import HALVINGS, fine_enough
+from fenwear.stick.jump import first_cycle as begin_cycle
+from fenwear.stick.jump import jumped
 from fenwear.stick.program import make_program
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem, with_steps
@@ -99,6 +101,27 @@ def test_jumps_tend_to_the_march() -> None:
     assert differences[1] < differences[0]
     assert others[0] < 0.1
     assert others[1] < min(0.02, others[0])
+
+
+def test_a_cycle_that_wears_too_much_goes_in_parts() -> None:
+    """Beyond what one explicit cycle may wear: every jump is within its tolerance, and the depth is as smooth as that
+    of gross sliding, which the contact nearly is, and near to it."""
+    sizes = ("geometry.parameters.elements_along_contact=20", "motion.positions=1", "motion.amplitude='25 um'")
+    wear = ("wear={punch={coefficient='2e-5 1/MPa'}}", "contact.friction=0.3", "stick={steps=4, step_tolerance=1}")
+    own, sliding = (
+        partial_slip_problem(load_case("fretting", [*sizes, *wear, "contact.law='coulomb'"])),
+        [*sizes, *wear[:2]],
+    )
+    cycle = begin_cycle(own, own.beginning(), own.unworn(), 0)
+    for number in range(1, 4):
+        cycle = jumped(own, cycle, 3, 3e-2)
+        assert cycle.number == number
+        assert cycle.error <= 3e-2
+    system = assemble(load_case("fretting", [*sliding, "contact.law='gross-sliding'"]))
+    *_, block = jump(system, 6, tolerance=1e-2)
+    smooth, depth = block.wear[-1], cycle.worn.punch
+    np.testing.assert_allclose(depth, smooth, atol=0.05 * smooth.max())
+    assert np.abs(np.diff(depth, 2)).max() < 1.3 * np.abs(np.diff(smooth, 2)).max()
 
 
 HARDLY_WORN = ("wear.punch.coefficient='1e-14 1/MPa'", "wear.strip.coefficient='1e-14 1/MPa'", "stick.step_tolerance=1")

@@ -511,6 +511,7 @@ class ContactSetup:
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
             self.layers.facing(pair, worn),
             edge,
+            self.friction.friction_temperature,
         )
 
     def friction_ratio(self, direction: int, pressure: Array | None = None) -> Array:

@@ -73,7 +73,8 @@ def friction_of(case: Case, field: SlidingField) -> Friction:
     """Return the law of friction of a case, with that of its coatings."""
     laws = (case.wear.punch, case.wear.strip)
     punch, strip = (None if law is None or law.coating is None else law.coating.friction for law in laws)
-    return Friction(case.contact, field, (punch, strip))
+    temperature = case.names.role_of(case.contact.friction_temperature)
+    return Friction(case.contact, field, (punch, strip), temperature)
 
 
 def _sliding_field(case: Case, made: Motion) -> SlidingField:

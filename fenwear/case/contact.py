@@ -31,6 +31,10 @@ class Contact(Part):
     friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=0.0, description="coefficient of friction mu"
     )
+    friction_temperature: str = Field(
+        default="mean",
+        description="T of friction and of lubrication: mean or hotter of both surfaces, or that of a body, by its name",
+    )
     transverse_friction: Number = Field(
         default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
     )

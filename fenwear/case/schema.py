@@ -346,22 +346,26 @@ class Case(Part):
                 for name, material in self.materials.items()
                 for key in material.dependent
             ]
-        problems += self._debris_problems() + self._carrier_problems() + self._region_problems()
+        problems += self._debris_problems() + self._body_problems() + self._region_problems()
         friction = self.contact.friction
         for body, law in self.wear.by_body.items():
             if law is not None and (law.beta, law.energy) != (None, None) and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
 
-    def _carrier_problems(self) -> list[str]:
-        """Return what is wrong with the body that carries debris."""
-        third, names = self.contact.third_body, self.names
-        if third is None:
-            return []
-        if names.role_of(third.carried_by) not in ROLES:
-            known = " or ".join(repr(name) for name in names.by_roles.values())
-            return [f"contact.third_body.carried_by: expected {known}, got {third.carried_by!r}"]
-        return []
+    def _body_problems(self) -> list[str]:
+        """Return what is wrong with the bodies that carry debris and set the temperature of friction."""
+        third, names, contact = self.contact.third_body, self.names, self.contact
+        given: list[tuple[str, str, tuple[str, ...]]] = [
+            ("friction_temperature", contact.friction_temperature, ("mean", "hotter"))
+        ]
+        if third is not None:
+            given.append(("third_body.carried_by", third.carried_by, ()))
+        return [
+            f"contact.{key}: expected {' or '.join(map(repr, (*others, *names.by_roles.values())))}, got {name!r}"
+            for key, name, others in given
+            if names.role_of(name) not in (*others, *ROLES)
+        ]
 
     def _debris_problems(self) -> list[str]:
         """Return which coefficients ask for the thickness of debris where there is none."""

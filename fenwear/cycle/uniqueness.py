@@ -75,7 +75,7 @@ def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: 
     exchange, friction = system.exchange, system.friction
     surfaces = None if state is None or exchange is None else exchange.contact_temperatures(state, phase - 1)
     conditions = system.conditions(phase, pressure, surfaces)
-    if not friction.contact.friction_asks("p", "pm"):
+    if not friction.asks("p", "pm"):
         return friction.values(conditions)
     levels = np.linspace(0.0, float(pressure.max()), LEVELS + 1)[:, None] * np.ones(len(pressure))
     traction = np.array([p * friction.values(conditions.pressed(p)) for p in levels])

@@ -36,7 +36,7 @@ from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.sliding.friction import ContactConditions
 
-Side = Literal["punch", "strip", "mean"]
+Side = Literal["punch", "strip", "friction"]
 NUDGE = 1e-5  # of a state, for differences
 AGREE, HALVINGS = 1e-6, 10  # change of a state by halving the parts of a phase, over the state; how often they are
 SETTLED, MOST_STEPS = 1e-9, 60  # change that ends Newton's method, over the state; its steps
@@ -107,7 +107,7 @@ class Memory:
     @cached_property
     def bodies(self) -> tuple[Side, ...]:
         """Whose conditions the rate of each state is at."""
-        of_contact: list[Side] = ["punch" if name in self.of_punch else "mean" for name in self.contact]
+        of_contact: list[Side] = ["punch" if name in self.of_punch else "friction" for name in self.contact]
         return (*of_contact, *(cast(Side, "strip") for _ in self.strip))
 
     @cached_property

@@ -8,7 +8,7 @@ the contact sees the part in the plane only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Self
@@ -23,6 +23,14 @@ from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import ALONG_X, SlidingField
 from fenwear.sliding.lubrication import asperity_share
 from fenwear.sliding.regions import Regions
+
+# Temperature of friction, from those of the punch's and the strip's surface.
+FRICTION_TEMPERATURES: Mapping[str, Callable[[Array, Array], Array]] = {
+    "mean": lambda punch, strip: (punch + strip) / 2,
+    "hotter": np.maximum,
+    "punch": lambda punch, _: punch,
+    "strip": lambda _, strip: strip,
+}
 
 
 @dataclass(frozen=True)
@@ -42,6 +50,7 @@ class ContactConditions:
         states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
         debris: Thickness of the third body (n,), mm; None without.
         edge: Distance from the edge of the contact (n,), mm; None where nothing asks for it.
+        friction_temperature: Which one friction depends on, see `FRICTION_TEMPERATURES`.
         covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`; None
             for a body without one, or where all is worn through.
     """
@@ -58,6 +67,7 @@ class ContactConditions:
     covered: tuple[Array | None, Array | None] = (None, None)
     debris: Array | None = None
     edge: Array | None = None
+    friction_temperature: str = "mean"
 
     @classmethod
     def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
@@ -91,20 +101,19 @@ class ContactConditions:
         found.__dict__.update(changes, _known={}, _changed=(self, *variables))
         return found
 
-    def of(self, body: Literal["punch", "strip", "mean"]) -> Mapping[str, Array]:
-        """Return the variables of laws, of a body; or of the punch, with the mean temperature of both."""
+    def of(self, body: Literal["punch", "strip", "friction"]) -> Mapping[str, Array]:
+        """Return the variables of laws, of a body; or of the punch, with the temperature of friction."""
         if (known := self._known.get(body)) is not None:
             return known
         if self._changed is not None:
             before, of_punch, of_strip = self._changed
             found = self._known[body] = {**before.of(body), **(of_strip if body == "strip" else of_punch)}
             return found
-        punch, strip = self.temperatures
         own = 1 if body == "strip" else 0
         x, y, z = self.places[own].T
         none = np.zeros(self.shape)
         found = self._known[body] = {
-            "T": (punch + strip) / 2 if body == "mean" else self.temperatures[own],
+            "T": FRICTION_TEMPERATURES[self.friction_temperature if body == "friction" else body](*self.temperatures),
             "p": self.pressure,
             "v": np.asarray(self.speed),
             "x": x,
@@ -145,12 +154,14 @@ class Friction:
         contact: mu and mu_d.
         field: Of the sliding.
         of_coatings: mu of the coatings of punch and strip; None where there is none of its own.
+        friction_temperature: Which one friction depends on, see `FRICTION_TEMPERATURES`.
         split: Whether nodes between regions share their pressure among unlike coefficients.
     """
 
     contact: Contact
     field: SlidingField = ALONG_X
     of_coatings: tuple[float | None, float | None] = (None, None)
+    friction_temperature: str = "mean"
     split: bool = False
 
     def asks(self, *names: str, of_share: bool = True) -> bool:
@@ -183,7 +194,7 @@ class Friction:
         if lubrication is None:
             return 1.0
         if "share" not in conditions.derived:
-            conditions.derived["share"] = asperity_share(lubrication, conditions.of("mean"), conditions.shape)
+            conditions.derived["share"] = asperity_share(lubrication, conditions.of("friction"), conditions.shape)
         return conditions.derived["share"]
 
     def _values(
@@ -203,7 +214,7 @@ class Friction:
         """
         if "mu" in conditions.derived:
             return conditions.derived["mu"]
-        return self._values(conditions.of("mean"), conditions, self.share(conditions))
+        return self._values(conditions.of("friction"), conditions, self.share(conditions))
 
     def of_asperities(self, conditions: ContactConditions) -> Array:
         """Return mu of what touches at the nodes (n,).
@@ -211,7 +222,7 @@ class Friction:
         Raises:
             CaseError: it is negative or not finite.
         """
-        return self._of_asperities(conditions.of("mean"), conditions)
+        return self._of_asperities(conditions.of("friction"), conditions)
 
     def _of_asperities(
         self, state: Mapping[str, Array], conditions: ContactConditions, *, checked: bool = True
@@ -256,7 +267,7 @@ class FollowingFriction:
 
     def __init__(self, friction: Friction, conditions: ContactConditions) -> None:
         self._friction, self._conditions = friction, conditions
-        self._state, self._with_cycle = dict(conditions.of("mean")), conditions.cycle is None
+        self._state, self._with_cycle = dict(conditions.of("friction")), conditions.cycle is None
         self._lubrication = lubrication = friction.contact.lubrication
         self._fluid = 0.0 if lubrication is None else lubrication.fluid_friction
         alike = not friction.asks("p", "pm", of_share=False)

@@ -165,6 +165,7 @@ class LocalLaws:
             states=states,
             covered=covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
             debris=debris,
+            friction_temperature=self.friction.friction_temperature,
             edge=None if self.edges is None else self.edges.distance(pressure > 0 if touching is None else touching),
         )
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
+from fenwear import Case, Tribosystem, assemble, jump, load_case, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
@@ -180,56 +180,3 @@ def test_distance_of_forces(assembled: Callable[..., Tribosystem]) -> None:
     expected = wasserstein_distance(x, x, weights * one, weights * other) / np.ptp(x[(one > 0) | (other > 0)])
     expected += abs(forces[0] - forces[1]) / max(forces)
     assert force_difference(system, one, other) == pytest.approx(expected, rel=1e-12)
-
-
-def warming_pin(friction: object) -> Case:
-    """Return a poor conductor on a steel plate, insulated but for its far end: heat goes straight through it."""
-    return make_case(
-        {
-            "geometry": {
-                "file": "blocks.geo",
-                "degree": 2,
-                "parameters": {"width": 4, "punch_height": 10, "strip_height": 2, "margin": 1, "across": 8},
-            },
-            "model": {"plane": "strain", "thickness": 10},
-            "materials": {
-                "ptfe": {"young": 1e3, "poisson": 0, "conductivity": 0.5, "heat_capacity": 1e9, "density": 2e-9,
-                         "expansion": 0},
-                "steel": {"young": 2.1e5, "poisson": 0, "conductivity": 46, "heat_capacity": 4.6e8, "density": 7.8e-9,
-                          "expansion": 0},
-            },
-            "punch": {
-                "regions": {"punch_body": "ptfe"},
-                "supports": [{"on": "punch_far", "fix": ["x"]}],
-                "no_turning_about": ["y"],
-                "loads": [{"on": "punch_far", "force": [0, -40]}],
-                "temperatures": [{"on": "punch_far", "temperature": "20 degC"}],
-                "insulated": ["punch_sides"],
-            },
-            "strip": {
-                "regions": {"strip_body": "steel"},
-                "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
-                "temperatures": [{"on": "strip_far", "temperature": "20 degC"}],
-            },
-            "contact": {"friction": friction},
-            "wear": {"punch": {"coefficient": 1e-8}},
-            "heat": {"partition": 1, "ambient": "20 degC", "initial": "20 degC", "convection": 0},
-            "motion": {"kind": "one-way", "direction": "rightward", "speed": 100, "duration": 10},
-            "run": {"half_cycles": 20},
-        }
-    )  # fmt: skip
-
-
-def test_a_stage_whose_cycle_begins_colder_than_anything() -> None:
-    """Friction that falls with T, as 1 / (1 + 0.02 (T - T_a)): below T_a - 50 K there is none.
-
-    The first stages of a jump look at temperatures before its begin, beyond the pole of the law: a cycle is marched.
-    """
-    system = assemble(warming_pin({"expression": "0.2 / (1 + 0.02 * (T - 293.15))"}))
-    *_, jumped = jump(system, 20, tolerance=1e-3)
-    *_, marched = march(system, 20, implicit=True)
-    assert jumped.heat is not None
-    assert marched.heat is not None
-    rise = marched.heat.temperature_punch[-1] - 293.15
-    np.testing.assert_allclose(jumped.heat.temperature_punch[-1] - 293.15, rise, rtol=2e-3)
-    np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=2e-3)

@@ -166,7 +166,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         ),
     },
     "case/setup.py": {
-        "whose sums": (MODEL, "`setup.reproducible` with `contact.solver = \"full\"`, whose sums go over the ranks"),
+        "whose sums": (MODEL, '`setup.reproducible` with `contact.solver = "full"`, whose sums go over the ranks'),
         "whose steps every rank makes alike": (MODEL, "the same with all temperatures, which the ranks share"),
     },
     "cycle/steady.py": {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -30,6 +31,8 @@ from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium
+from fenwear.layers import Layers
+from fenwear.layers.between import SOFT
 from fenwear.parallel import all_together
 from fenwear.sliding.wear import WornDepths
 
@@ -98,6 +101,12 @@ class Tribosystem(ContactSetup):
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
         return float(self.contact_law.elastic_length(self))
+
+    @cached_property
+    def layers(self) -> Layers:
+        """What lies between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
+        found = super().layers
+        return found if found.hardness == np.inf else replace(found, softness=SOFT * self.interface.elastic_length)
 
     @property
     def replicated(self) -> bool:

@@ -130,7 +130,7 @@ def element_height(elastic: ElasticBody) -> Array:
     v = ufl.TestFunction(cells)
     volume, area = (fem.assemble_vector(compiled(v * over)).array for over in (ufl.dx(domain=mesh), ds))
     height = fem.Function(cells)
-    height.x.array[:] = volume / np.maximum(area, 1e-300)
+    np.divide(volume, area, out=height.x.array, where=area > 0)
     surface = elastic.trace.surface
     if surface.cell == "triangle":  # shape functions of degree 2 have no integral at vertices: their values are taken
         ds = ds(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})

@@ -166,7 +166,7 @@ class CondensedContact:
         rigid = interface.rigid
         n, r, m = len(rigid.pair.weights), len(rigid.resultant), len(self.phases)
         self.shape = (m, n)
-        self._pressure_scale = rigid.mean_pressure
+        self._pressure_scale = interface.pressure_scale
         self._gap_scale = self._pressure_scale * interface.elastic_length
         # Arrays of one number: numpy takes twice as long for numbers of Python.
         self._scales = np.array(self._pressure_scale), np.array(1 / self._gap_scale)

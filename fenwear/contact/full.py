@@ -68,7 +68,7 @@ class FullContact:
         interface, punch = self.phases[0].interface, self._bodies[0][0]
         self.comm = lasting(punch.body.mesh.comm)
         rigid, pair = interface.rigid, interface.pair
-        self._pressure_scale = rigid.mean_pressure
+        self._pressure_scale = interface.pressure_scale
         self._gap_scale = self._pressure_scale * interface.elastic_length
         self._force_scale = self._pressure_scale * float(pair.weights.sum())
         guided = guided_equilibrium(pair, *self._bodies[0])

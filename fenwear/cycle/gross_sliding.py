@@ -50,6 +50,7 @@ from fenwear.cycle.state import RunState, carried_by, known_pressures
 from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
+from fenwear.layers.between import PLASTIC
 from fenwear.remedies import MARCHED, SHORTER_JUMPS
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 
@@ -120,8 +121,8 @@ class Jumps:
         """Make the steps of half-cycles; collective."""
         self._half_cycles = HalfCycles(self.system, self.stepper.watch, self.stepper.loading, implicit=True)
 
-    def _marched(self, state: RunState) -> tuple[RunState, Estimate, list[HalfCycle]]:
-        """Return the state after one cycle of half-cycles, an estimate that says nothing of its error, and its record.
+    def _marched(self, state: RunState) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after one cycle of half-cycles, and its record.
 
         Raises:
             ConvergenceError: a half-cycle did not converge.
@@ -133,8 +134,7 @@ class Jumps:
         for _ in range(self.system.motion.half_cycles):
             after, own = self._half_cycles(after, after.half_cycle + 1)
             recorded += own
-        self.system.remedies.note(MARCHED)
-        return after, Estimate(np.inf, np.inf, np.inf), recorded
+        return replace(after, finer=None if state.finer is None else after), recorded
 
     def change(self, temperature: HeatState | None) -> float:
         """Return the largest change of a property at temperatures; collective."""
@@ -145,6 +145,11 @@ class Jumps:
         stepper, tolerance = self.stepper, self.tolerance
         strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
         length, left = int(state.jump_length), (until - state.half_cycle) // strokes
+        # What flows in a first cycle, or as a load rises, depends on the order of the phases and on what they heat.
+        if self.system.layers.hardness < np.inf and (left == 1 or not given):
+            after, recorded = self._marched(state)
+            if state.contacts[0] is None or self._flown(state, after) > tolerance or given:
+                return after, recorded
         while True:
             tried = min(length, left)
             try:
@@ -154,7 +159,9 @@ class Jumps:
                     stepper.system.remedies.note(SHORTER_JUMPS)
                     length = max(1, tried // 4)
                     continue
-                end, estimate, recorded = self._marched(state)
+                end, recorded = self._marched(state)
+                estimate = Estimate(np.inf, np.inf, np.inf)  # it says nothing of the error
+                stepper.system.remedies.note(MARCHED)
             if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
                 length = max(1, tried // 2)
                 continue
@@ -174,6 +181,12 @@ class Jumps:
         if state.finer is not None:
             after = replace(after, finer=stepper.finer(state, state.finer, after, tried))
         return after, recorded
+
+    def _flown(self, before: RunState, after: RunState) -> float:
+        """Return the volume that surfaces flow in a step, over all that has flown."""
+        row, weights = self.system.layers.row(PLASTIC), self.system.pair.weights
+        first, last = (float(weights @ state.worn.between[row]) for state in (before, after))
+        return (last - first) / max(last, 1e-300)
 
 
 class GrossSliding:

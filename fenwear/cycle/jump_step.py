@@ -291,8 +291,8 @@ class Stepper:
         return system.wear.phases(conditions).begun(state.worn).worn(pressures)
 
     def _solve_to(self, share: float) -> None:
-        """Solve contact to a share of the tolerance, where its digits cost."""
-        if isinstance(self.contact, CondensedContact):
+        """Solve contact to a share of the tolerance, where its digits cost; fully beyond a hardness, as flow stays."""
+        if isinstance(self.contact, CondensedContact) and self.system.layers.hardness == np.inf:
             self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
 
     def step(

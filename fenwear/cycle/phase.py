@@ -54,6 +54,8 @@ class PhaseStep:
 
     def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
+        flows = implicit and system.layers.hardness < np.inf
+        self._at_begin = PhaseStep(system, phase, implicit=False) if flows else None
         self._constant, self._load = system.constant_coefficients, 1.0
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
@@ -110,6 +112,25 @@ class PhaseStep:
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
+        if self._at_begin is None:
+            return self._end_of(temperature, worn, before, load, half_cycles, near, cycle)
+        # Surfaces flow as soon as they are pressed, before anything wears.
+        pressed = self._at_begin.solve(temperature, worn, before, load, half_cycles, near, cycle)
+        flown = self.system.layers.flown_as(worn, worn + pressed.worn)
+        end = self._end_of(temperature, flown, before, load, half_cycles, near, cycle)
+        return replace(end, worn=end.worn + (flown - worn))
+
+    def _end_of(
+        self,
+        temperature: HeatState | None,
+        worn: WornDepths,
+        before: ContactState | None,
+        load: float,
+        half_cycles: float,
+        near: ContactState | None,
+        cycle: CycleShear | None,
+    ) -> PhaseEnd:
+        """Return the end of the phase, as `solve`."""
         temperature = temperature or self._initial
         if load != self._load:
             self._contact.press(load)

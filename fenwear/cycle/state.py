@@ -138,4 +138,4 @@ def pressure_scales(system: Tribosystem, pressure: Array) -> Array:
     force = (np.abs(pressure) * weights).sum(axis=(1, 2))
     carried = (pressure**2 * weights).sum(axis=(1, 2))
     loaded = force > 0
-    return np.where(loaded, carried / np.where(loaded, force, 1.0), system.rigid.mean_pressure)
+    return np.where(loaded, carried / np.where(loaded, force, 1.0), system.interface.pressure_scale)

@@ -58,7 +58,7 @@ class SteadyInequality:
         self.m, self.n, self.r = m, n, r
         self.wear, self.closure = system.phases_wear, system.layers.closure
         self.conditions: Sequence[ContactConditions] | None = None
-        self.p_scale = rigid.mean_pressure
+        self.p_scale = interface.pressure_scale
         self.gap_scale = self.p_scale * interface.elastic_length
         above = max((law.pressure_threshold for law in system.sliding.wear if law is not None), default=0.0)
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale + above)).max()) / m

@@ -243,6 +243,13 @@ class Interface:
         return PressureCompliance(self, scale * traction)
 
     @cached_property
+    def pressure_scale(self) -> float:
+        """Mean pressure of the loads, MPa; without loads, that of moved supports or overlapping surfaces."""
+        closed = max(float(np.abs(self.load_gap).max()), -float(self.pair.initial_gap.min()))
+        by_gap = closed / self.elastic_length if closed > 0 and self.elastic_length > 0 else 1.0
+        return self.rigid.mean_pressure if self.rigid.carried > 0 else by_gap
+
+    @cached_property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps.
 

@@ -5,11 +5,11 @@
 with the linear closure, that of a law and of coatings by what is left of them (`closure`), the thickness of
 debris (`debris`) and the plastic depth D, which grows where the pressure is at the hardness. In one phase that is an
 upper bound of the inequality, and D grows by what the gap would be below zero (0 <= dD, p <= hardness, dD (p -
-hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface gives way in a solve by SOFT (p /
-hardness - 1) beyond it; what it has given way by is put into the gap, and solved again: the excess falls to a part of
-itself each time, to nothing (augmented Lagrangians; M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is
-linear in the pressure belongs to the compliance of the bodies (`fenwear.interface.Interface`), so that every study has
-it.
+hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface gives way in a solve by
+s (p - hardness) beyond it, s being SOFT times the elastic closure by a unit of pressure. This is put into the gap, and
+the contact is solved again: the excess falls to a part of itself each time (augmented Lagrangians; M. R. Hestenes, J.
+Optim. Theory Appl. 4, 1969, 303), until it is CAPPED of the hardness. What is linear in the pressure belongs to the
+compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from fenwear.sliding.wear import NOTHING, WornDepths
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
 PLASTIC = "plastic_depth"
-SOFT = 0.03  # mm
-MOST_FLOWS, FLOWED, FLAT = 500, 1e-8, 1e-9  # iterations; change over what has flown, least depth (mm), that end them
+SOFT = 1.0  # softness beyond the hardness over that of the bodies
+MOST_FLOWS, CAPPED = 500, 1e-8  # iterations; pressure beyond the hardness, over it, that ends them
 T = TypeVar("T")
 Regions = tuple[Mapping[str, Array], Mapping[str, Array]]
 
@@ -59,6 +59,7 @@ class Layers:
         winkler: Closure over pressure of a linear layer (n,), mm/MPa; None without.
         debris: Of the third body; None without.
         hardness: Largest pressure, MPa.
+        softness: By how much surfaces give way in a solve, over the pressure beyond the hardness, mm/MPa.
         memory: States of laws of one's own; None without.
         begun: These at the start; None without.
         strip_carries: Whether debris lies on the strip's material.
@@ -70,6 +71,7 @@ class Layers:
     winkler: Array | None = None
     debris: Debris | None = None
     hardness: float = np.inf
+    softness: float = 0.0
     memory: Memory | None = None
     begun: Held | None = None
     strip_carries: bool = False
@@ -272,7 +274,7 @@ class Layers:
         found = None if self.closure is None else self.closure.slope(pressure)
         if capped or self.hardness == np.inf:
             return found
-        soft = np.where(pressure > self.hardness, SOFT / self.hardness, 0.0)
+        soft = np.where(pressure > self.hardness, self.softness, 0.0)
         return soft if found is None else found + soft
 
     def flowed(self, pressure: Array, gap: Array) -> Array:
@@ -281,7 +283,7 @@ class Layers:
 
     def flow(self, pressure: Array) -> Array:
         """Return by how much more the surfaces have to flow at pressures (m, n), mm."""
-        return SOFT * np.maximum(pressure / self.hardness - 1, 0.0)
+        return self.softness * np.maximum(pressure - self.hardness, 0.0)
 
     def flowing(self, solve: Callable[[Array], T], pressure_of: Callable[[T], Array]) -> tuple[T, Array | None]:
         """Return what solves a contact with no pressure beyond the hardness, and what has flown (n,), mm.
@@ -298,14 +300,16 @@ class Layers:
         if self.hardness == np.inf:
             return found, None
         for _ in range(MOST_FLOWS):
-            more = self.flow(pressure_of(found)).max(axis=0)
-            if more.max() <= FLOWED * max(float(flowed.max()), FLAT):
+            pressure = pressure_of(found)
+            if pressure.max() <= (1 + CAPPED) * self.hardness:
                 return found, flowed
-            flowed = flowed + more
+            flowed = flowed + self.flow(pressure).max(axis=0)
             found = solve(flowed)
+        beyond = float(pressure_of(found).max()) / self.hardness - 1
         raise ConvergenceError(
-            f"what flows beyond contact.hardness did not come to rest in {MOST_FLOWS} iterations: it may be next to "
-            "the mean pressure, so that nothing holds the punch"
+            f"Plastic flow did not converge: after {MOST_FLOWS} iterations the largest pressure exceeds "
+            f"contact.hardness by {beyond:.2g} of it. Little else carries the load where the hardness is near the mean "
+            "pressure"
         )
 
     def settled(self, worn: WornDepths) -> WornDepths:
@@ -381,7 +385,7 @@ def layers_of(
     begun = None if memory is None else memory.beginning(pair)
     on_strip = debris is not None and strip_carries
     soft = soft_coatings(pair, (wear[0], wear[1]))
-    return Layers(n, closure, winkler, debris, hardness, memory, begun, on_strip, soft)
+    return Layers(n, closure, winkler, debris, hardness, 0.0, memory, begun, on_strip, soft)
 
 
 def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory | None:

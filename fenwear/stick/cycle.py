@@ -123,7 +123,7 @@ class PartialSlipProblem:
     def reach(self) -> float:
         """Largest way of the strip's supports, or a fraction of the contact where a force is imposed, mm."""
         ways = [abs(step.displacement) for step in self.program.steps if step.displacement is not None]
-        return max(ways, default=0.0) or 1e-3 * float(self.weights.sum())
+        return max(ways, default=0.0) or 1e-3 * self.interface.middle.pair.punch.extent()
 
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, and what lies between then."""

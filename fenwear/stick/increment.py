@@ -83,7 +83,8 @@ def _check_force(
         ConvergenceError: gross sliding starts.
     """
     force = end.force or 0.0
-    far = 1e3 * float(np.median(position.compliance.diagonal())) * float(before.pressure.max(initial=1.0))
+    largest = float(before.pressure.max(initial=0.0)) or position.interface.pressure_scale
+    far = 1e3 * float(np.median(position.compliance.diagonal())) * largest
     held, pushed = (
         replace(start, displacement=before.displacement, force=None),
         replace(end, displacement=before.displacement + np.copysign(far, force), force=None),

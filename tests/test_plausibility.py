@@ -12,12 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dolfinx import fem
+from dolfinx.mesh import CellType, create_rectangle
 from markupsafe import escape
+from mpi4py import MPI
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
 from fenwear.assembly import place_case, regridded, with_case
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.material import Isotropic, lame
+from fenwear.bodies.mesh import own_mesh
 from fenwear.bodies.ready import meshes_folder
-from fenwear.case import changed_case, plausibility_warnings
+from fenwear.case import Body, Support, changed_case, plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
 from fenwear.plausibility import (
@@ -33,6 +39,7 @@ from fenwear.plausibility.chamfer import contact_chamfer
 from fenwear.plausibility.curved import curved_text, turned
 from fenwear.plausibility.ends import contact_ends
 from fenwear.plausibility.few import few_text
+from fenwear.plausibility.large import strain_and_rotation
 from fenwear.plausibility.layer import heated_layer, layer_warnings
 from fenwear.plausibility.polygon import polygon_text
 from fenwear.plausibility.rim import ContactRim, contact_rim
@@ -686,3 +693,25 @@ def test_deep_wear_of_a_bore_turns_its_normals() -> None:
     assert turned(pair, 0.08 * radius * cosine) == pytest.approx(0.08, rel=5e-3)
     assert curved_text(pair, 0.04 * radius * cosine, "then") == ""
     assert "8 % of its radius" in curved_text(pair, 0.08 * radius * cosine, "then")
+
+
+def test_strain_and_rotation_of_a_linear_displacement() -> None:
+    """Exact: e : e = 0.2^2 + 2 0.1^2, rotation 0.2, of u = (0.2 x + 0.1 z, -0.3 x), whatever the elements."""
+    mesh = create_rectangle(MPI.COMM_SELF, [(0, 0), (3, 2)], (6, 4), CellType.quadrilateral)
+    groups = {"punch_contact": lambda x: np.isclose(x[1], 0), "top": lambda x: np.isclose(x[1], 2)}
+    held = Body(supports=(Support(on="top", fix=("x", "z")),))
+    law = Isotropic("stress", lame(1, 0.3, "stress"))
+    body = ElasticBody(own_mesh("punch", mesh, groups), held, law, degree=2)
+    moved = fem.Function(body.space)
+    moved.interpolate(lambda x: (0.2 * x[0] + 0.1 * x[1], -0.3 * x[0]))
+    assert strain_and_rotation(body, moved) == pytest.approx((0.06**0.5, 0.2), rel=1e-12)
+
+
+@pytest.mark.parametrize(("young", "told"), [("1 GPa", False), ("100 MPa", True)])
+def test_displacements_beyond_small_strain(assembled: Assembled, young: str, told: bool) -> None:
+    """A block under 16.7 MPa stretches by 1.7 % or 17 %: `check` tells of the latter, with the size of the error."""
+    both = [f"materials.{name}.young='{young}'" for name in ("composite", "steel")]
+    texts = [text for text in initial_warnings(assembled("example2", *FLAT, *both)) if "small strains" in text]
+    assert bool(texts) is told
+    if told:
+        assert 14 < float(re.findall(r"off by some (\d+) %", texts[0])[0]) < 22

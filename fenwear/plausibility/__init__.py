@@ -11,6 +11,7 @@ thickness bodies that are worn through
 fineness  steps, bases and elements of the heat that are too coarse
 heated    the same of all stages of a run, and contact that has several answers
 slip      time steps of stick and slip: too coarse, several answers, sliding as a whole
+large     displacements beyond small strain
 layer     elements thicker than the layer that heats up below a fast contact
 size      bodies whose mesh is hardly in mm
 states    a run's blocks, the first contact and the steady state: clipped, too hot, harder pressed than hard

@@ -17,6 +17,7 @@ from fenwear.plausibility.depth import depth_text
 from fenwear.plausibility.ends import ContactEnds, contact_ends, opened
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.grid_rim import grid_limits
+from fenwear.plausibility.large import large_warnings
 from fenwear.plausibility.layer import layer_warnings
 from fenwear.plausibility.polygon import polygon_text
 from fenwear.plausibility.rim import ContactRim, contact_rim
@@ -70,6 +71,7 @@ class StateMonitor:
         if self._first:
             found["few"] = few_across(self.system, self.limits, block.pressure[0], "at the start")
             found["polygon"] = polygon_text(self.system, block.pressure[0], "at the start")
+            found |= {f"large {k}": text for k, text in enumerate(large_warnings(self.system))}
             self._first = False
         worst = int(np.argmax(block.complementarity_error))
         when = f"in half-cycle {int(block.half_cycle[worst]):,}"
@@ -214,7 +216,7 @@ def initial_warnings(system: Tribosystem) -> list[str]:
         needed = limits.width_needed(0.0, float(weights @ pressure))
         texts.append(clipped_text(limits, where, needed, system.case))
     told = size_warnings(system.case, system.bodies, system.rigid)
-    return [*told, *(text for text in texts if text), *stroke_warnings(system)]
+    return [*told, *(text for text in texts if text), *large_warnings(system, contact), *stroke_warnings(system)]
 
 
 def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:

@@ -95,27 +95,38 @@ def body_fields(
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; by default that of sliding.
         worn: Depths, and states that laws remember, for friction that depends on them; by default those at the start.
     """
-    pair, traction = system.pairs[phase], friction_ratio
+    traction = friction_ratio
     traction = _traction(system, phase, pressure, temperatures, worn) if traction is None else in_space(traction)
-    force = in_space(pair.normal) + traction
-    force *= (pair.weights * pressure)[:, None]
-    on_punch, on_strip = pair.punch.spread @ force, -(pair.transfer.T @ force)
-    bodies = system.loaded[phase]
-    count = len(bodies.punch.rigid_modes)
-    amplitudes = (rigid[:count], rigid[count:])
     punch, strip = (
         _solve(elastic, load, modes, heat, None if temperatures is None else temperatures[k])
-        for k, (elastic, load, modes, heat) in enumerate(
-            zip(
-                (bodies.punch, bodies.strip),
-                (on_punch, on_strip),
-                amplitudes,
-                system.bodies.heat or (None, None),
-                strict=True,
-            )
+        for k, ((elastic, load, modes), heat) in enumerate(
+            zip(_loaded(system, phase, pressure, rigid, traction), system.bodies.heat or (None, None), strict=True)
         )
     )
     return punch, strip
+
+
+def displacements(
+    system: Tribosystem, pressure: Array, rigid: Array, phase: int = 0
+) -> tuple[tuple[ElasticBody, fem.Function], ...]:
+    """Return punch and strip, each with its displacement (mm) before any heat, as `body_fields`; collective."""
+    traction = _traction(system, phase, pressure, None, None)
+    loaded = _loaded(system, phase, pressure, rigid, traction)
+    return tuple((elastic, _displacement(elastic, load, modes)) for elastic, load, modes in loaded)
+
+
+def _loaded(
+    system: Tribosystem, phase: int, pressure: Array, rigid: Array, traction: Array
+) -> list[tuple[ElasticBody, Array, Array]]:
+    """Return punch and strip with the forces on their trace nodes (N, 3), N/mm, and the amplitudes of their modes."""
+    pair, bodies = system.pairs[phase], system.loaded[phase]
+    force = in_space(pair.normal) + traction
+    force *= (pair.weights * pressure)[:, None]
+    count = len(bodies.punch.rigid_modes)
+    return [
+        (bodies.punch, pair.punch.spread @ force, rigid[:count]),
+        (bodies.strip, -(pair.transfer.T @ force), rigid[count:]),
+    ]
 
 
 def _traction(
@@ -141,19 +152,35 @@ def _solve(
     temperature: Array | None,
 ) -> BodyFields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
-    force, dim = elastic.load.copy(), elastic.dim
-    load = elastic.on_trace(load)
-    on_surface = elastic.trace.place(in_model(load, dim)[:, :, None])
-    couple = elastic.guided_resultant[:, None] + elastic.couple_of(on_surface)
-    force += on_surface[:, 0]
-    force[elastic.supported] = 0.0
     theta = change = None
+    thermal: Array | float = 0.0
     if heat is not None and temperature is not None:
         theta = heat.function(temperature)
         change = heat.function(temperature - heat.heat.initial)
         coupling = elastic.thermal_coupling(heat.space)
-        force += times(coupling, change.x.array[: heat.owned])
+        thermal = times(coupling, change.x.array[: heat.owned])
         coupling.destroy()
+    displacement = _displacement(elastic, load, rigid, thermal)
+    out_of_plane = None
+    if elastic.dim == 2 and load[:, 1].any():
+        out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, elastic.on_trace(load)[:, 1])
+    components = _stress(elastic, displacement, out_of_plane, change)
+    stress = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
+    von_mises = _interpolated(_von_mises(*components), elastic, "von_mises", ())
+    flux = None
+    if heat is not None and theta is not None:
+        flux = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (elastic.dim,))
+    return BodyFields(displacement, out_of_plane, stress, von_mises, theta, flux)
+
+
+def _displacement(elastic: ElasticBody, load: Array, rigid: Array, thermal: Array | float = 0.0) -> fem.Function:
+    """Return a body's displacement (mm) under such forces, and those of its heat (owned,), N/mm; collective."""
+    force, dim = elastic.load.copy(), elastic.dim
+    on_surface = elastic.trace.place(in_model(elastic.on_trace(load), dim)[:, :, None])
+    couple = elastic.guided_resultant[:, None] + elastic.couple_of(on_surface)
+    force += on_surface[:, 0]
+    force[elastic.supported] = 0.0
+    force += thermal
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
     solved = elastic.held(elastic.solve(force)[:, None], force[:, None], couple)[:, 0]
@@ -161,16 +188,7 @@ def _solve(
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
-    out_of_plane = None
-    if dim == 2 and load[:, 1].any():
-        out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, load[:, 1])
-    components = _stress(elastic, displacement, out_of_plane, change)
-    stress = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
-    von_mises = _interpolated(_von_mises(*components), elastic, "von_mises", ())
-    flux = None
-    if heat is not None and theta is not None:
-        flux = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (dim,))
-    return BodyFields(displacement, out_of_plane, stress, von_mises, theta, flux)
+    return displacement
 
 
 def _stress(elastic: ElasticBody, displacement: Any, out_of_plane: Any, change: Any) -> tuple[Any, ...]:

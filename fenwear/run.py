@@ -43,9 +43,8 @@ from fenwear.plausibility import (
     StateMonitor,
     law_warnings,
     passing_text,
-    size_warnings,
     sliding_text,
-    stroke_warnings,
+    system_warnings,
     unique_text,
     uniques,
 )
@@ -226,8 +225,7 @@ class _Run:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
-        self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
-        self.warnings += [*law_warnings(system), *stroke_warnings(system)]
+        self.warnings += [*law_warnings(system), *system_warnings(system)]
         if self.case.leaves_positions and system.motion.positions > DEFAULT_POSITIONS:
             log(f"motion.positions: {system.motion.positions} are taken, about as near to each other as contact nodes")
         for warning in self.warnings:

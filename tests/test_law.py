@@ -10,7 +10,7 @@ import pytest
 from fenwear import CaseError, load_case
 from fenwear.assembly import assemble
 from fenwear.law_choice import check_decided, resolve_law
-from fenwear.plausibility import stroke_warnings
+from fenwear.plausibility import system_warnings
 from fenwear.run import run_case
 from fenwear.sweeps.evaluate import VariantRunner
 
@@ -54,7 +54,7 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     assert f"'{law}' is taken" in told[0]
     assert reason in told[0]
     if reason == "contact.transverse_friction":
-        assert "cannot be followed here: contact.transverse_friction" in stroke_warnings(found.system)[0]
+        assert "cannot be followed here: contact.transverse_friction" in system_warnings(found.system)[0]
 
 
 def test_the_estimate_decides_where_it_says() -> None:

@@ -27,24 +27,17 @@ from fenwear.case import Body, Support, changed_case, plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
 from fenwear.plausibility import (
+    RULES,
+    Seen,
     StateMonitor,
     elastic_way,
-    hot,
     initial_warnings,
-    pressed,
     steady_warnings,
-    stroke_warnings,
+    system_warnings,
 )
-from fenwear.plausibility.chamfer import contact_chamfer
-from fenwear.plausibility.curved import curved_text, turned
-from fenwear.plausibility.ends import contact_ends
-from fenwear.plausibility.few import few_text
+from fenwear.plausibility.boundary import contact_chamfers, contact_limits, thickness
 from fenwear.plausibility.large import strain_and_rotation
-from fenwear.plausibility.layer import heated_layer, layer_warnings
-from fenwear.plausibility.polygon import polygon_text
-from fenwear.plausibility.rim import ContactRim, contact_rim
-from fenwear.plausibility.states import clipped_text, contact_limits
-from fenwear.plausibility.thickness import thickness
+from fenwear.plausibility.meshes import few, heated_layer, turned
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
@@ -59,43 +52,29 @@ CYLINDER = ("geometry.parameters.elements_along_contact=16", "motion.positions=3
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(
-    ("name", "settings", "goes_on", "ends", "reach"),
+    ("name", "settings", "ends"),
     [
-        ("example1", FLAT, (False, False), 30.0, 60.0),  # the corners of a flat punch
-        ("rounded-punch", (), (False, False), 30.0, 60.0),  # its rounded edges end at the sides
-        ("fretting", CYLINDER, (True, True), 0.3, 8.0),  # up to the sides of the part that is meshed
+        ("example1", FLAT, []),  # the corners of a flat punch
+        ("rounded-punch", (), []),  # its rounded edges end at the sides
+        ("fretting", CYLINDER, [-0.3, 0.3]),  # an arc that was tagged too short
+        ("ring-on-ring", (), []),
     ],
 )
-def test_where_bodies_go_on(
-    assembled: Assembled, name: str, settings: tuple[str, ...], goes_on: tuple[bool, bool], ends: float, reach: float
-) -> None:
+def test_where_bodies_go_on(assembled: Assembled, name: str, settings: tuple[str, ...], ends: list[float]) -> None:
     """An edge ends a contact, an arc that was tagged too short does not."""
-    found = contact_ends(assembled(name, *settings))
-    assert found is not None
-    assert found.goes_on == goes_on
-    np.testing.assert_allclose(found.ends, (-ends, ends), rtol=1e-9)
-    assert found.reach == pytest.approx(reach, rel=1e-9)
+    limits = contact_limits(assembled(name, *settings))
+    np.testing.assert_allclose(limits.x[limits.clips, 0], ends, rtol=1e-9)
 
 
 def test_width_by_area(assembled: Assembled) -> None:
     """Reference: A = 4 a³ / (3 2 R) of a parabola worn flat, and Hertz's a² = 4 F R / (pi E*)."""
-    ends = contact_ends(assembled("fretting", *CYLINDER))
-    assert ends is not None
+    limits = contact_limits(assembled("fretting", *CYLINDER))
     for a in (0.5, 0.7):
-        assert ends.width_needed(4 * a**3 / (3 * 12), 18.5) == pytest.approx(2 * a, rel=0.01)
+        assert limits.width_needed(4 * a**3 / (3 * 12), 18.5) == pytest.approx(2 * a, rel=0.01)
     modulus, load = 2e5 / (2 * (1 - 0.09)), 6000.0
-    assert ends.width_needed(0.0, load) == pytest.approx(2 * np.sqrt(4 * load * 6 / (np.pi * modulus)), rel=0.02)
-    assert ends.width_needed(1e3, 18.5) == ends.reach  # never beyond the edges
-
-
-def test_rings_are_as_long_as_they_are_round(assembled: Assembled) -> None:
-    """Volumes and loads of whole rings are those of a plane times 2 pi times the mean radius of the contact."""
-    ends = contact_ends(assembled("ring-on-ring"))
-    assert ends is not None
-    assert ends.goes_on == (False, False)
-    assert ends.around == pytest.approx(2 * np.pi * 2 / 3 * (30**3 - 20**3) / (30**2 - 20**2), rel=1e-9)
-    plane = replace(ends, around=1.0)
-    assert ends.width_needed(ends.around * 1e-3, ends.around * 7.0) == plane.width_needed(1e-3, 7.0)
+    assert limits.width_needed(0.0, load) == pytest.approx(2 * np.sqrt(4 * load * 6 / (np.pi * modulus)), rel=0.02)
+    ring = replace(limits, around=7.0)  # volumes and loads of whole rings over their circumference
+    assert ring.width_needed(7e-3, 70.0) == limits.width_needed(1e-3, 10.0)
 
 
 @pytest.mark.mpi
@@ -110,11 +89,10 @@ def test_rings_are_as_long_as_they_are_round(assembled: Assembled) -> None:
 def test_rims(name: str, settings: tuple[str, ...], clips: str) -> None:
     """A ball goes on beyond the square that is tagged; an edge ends a contact."""
     placed = place_case(load_case(name, ["geometry.degree=2", *settings]))
-    rim = contact_rim(placed)
+    rim = contact_limits(placed)
     if clips == "nowhere":
-        assert rim is None
+        assert not rim.clips.any()
         return
-    assert rim is not None
     x = placed.pair.punch.x
     np.testing.assert_array_equal(rim.clips, np.abs(x[:, :2]).max(axis=1) > 0.2 - 1e-9)
     assert rim.width == pytest.approx(0.4, rel=1e-9)
@@ -124,18 +102,16 @@ def test_rims(name: str, settings: tuple[str, ...], clips: str) -> None:
 def test_a_ball_that_needs_more(assembled: Assembled) -> None:
     """Reference: Hertz's a³ = 3 F R / (4 E*), and the volume pi a⁴ / (4 R) of a cap worn flat."""
     system = assembled("ball-on-flat", "geometry.degree=1", "punch.loads.0.force=[0, 0, -600]")
-    rim = contact_rim(system)
-    assert rim is not None
+    rim = contact_limits(system)
     modulus = 210e3 / (2 * (1 - 0.09))
     assert rim.width_needed(0.0, 600.0) == pytest.approx(2 * (0.75 * 600 * 5 / modulus) ** (1 / 3), rel=2e-3)
     assert rim.width_needed(np.pi * 0.4**4 / (4 * 5), 0.0) == pytest.approx(0.8, rel=2e-3)
-    (warning, _) = initial_warnings(system)
-    assert re.search(
-        r"at \d+ nodes of its rim, \((0\.2, 0|0, 0\.2), 0\.004\d*\) mm among them, where the bodies go on", warning
-    )
-    assert "a width of about 0.538 mm is needed, it has 0.4 mm; set geometry.parameters.contact_width" in warning
+    warning = RULES["clipped"].text(Seen.of_start(system))
+    assert re.search(r"at \d+ nodes of its rim, \((0\.2, 0|0, 0\.2), 0\.004\d*\) mm among them", warning)
+    assert "about 0.538 mm" in warning
+    assert "it has 0.4 mm. Set `geometry.parameters.contact_width`" in warning
     inside = assembled("ball-on-flat", "geometry.degree=1", "punch.loads.0.force=[0, 0, -20]")
-    assert not any("clipped" in text for text in initial_warnings(inside))
+    assert RULES["clipped"].text(Seen.of_start(inside)) == ""
 
 
 def half_tagged(folder: Path) -> Path:
@@ -166,7 +142,7 @@ def test_clipped_contact_is_told(tmp_path: Path) -> None:
     (warning,) = [text for text in narrow["warnings"] if "clipped" in text]
     assert "x = -0.2 and 0.2 mm" in warning
     assert "geometry.parameters.contact_width" in warning
-    assert any(text.startswith("warning: from half-cycle") and "clipped" in text for text in said)
+    assert any("contact is clipped in half-cycle" in text for text in said)
     assert str(escape(warning)) in page(tmp_path / "run")
     needed = float(warning.partition("a width of about ")[2].partition(" mm")[0])
     (tmp_path / "wide").mkdir()
@@ -190,13 +166,12 @@ def test_a_contact_grid_may_be_too_small(size: str, clipped: bool, assembled: As
     bodies = ("punch.operator='half-space'", "strip.operator='half-space'", "motion.positions=2")
     coarse = ("geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4")
     system = assembled("ball-on-flat", grid, *bodies, *coarse)
-    found = [text for text in initial_warnings(system) if "clipped" in text]
-    assert len(found) == clipped
+    found = RULES["clipped"].text(Seen.of_start(system))
+    assert bool(found) == clipped
     if clipped:
-        assert "end of the contact grid" in found[0]
         width = 2 * (3 * 20 * 5 / (4 * 210e3 / (2 * (1 - 0.3**2)))) ** (1 / 3)
-        assert f"a width of about {width:.2g}" in found[0]
-        assert "set grid.size" in found[0]
+        assert f"about {width:.2g}" in found
+        assert "`grid.size`" in found
 
 
 @pytest.mark.parametrize("grid", ["nodes=9", "across=8"])
@@ -207,29 +182,29 @@ def test_a_contact_grid_over_the_whole_surface(grid: str, assembled: Assembled) 
     system = assembled("ball-on-flat", f"grid={{{grid}}}", *bodies, *coarse)
     limits = contact_limits(system)
     if "across" in grid:
-        assert limits is None or not limits.clips.any()  # it can still grow
+        assert not limits.clips.any()  # it can still grow
         whole = system.bodies.punch.reach
         assert whole is not None
         system = regridded(system, whole.grid)
         limits = contact_limits(system)
-    assert isinstance(limits, ContactRim)
     assert not limits.of_grid
     found = system.pair.punch.grid
     assert found is not None
     outer = ((found.places == 0) | (found.places == np.array(found.counts) - 1)).any(axis=1)
     np.testing.assert_array_equal(limits.clips, outer)
-    assert "meshed contact surface" in clipped_text(limits, limits.where(outer), None, system.case)
+    text = RULES["clipped"].text(Seen.of_pressure(system, outer[None].astype(float), "then"))
+    assert "end of the meshed contact surface at" in text
 
 
 def test_half_a_flat_is_clipped(assembled: Assembled, tmp_path: Path) -> None:
-    """The same punch whose tag ends in the middle of its flat: told before anything is computed, and by `steady`."""
+    """The same punch whose tag ends in the middle of its flat: told before anything is computed and by `steady`."""
     system = assembled(half_tagged(tmp_path), *FLAT)
     (warning,) = initial_warnings(system)
     assert "at x = 0 mm" in warning
-    assert "about 60 mm is needed, it has 30 mm" in warning
+    assert "Widen `punch_contact`" in warning
     (warning,) = steady_warnings(system, steady(system))
-    assert "x = 0 mm" in warning
-    assert "a width of about 60 mm" in warning
+    assert "at x = 0 mm" in warning
+    assert "as wide as that surface, 30 mm" in warning
 
 
 def test_steady_scar_of_a_cylinder(assembled: Assembled) -> None:
@@ -241,19 +216,24 @@ def test_steady_scar_of_a_cylinder(assembled: Assembled) -> None:
     state = steady(system)
     assert state.contact_width.max() == pytest.approx(0.6, rel=1e-6)
     (warning,) = steady_warnings(system, state)
-    assert "as wide as what is meshed, 0.6 mm" in warning
-    assert "about 8 mm" in warning
+    assert "as wide as that surface, 0.6 mm" in warning
 
 
 def test_pressed_beyond_the_hardness() -> None:
     """The mean pressure against the hardness of either body, and against a tenth of Young's modulus."""
-    tables = tomllib.loads(load_case("example1").to_toml())
+    tables = tomllib.loads(load_case("example1", FLAT).to_toml())
     tables["wear"]["punch"] = {"archard": 1e-5, "hardness": "1.2 GPa"}
-    case = make_case(tables)
-    assert pressed(case, 1199.0) == ""
-    assert "wear.punch.hardness, 1,200 MPa" in pressed(case, 1201.0)
-    assert pressed(load_case("example1"), 1.29e4) == ""
-    assert "Young's modulus of composite" in pressed(load_case("example1"), 1.31e4)
+    hard, plain = place_case(make_case(tables)), place_case(load_case("example1", FLAT))
+
+    def told(system: Tribosystem, pressure: float, name: str) -> str:
+        even = np.full((1, len(system.pair.weights)), pressure)
+        return RULES[name].text(Seen.of_pressure(system, even, "then"))
+
+    assert told(hard, 1199.0, "hardness") == ""
+    assert told(hard, 1201.0, "hardness").startswith("wear.punch.hardness: ")
+    assert "1,201 MPa then, above the hardness of 1,200 MPa" in told(hard, 1201.0, "hardness")
+    assert told(plain, 1.29e4, "strength") == ""
+    assert "Young's modulus of composite" in told(plain, 1.31e4, "strength")
 
 
 def test_a_run_beyond_the_hardness(tmp_path: Path) -> None:
@@ -264,7 +244,8 @@ def test_a_run_beyond_the_hardness(tmp_path: Path) -> None:
     tables["wear"]["punch"] = {"archard": 1e-9, "hardness": "10 MPa"}
     summary, _ = run_case(make_case(tables), "run", tmp_path / "run", lambda message: None)
     (warning,) = summary["warnings"]
-    assert "reaches 16.67 MPa, more than wear.punch.hardness, 10 MPa" in warning
+    assert warning.startswith("wear.punch.hardness: ")
+    assert "reaches 16.67 MPa in half-cycle 1, above the hardness of 10 MPa" in warning
 
 
 @pytest.mark.parametrize(("name", "factor"), [("fretting-partial-slip", 4.0), ("ball-on-flat", 4.7)])
@@ -286,10 +267,12 @@ def test_shakedown(name: str, factor: float, assembled: Assembled) -> None:
             assert not [text for text in initial_warnings(capped) if "shakedown" in text]
 
 
-def test_molten() -> None:
+def test_molten(assembled: Assembled) -> None:
     """16,269 K ended with status 0 and no word."""
-    assert hot(1999.0, "") == ""
-    assert "reach 1.627e+04 K in half-cycle 3" in hot(16269.0, "in half-cycle 3")
+    system = assembled("example1", *FLAT)
+    seen = Seen.of_system(system)
+    assert RULES["hot"].text(replace(seen, temperature=np.array([1999.0]))) == ""
+    assert "reach 1.627e+04 K at the start" in RULES["hot"].text(replace(seen, temperature=np.array([16269.0])))
 
 
 def test_a_mesh_is_not_moved_after_the_last_half_cycle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -333,13 +316,13 @@ def test_elastic_way_against_stick(assembled: Assembled) -> None:
 
 def test_stroke_taken_up(assembled: Assembled) -> None:
     """The case itself slides as a whole: 3 %; a stroke that the bodies take up in part, or wholly, is told."""
-    assert stroke_warnings(pressed_by(assembled, 18.5, 25)) == []
-    assert stroke_warnings(pressed_by(assembled, 18.5, 10)) == []
-    (text,) = stroke_warnings(pressed_by(assembled, 18.5, 5))
+    assert system_warnings(pressed_by(assembled, 18.5, 25)) == []
+    assert system_warnings(pressed_by(assembled, 18.5, 10)) == []
+    (text,) = system_warnings(pressed_by(assembled, 18.5, 5))
     assert 'contact.law = "coulomb"' in text
     assert "amplitude of 5 µm" in text
     assert text in initial_warnings(pressed_by(assembled, 18.5, 5))
-    (text,) = stroke_warnings(pressed_by(assembled, 120, 3))
+    (text,) = system_warnings(pressed_by(assembled, 120, 3))
     share = float(text.split(" % of the amplitude")[0].split()[-1])
     assert share > 100
 
@@ -347,12 +330,12 @@ def test_stroke_taken_up(assembled: Assembled) -> None:
 @pytest.mark.parametrize("name", ["example1", "rounded-punch"])
 def test_long_strokes_are_not_told(assembled: Assembled, name: str) -> None:
     """Strokes of millimetres."""
-    assert stroke_warnings(assembled(name, *(FLAT if name == "example1" else ()))) == []
+    assert system_warnings(assembled(name, *(FLAT if name == "example1" else ()))) == []
 
 
 def test_frictionless_stroke_is_not_told(assembled: Assembled) -> None:
     """Nothing follows where there is no friction."""
-    assert stroke_warnings(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")) == []
+    assert system_warnings(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")) == []
 
 
 CHAMFERED = """
@@ -417,13 +400,11 @@ def chamfered(folder: Path, kind: str, rise: float, width: float = 2.0, *, tagge
 def test_a_chamfer_that_wear_reaches(tmp_path: Path, kind: str, rise: float, wider: float) -> None:
     """Reference: 0.05 mm off a flat beside a chamfer of rise over 0.6 mm makes it 0.05 * 0.6 / rise wider a side."""
     system = chamfered(tmp_path, kind, rise)
-    chamfer = contact_chamfer(system)
-    assert chamfer is not None
-    worn = system.unworn()
-    assert chamfer.text(chamfer.widened(system, worn)) == ""
+    chamfers, worn = contact_chamfers(system), system.unworn()
+    assert chamfers.widened(system, worn) == 0
     worn = replace(worn, punch=np.full_like(worn.punch, 0.05))
-    assert chamfer.widened(system, worn) == pytest.approx(wider, rel=1e-6)
-    text = chamfer.text(chamfer.widened(system, worn))
+    assert chamfers.widened(system, worn) == pytest.approx(wider, rel=1e-6)
+    text = RULES["chamfer"].text(replace(Seen.of_system(system), end=worn, kind="run"))
     assert ("" if wider < 0.02 * 2.8 else f"about {wider:.2g} mm wider than the 2.8") in text
     assert bool(text) == (wider > 0.02 * 2.8)
 
@@ -431,8 +412,8 @@ def test_a_chamfer_that_wear_reaches(tmp_path: Path, kind: str, rise: float, wid
 @pytest.mark.parametrize("kind", ["plane", "solid"])
 def test_what_is_no_chamfer(tmp_path: Path, kind: str) -> None:
     """One that is tagged, and sides that are nearly upright."""
-    assert contact_chamfer(chamfered(tmp_path, kind, 0.3, tagged=True)) is None
-    assert contact_chamfer(chamfered(tmp_path, kind, 3.9, 1.5)) is None
+    assert not contact_chamfers(chamfered(tmp_path, kind, 0.3, tagged=True)).cotangent.any()
+    assert not contact_chamfers(chamfered(tmp_path, kind, 3.9, 1.5)).cotangent.any()
 
 
 def test_a_body_worn_through_is_told(assembled: Assembled) -> None:
@@ -444,7 +425,7 @@ def test_a_body_worn_through_is_told(assembled: Assembled) -> None:
     first = int(block.half_cycle[block.totals.of("volume_punch") >= 10 * area][0])
     watch = StateMonitor(system)
     (text,) = watch.see(block)
-    assert f"from half-cycle {first} on the punch is worn through: it has lost 10 mm where it was 10 mm thick" in text
+    assert f"the punch is worn through in half-cycle {first}: it has lost 10 mm where it was 10 mm thick" in text
     assert watch.warnings() == [text]
     assert not StateMonitor(system).see(next(march(system, first - 1, implicit=True)))
 
@@ -494,12 +475,10 @@ def test_solids_warn_of_nothing(name: str, tmp_path: Path) -> None:
     """Without solving for their contact: that of balls is as wide as Hertz's."""
     placed = place_case(case_of(name, tmp_path))
     assert [*position_warnings(placed), *plausibility_warnings(placed.case)] == []
-    rim, x = contact_rim(placed), placed.pair.punch.x
-    if rim is not None:
-        width = rim.hertzian(placed.normal_force)
-        assert width is not None
-        touching = np.where(np.hypot(*x[:, :2].T) < width / 2, 1.0, 0.0)
-        assert few_text(placed.case, net_of(placed), touching, "at the start") == ""
+    rim, x = contact_limits(placed), placed.pair.punch.x
+    if rim.curvatures and rim.clips.any():
+        touching = np.where(np.hypot(*x[:, :2].T) < rim.hertzian(placed.normal_force) / 2, 1.0, 0.0)
+        assert few(placed.case, net_of(placed), touching) == {}
 
 
 def start(system: Tribosystem) -> np.ndarray:
@@ -524,7 +503,7 @@ def test_contact_on_a_few_nodes_is_told(assembled: Assembled, elements: int, few
     told = [text for text in initial_warnings(system) if "across the contact" in text]
     assert bool(told) is few
     if few:
-        wanted = int(told[0].rpartition(f"{key} = ")[2])
+        wanted = int(told[0].rpartition(f"{key} = ")[2].strip("`"))
         assert 32 <= wanted <= 60  # with 60 there are 15 nodes
         finer = assembled("fretting", f"{key}={wanted}", "motion.positions=2")
         assert not [text for text in initial_warnings(finer) if "across the contact" in text]
@@ -535,13 +514,13 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
     coarse = ("geometry.parameters.elements_along_contact=8", "motion.positions=2")
     summary, said = run(tmp_path, "fretting", *coarse, "run.half_cycles=2", "run.integration=implicit",
                         "output.report=false", "output.uncertainty=false")  # fmt: skip
-    (told,) = [text for text in summary["warnings"] if "across the contact at the start" in text]
+    (told,) = [text for text in summary["warnings"] if "across the contact in half-cycle 1" in text]
     assert said.count(f"warning: {told}") == 1
     system = assembled("fretting", *coarse)
     (tmp_path / "own.msh").touch()
     geometry = system.case.geometry.model_copy(update={"file": "own.msh", "order": 1, "parameters": {}})
     own = system.case.model_copy(update={"geometry": geometry}).at(tmp_path)
-    text = few_text(own, net_of(system), start(system), "at the start")
+    text = str(few(own, net_of(system), start(system))["remedy"])
     size = float(re.findall(r"elements at the contact ([\d.e-]+) mm long", text)[0])
     assert 0.6 / 60 < size < 0.6 / 32  # with 60 there are 15 nodes
     state = steady(assembled("example1", "geometry.degree=1", "geometry.parameters.elements_along_contact=4"))
@@ -621,8 +600,8 @@ def test_a_curve_that_is_meshed_as_a_polygon(assembled: Assembled, elements: int
             assembled("fretting", *settings, f"geometry.degree={degree}", f"geometry.order={order}") for order in (1, 2)
         )
         pressure = start(straight)
-        off, told = np.abs(pressure - start(curved)).max(), polygon_text(straight, pressure, "at the start")
-        assert polygon_text(curved, start(curved), "at the start") == ""
+        off, told = np.abs(pressure - start(curved)).max(), RULES["polygon"].text(Seen.of_start(straight))
+        assert RULES["polygon"].text(Seen.of_start(curved)) == ""
         if degree == 1:
             assert off < 1e-3 * pressure.max()
             assert told == ""
@@ -654,7 +633,8 @@ def test_elements_thicker_than_the_layer_that_heats_up() -> None:
     bare = ["motion.angular_speed=100", "geometry.parameters.diffusion_area=0"]
 
     def told(*settings: str) -> list[str]:
-        return layer_warnings(place_case(load_case("brake-pad", list(settings))))
+        text = RULES["layer"].text(Seen.of_system(place_case(load_case("brake-pad", list(settings)))))
+        return [text] if text else []
 
     (coarse,) = told(*bare, "geometry.parameters.growth=1", "geometry.parameters.disc_layers=3")
     assert "up to 4 mm high" in coarse
@@ -691,8 +671,6 @@ def test_deep_wear_of_a_bore_turns_its_normals() -> None:
     cosine = np.maximum((pair.normal @ pair.normal[np.abs(pair.x).argmin()]), 0.0)
     radius = pair.punch.rounds[0][0].radius
     assert turned(pair, 0.08 * radius * cosine) == pytest.approx(0.08, rel=5e-3)
-    assert curved_text(pair, 0.04 * radius * cosine, "then") == ""
-    assert "8 % of its radius" in curved_text(pair, 0.08 * radius * cosine, "then")
 
 
 def test_strain_and_rotation_of_a_linear_displacement() -> None:

@@ -10,12 +10,8 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
-from fenwear.plausibility.few import few_text
-from fenwear.plausibility.size import size_warnings
-from fenwear.plausibility.slip import law_warnings, unique_text
+from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
-from fenwear.results.shakedown import shakedown_text
-from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.interface import meshed
@@ -39,7 +35,6 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     problem = system.law_state.problem
     both = meshed(problem.interface)
     setup = both.needs.text()
-    sizes = size_warnings(case, system.bodies, system.rigid)
     records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
     thick, weights = case.model.thickness, problem.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
@@ -47,9 +42,9 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
     if stuck == closed:
         regime = "full stick"
-    few = few_text(case, net_of(system), records.pressure[0], "at the start")
-    flows = shakedown_text(system, float(records.pressure.max()), "in the first cycle")
-    warnings = (*sizes, *law_warnings(system), unique_text(records.unique.astype(bool)), few, flows)
+    seen = Seen.of_pressure(system, records.pressure, "in the first cycle")
+    texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown")]
+    warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
     return (
         f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "

@@ -24,14 +24,3 @@ def complementarity_error(pressure: Array, gap: Array, elastic_length: float) ->
     """
     scale = np.maximum(np.abs(pressure).max(axis=-1, keepdims=True), 1e-300)
     return np.abs(np.minimum(pressure / scale, gap / (elastic_length * scale))).max(axis=-1)
-
-
-def broken_text(error: float, when: str) -> str:
-    """Say that a contact does not fulfil its conditions; "" if it does."""
-    if error <= BROKEN:
-        return ""
-    return (
-        f"{when} the contact breaks its own conditions (p >= 0, gap >= 0, p gap = 0) by {100 * error:.2g} % of its "
-        "largest pressure and of the gap that belongs to it: bodies overlap or pull on each other, and no number of it "
-        "is to be believed; look at the supports, or take smaller steps"
-    )

@@ -25,7 +25,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
 from fenwear.life.snapshot import Snapshot, WornSurface, contacts_of, edge_moved
-from fenwear.plausibility.stroke import stroke_warnings
+from fenwear.plausibility import system_warnings
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.final import FinalShape
@@ -101,7 +101,7 @@ class Model:
 
     def stick_left_out(self) -> list[str]:
         """Return what is to be said of stick that the case leaves out, with an estimate of it."""
-        return stroke_warnings(self.system())
+        return system_warnings(self.system())
 
     def _check_stays(self) -> None:
         """Refuse laws that change as long as a run goes on where a steady state is asked for.

@@ -21,24 +21,10 @@ from fenwear.case import CONDENSED
 from fenwear.compat import geometry_dofmap
 from fenwear.contact import ContactState
 from fenwear.parallel import total
+from fenwear.plausibility.meshes import Fields
 from fenwear.results.fields import displacements
 
 LARGE = 0.05  # strain, or rotation in rad: the linear theory leaves out terms of this relative size
-
-
-def large_text(elastic: ElasticBody, displacement: fem.Function) -> str:
-    """Say that a body turns or stretches beyond small strain; "" where it does not; collective."""
-    stretched, turned = strain_and_rotation(elastic, displacement)
-    if max(stretched, turned) <= LARGE:
-        return ""
-    own = np.linalg.norm(displacement.x.array.reshape(-1, elastic.dim), axis=1).max(initial=0.0)
-    farthest = float(elastic.body.mesh.comm.allreduce(float(own), op=MPI.MAX))
-    return (
-        f"the {elastic.body.name} moves by up to {farthest:.2g} mm: where it is strained it stretches by "
-        f"{100 * stretched:.2g} % and turns by {np.degrees(turned):.2g} degrees. The linear theory, of small strains "
-        f"and rotations, is off by some {100 * max(stretched, turned):.0f} % there. Reduce the load or the approach, "
-        "or compute it by a program for large displacements"
-    )
 
 
 def strain_and_rotation(elastic: ElasticBody, displacement: fem.Function) -> tuple[float, float]:
@@ -59,15 +45,19 @@ def strain_and_rotation(elastic: ElasticBody, displacement: fem.Function) -> tup
     return float(np.sqrt(strains / max(weight, 1e-300))), float(np.sqrt(spins / max(weight, 1e-300)))
 
 
-def large_warnings(system: Tribosystem, contact: ContactState | None = None) -> list[str]:
-    """Return what is to be said of bodies that the first contact moves beyond small strain; collective.
-
-    Args:
-        system: The problem.
-        contact: Of unworn bodies; by default it is solved.
-    """
+def large(system: Tribosystem, contact: ContactState) -> Fields:
+    """Return the body that a contact moves beyond small strain; nothing where none does; collective."""
     if any(body.operator != CONDENSED for body in (system.bodies.punch, system.bodies.strip)):
-        return []  # bodies that nothing but their contact knows
-    contact = contact or system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
-    found = displacements(system, contact.pressure[0], contact.rigid[0])
-    return [text for body, displacement in found if (text := large_text(body, displacement))]
+        return {}  # bodies that nothing but their contact knows
+    for elastic, displacement in displacements(system, contact.pressure[0], contact.rigid[0]):
+        stretched, turned = strain_and_rotation(elastic, displacement)
+        if max(stretched, turned) > LARGE:
+            own = np.linalg.norm(displacement.x.array.reshape(-1, elastic.dim), axis=1).max(initial=0.0)
+            return {
+                "body": elastic.body.name,
+                "farthest": float(elastic.body.mesh.comm.allreduce(float(own), op=MPI.MAX)),
+                "stretched": 100 * stretched,
+                "turned": np.degrees(turned),
+                "percent": 100 * max(stretched, turned),
+            }
+    return {}

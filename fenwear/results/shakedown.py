@@ -29,21 +29,9 @@ def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
     if not given:
         return None
     softest = min(given, key=lambda name: given[name])
-    return float(_factor(placed) * given[softest] / np.sqrt(3)), softest
+    return float(factor(placed) * given[softest] / np.sqrt(3)), softest
 
 
-def _factor(placed: ContactSetup) -> float:
+def factor(placed: ContactSetup) -> float:
     """Return p_0 / k: in space of a point, else of a line."""
     return POINT if placed.pair.punch.dim == 3 else LINE
-
-
-def shakedown_text(placed: ContactSetup, pressure: float, when: str) -> str:
-    """Say that a largest pressure, MPa, is beyond the limit; "" if it is not, or a hardness caps it."""
-    limit = None if placed.layers.hardness < np.inf else shakedown_limit(placed)
-    if limit is None or pressure <= limit[0]:
-        return ""
-    return (
-        f"the largest pressure is {pressure:,.4g} MPa {when}, beyond the shakedown limit of {limit[0]:,.4g} MPa, "
-        f"{_factor(placed):g} k by materials.{limit[1]}.yield_stress: the surface flows in every cycle, and a "
-        "linear-elastic contact does not; expected less load, or contact.hardness"
-    )

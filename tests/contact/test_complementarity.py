@@ -10,7 +10,7 @@ import pytest
 
 from fenwear import Tribosystem, march, steady
 from fenwear.contact import ContactState
-from fenwear.contact.complementarity import BROKEN, broken_text, complementarity_error
+from fenwear.contact.complementarity import complementarity_error
 from fenwear.contact.condensed import CondensedContact
 from fenwear.plausibility import StateMonitor, steady_warnings
 
@@ -31,7 +31,6 @@ def test_error(pressure: list[float], gap: list[float], error: float) -> None:
     """Each of the three conditions is seen, over the scales of both."""
     found = complementarity_error(np.array(pressure), np.array(gap), 0.1)
     assert found == pytest.approx(error, abs=1e-15)
-    assert bool(broken_text(float(found), "here")) == (error > BROKEN)
 
 
 def test_of_runs_and_steady_states(assembled: Callable[..., Tribosystem]) -> None:
@@ -41,7 +40,7 @@ def test_of_runs_and_steady_states(assembled: Callable[..., Tribosystem]) -> Non
     assert block.complementarity_error.max() < 1e-8
     state = steady(system)
     assert state.complementarity_error < 1e-8
-    assert not [text for text in steady_warnings(system, state) if "conditions" in text]
+    assert not [text for text in steady_warnings(system, state) if "p gap = 0" in text]
 
 
 def test_a_contact_that_lies(assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,4 +57,4 @@ def test_a_contact_that_lies(assembled: Callable[..., Tribosystem], monkeypatch:
     *_, block = march(system, 2)
     assert block.equilibrium_error.max() < 1e-12
     assert block.complementarity_error.min() > 0.05
-    assert "in half-cycle 1 the contact breaks its own conditions" in StateMonitor(system).see(block)[0]
+    assert any("did not converge in half-cycle" in text for text in StateMonitor(system).see(block))

@@ -15,7 +15,7 @@ from fenwear import load_case
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
-from fenwear.plausibility.slip import unique_text
+from fenwear.plausibility import unique_text
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.cone import project
 from fenwear.stick.records import TimeStepRecords
@@ -136,5 +136,6 @@ def test_friction_too_large_is_seen() -> None:
     assert found[0.9].all()
     assert unique_text(found[0.9]) == ""
     assert not found[6.0].all()
-    text = f"may have no or several answers in {(~found[6.0]).sum()} of 16 time steps; those taken are the ones"
-    assert text in unique_text(found[6.0])
+    text = unique_text(found[6.0])
+    assert text.startswith("contact.friction: ")
+    assert f"{(~found[6.0]).sum()} of 16 time steps" in text

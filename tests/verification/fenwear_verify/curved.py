@@ -7,7 +7,7 @@ import numpy as np
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.plausibility.ends import contact_ends
+from fenwear.plausibility.boundary import contact_limits
 from fenwear_verify.bodies import STEEL, builtin
 from fenwear_verify.contact import measured_half_width, semi_ellipse
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
@@ -146,13 +146,13 @@ def clipped_contact() -> Result:
         system = vary(cylinder(20), *settings)
         a = 2 * np.sqrt(load * RADIUS / (np.pi * modulus))
         _, p = pressed(system, load)
-        ends = contact_ends(system)
-        told = [] if ends is None else ends.reached((bool(p[0] > 0), bool(p[-1] > 0)))
-        clipped = 2.0 if 2 * a > width else 0.0
-        rows.append(number(f"surface of {width:g} mm: clipped ends", clipped, float(len(told)), 1e-12, scale=1.0))
-        if ends is not None and told:
-            rows.append(number("width needed, unworn (mm)", 2 * a, ends.width_needed(0.0, load), 0.01))
+        limits = contact_limits(system)
+        clipped = float((limits.clips & (p > 0)).sum())
+        wanted = 2.0 if 2 * a > width else 0.0
+        rows.append(number(f"surface of {width:g} mm: clipped ends", wanted, clipped, 1e-12, scale=1.0))
+        if clipped:
+            rows.append(number("width needed, unworn (mm)", 2 * a, limits.width_needed(0.0, load), 0.01))
             chord = 0.5
             area = chord**3 / (12 * RADIUS)
-            rows.append(number("width needed, worn to 0.5 mm (mm)", chord, ends.width_needed(area, 1e-3), 0.01))
+            rows.append(number("width needed, worn to 0.5 mm (mm)", chord, limits.width_needed(area, 1e-3), 0.01))
     return Result(rows)

@@ -31,6 +31,7 @@ from fenwear.sliding.wear import WornDepths
 
 FLAT = 1e-6  # of the contact: what lies in a plane
 SWALLOWED = 0.2  # of a load: nodes at the end of its group that a support beside it holds may take less of it
+TILTED = 4.0  # times Sq: how much a rough surface may rise from end to end
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,27 @@ class Bodies:
     @property
     def remarks(self) -> list[str]:
         """What is to be said of the bodies before anything is computed with them."""
-        return [*self.last_resorts, *self.swallowed_loads]
+        return [*self.last_resorts, *self.swallowed_loads, *self.tilted_maps]
+
+    @property
+    def tilted_maps(self) -> list[str]:
+        """What is to be said of rough surfaces whose tilt is higher than their roughness."""
+        texts = []
+        for body in (self.punch, self.strip):
+            heights, grid = body.surface.heights, body.surface.grid
+            if heights is None or grid is None:
+                continue
+            plane = np.column_stack([np.ones(len(heights)), grid.flat - grid.flat.mean(axis=0)])
+            fitted = np.linalg.lstsq(plane, heights, rcond=None)[0]
+            rise, rough = np.ptp(plane @ fitted), np.sqrt(np.mean((heights - plane @ fitted) ** 2))
+            if rise > TILTED * rough and rise > 0:
+                slope = 1e3 * float(np.linalg.norm(fitted[1:]))
+                texts.append(
+                    f"{body.body.name}.topography: the map is tilted by {slope:.2g} mrad. One end lies "
+                    f"{1e3 * rise:.3g} µm higher, where Sq is {1e3 * rough:.3g} µm, which moves the contact. "
+                    "Set level = 'plane'."
+                )
+        return texts
 
     @property
     def swallowed_loads(self) -> list[str]:

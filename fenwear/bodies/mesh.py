@@ -35,7 +35,8 @@ from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
 from fenwear.files.formats import CAD, MESHES, is_foreign, read_mesh
-from fenwear.files.groups import GroupedMesh, grouped, into_gmsh, normal
+from fenwear.files.groups import Group, GroupedMesh, grouped, into_gmsh, normal, rows_text
+from fenwear.files.mesh import stacked
 from fenwear.files.session import gmsh_model
 from fenwear.memory import check_memory
 from fenwear.parallel import on_root
@@ -243,7 +244,7 @@ def write_msh(
     kind: Kind | None = "stress",
     known: Mapping[str, float] = NOTHING,
     names: Names = BY_ROLE,
-) -> GroupedMesh | None:
+) -> tuple[list[dict[str, Any]], str]:
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
 
     Args:
@@ -255,7 +256,7 @@ def write_msh(
         names: Of the bodies.
 
     Returns:
-        The groups of the mesh of another program.
+        A row of each group, with its size, and all of it in lines with what is left out of the mesh of another program.
 
     Raises:
         CaseError: as `build_meshes`; or `path` cannot be written.
@@ -274,7 +275,28 @@ def write_msh(
         if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
             path.unlink()
             raise OutputError(path, "gmsh wrote only a part of it; is there room?")
-    return foreign
+        if foreign is not None:
+            return foreign.rows(), foreign.text()
+        rows = _group_rows(gmsh)
+    return rows, rows_text(rows)
+
+
+def _group_rows(gmsh: Any) -> list[dict[str, Any]]:
+    """Return a row of each group of bodies in gmsh's current model."""
+    tags, flat, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    points = np.asarray(flat, dtype=np.float64).reshape(-1, 3)[order]
+    groups = []
+    for dim in range(4):
+        for name, tag in _groups(gmsh, dim).items():
+            cells: dict[int, NDArray[np.int64]] = {}
+            for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
+                for kind, labels, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+                    rows = np.searchsorted(np.asarray(tags)[order], nodes).reshape(len(labels), -1)
+                    cells[int(kind)] = stacked(cells.get(int(kind)), rows)
+            if cells:
+                groups.append(Group(name, dim, cells, name))
+    return GroupedMesh(points, tuple(groups), (), ()).rows()
 
 
 def foreign_mesh(geometry: Geometry, path: Path, kind: Kind | None, names: Names) -> GroupedMesh | None:
@@ -339,7 +361,7 @@ def _load(
         if foreign is not None:
             into_gmsh(gmsh, foreign)
         elif shape:
-            read_shapes(gmsh, str(path), path.name, _millimetres(geometry.unit or "mm"))
+            read_shapes(gmsh, path, _millimetres(geometry.unit or "mm"))
         else:
             _merge(gmsh, path)
             _rename_groups(gmsh, path, geometry, names)
@@ -347,7 +369,7 @@ def _load(
         dim = _dim(kind)
         if shape:
             parts = {_any_case(names)(name): part for name, part in geometry.groups.items()}
-            name_parts(gmsh, path.name, parts, dim, _any_case(names))
+            name_parts(gmsh, path.name, parts, dim, _any_case(names), lambda text: convert(text, "mm"))
         _by_roles(gmsh, path, names)
         if shape:
             tags = {name: (d, tag) for d in range(4) for name, tag in _groups(gmsh, d).items()}

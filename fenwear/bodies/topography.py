@@ -7,7 +7,7 @@ Matter 17, 2005); its root mean square is set exactly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,27 +15,12 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Topography
-from fenwear.case.csv_table import read_csv
-from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
+from fenwear.files.heights import Heights, read_heights
 
 COARSE = 4.0  # spacings that the shortest wave length needs
 USUAL = 8.0  # spacings of the shortest wave length by default
 SLACK = 1e-6  # of the map's extent: how far a grid may reach beyond it
-COLUMNS = {"x": "mm", "y": "mm", "height": "mm"}
-
-
-@dataclass(frozen=True)
-class HeightMap:
-    """Heights at the points of a rectangular raster.
-
-    Attributes:
-        places: Ascending coordinates along each axis, mm.
-        heights: (m,) or (m, n), mm.
-    """
-
-    places: tuple[Array, ...]
-    heights: Array
 
 
 def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | None) -> Array:
@@ -52,7 +37,7 @@ def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | N
     """
     if wanted.file is not None:
         path = Path(wanted.file) if folder is None else folder / wanted.file
-        found = _interpolated(read_map(path, f"{key}.file"), grid, f"{key}.file")
+        found = _interpolated(_measured(path, wanted, key), grid, f"{key}.file")
     elif wanted.wavelength is not None:
         found = _wave(wanted, grid, key)
     else:
@@ -101,7 +86,32 @@ def _self_affine(wanted: Topography, grid: RegularGrid, key: str) -> Array:
     return np.asarray(found * (wanted.rms or 0.0) / np.sqrt(np.mean(found**2)))
 
 
-def _interpolated(measured: HeightMap, grid: RegularGrid, key: str) -> Array:
+def _measured(path: Path, wanted: Topography, key: str) -> Heights:
+    """Return the map of a file, levelled and without holes as its keys say.
+
+    Raises:
+        CaseError: it cannot be read, or has holes that are not to be filled.
+    """
+    try:
+        found = read_heights(path)
+    except CaseError as error:
+        raise CaseError([InputError(f"{key}.file", problem.message) for problem in error.problems]) from None
+    missing = int((~np.isfinite(found.heights)).sum())
+    if wanted.holes == "keep":
+        found = replace(found, far=np.zeros_like(found.far))
+    if found.holes and wanted.holes != "fill":
+        far = f", {found.far.sum()} of them fill values or spikes far beyond the others" if found.far.any() else ""
+        kept = "" if missing else ", or 'keep' if these heights are real"
+        message = f"{path.name} has {found.holes} holes{far}. Set {key}.holes = 'fill'{kept}."
+        raise CaseError(InputError(f"{key}.file", message))
+    try:
+        found = found.filled() if found.holes else found
+    except ValueError as error:
+        raise CaseError(InputError(f"{key}.file", f"{path.name}: {error}")) from None
+    return found if wanted.level is None else found.levelled(wanted.level)
+
+
+def _interpolated(measured: Heights, grid: RegularGrid, key: str) -> Array:
     """Return a map at the nodes of a grid, linear between its points; its middle is that of the grid."""
     from scipy.interpolate import RegularGridInterpolator  # which takes long to load
 
@@ -125,71 +135,3 @@ def _interpolated(measured: HeightMap, grid: RegularGrid, key: str) -> Array:
     low, high = (np.array([own[end] for own in measured.places]) for end in (0, -1))
     read = RegularGridInterpolator(measured.places, measured.heights)
     return np.asarray(read(np.clip(at, low, high)))
-
-
-def read_map(path: Path, key: str) -> HeightMap:
-    """Return the height map of a file: .npz without pickles, .nc or .csv, each number with its unit.
-
-    Raises:
-        CaseError: it cannot be read, is no full raster, or has holes.
-    """
-    readers = {".npz": _from_npz, ".nc": _from_nc, ".csv": _from_csv}
-    if path.suffix.lower() not in readers:
-        raise CaseError(InputError(key, f"expected a file that ends with {', '.join(readers)}, got {path.name}"))
-    try:
-        places, heights = readers[path.suffix.lower()](path, key)
-    except (OSError, ValueError, KeyError) as error:
-        if isinstance(error, CaseError):
-            raise
-        raise CaseError(InputError(key, f"{path.name} cannot be read: {error}")) from None
-    if heights.shape != tuple(len(one) for one in places) or min(heights.shape, default=0) < 2:
-        sizes = " by ".join(str(len(one)) for one in places)
-        raise CaseError(InputError(key, f"{path.name}: expected heights {sizes}, got {heights.shape}"))
-    if not np.isfinite(heights).all() or not all(np.isfinite(one).all() for one in places):
-        holes = int((~np.isfinite(heights)).sum())
-        raise CaseError(InputError(key, f"{path.name} has {holes} holes (not a number): expected them filled"))
-    if any((np.diff(one) <= 0).any() for one in places):
-        raise CaseError(InputError(key, f"{path.name}: expected coordinates that rise"))
-    return HeightMap(places, heights)
-
-
-def _from_npz(path: Path, key: str) -> tuple[tuple[Array, ...], Array]:
-    with np.load(path, allow_pickle=False) as data:
-        missing = [name for name in ("height", "x", "unit") if name not in data]
-        if missing:
-            message = f"{path.name} lacks {', '.join(missing)}: expected height (m, n), x (m,), y (n,) and a unit"
-            raise CaseError(InputError(key, message))
-        to_mm = convert(f"1 {data['unit']}", "mm")
-        names = ["x", "y"][: data["height"].ndim]
-        places = tuple(np.asarray(data[name], dtype=np.float64) * to_mm for name in names)
-        return places, np.asarray(data["height"], dtype=np.float64) * to_mm
-
-
-def _from_nc(path: Path, key: str) -> tuple[tuple[Array, ...], Array]:
-    import xarray
-
-    with xarray.open_dataset(path, engine="h5netcdf") as data:
-        if "height" not in data:
-            raise CaseError(InputError(key, f"{path.name} has no variable height"))
-        height = data["height"].transpose(*(name for name in ("x", "y") if name in data["height"].dims))
-        parts = []
-        for name in (*height.dims, "height"):
-            unit = data[name].attrs.get("units")
-            if unit is None:
-                raise CaseError(InputError(key, f"{path.name}: {name} has no attribute units"))
-            parts.append(np.asarray(data[name] if name != "height" else height) * convert(f"1 {unit}", "mm"))
-        return tuple(parts[:-1]), parts[-1]
-
-
-def _from_csv(path: Path, key: str) -> tuple[tuple[Array, ...], Array]:
-    table = read_csv(path, key, COLUMNS, least=2)
-    if sorted(table.names) not in (["height", "x"], ["height", "x", "y"]):
-        raise table.wrong("expected the columns x and height, or x, y and height")
-    rows = np.array(table.rows)
-    names = [name for name in ("x", "y") if name in table.names]
-    columns = [rows[:, table.names.index(name)] for name in names]
-    places, numbers = zip(*(np.unique(one, return_inverse=True) for one in columns), strict=True)
-    shape = tuple(len(one) for one in places)
-    heights = np.full(shape, np.nan)
-    heights[numbers] = rows[:, table.names.index("height")]
-    return tuple(places), heights

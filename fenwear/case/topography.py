@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from fenwear.case.quantities import Length, Number, Part
 
 Positive = Annotated[Length, Field(gt=0)]
+
+
+def _degree(value: object) -> object:
+    """Return the degree of a polynomial that has a name."""
+    return {"plane": 1, "mean": 0}.get(value, value) if isinstance(value, str) else value
 
 
 class Topography(Part):
@@ -17,7 +22,17 @@ class Topography(Part):
     file: str | None = Field(
         default=None,
         description="a height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
-        ".csv with columns x, (y,) height and their units",
+        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by SurfaceTopography or "
+        "surfalize, where one of them is installed",
+    )
+    holes: Literal["reject", "fill", "keep"] = Field(
+        default="reject",
+        description="of a map: points without a number, fill values such as -9999 and spikes; fill: by their "
+        "neighbours; keep: heights far beyond the others are real",
+    )
+    level: Annotated[int, BeforeValidator(_degree), Field(ge=0, le=8)] | None = Field(
+        default=None,
+        description="what is taken off a map: plane, or a polynomial of this degree; by default nothing",
     )
     rms: Positive | None = Field(default=None, description="Sq of a made self-affine surface, mean zero")
     hurst: Annotated[Number, Field(gt=0, le=1)] = Field(default=0.8, description="H: the spectrum falls by q^-2(1+H)")

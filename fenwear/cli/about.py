@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
+from mpi4py import MPI
 
 from fenwear.case import builtin_cases
 from fenwear.cli import suggestions
 from fenwear.cli.base import JsonOption, app, print_json, show
+from fenwear.parallel import on_root
 
 
 @app.command("info")
@@ -18,13 +21,14 @@ def info_command(
         str | None,
         typer.Argument(
             metavar="KEY",
-            help="Explain this key of the case file, this table, or this ready geometry: bushing.geo.",
+            help="Explain this key of the case file, this table, or this ready geometry: bushing.geo; or list what a "
+            "file has: a mesh, a shape from CAD, a table, a height map.",
             autocompletion=suggestions.keys,
         ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    """Print the versions of the stack and the built-in cases; explain a key of cases; or list what a file has."""
     from fenwear.bodies import kept
     from fenwear.bodies.ready import ready_geometries
     from fenwear.case.keys import find_keys
@@ -36,6 +40,9 @@ def info_command(
             print_json({"geometry": asdict(geometries[key])})
         else:
             show(geometries[key].text())
+        return
+    if key is not None and Path(key).is_file():
+        _list_file(Path(key), as_json=as_json)
         return
     if key is not None:
         found = find_keys(key)
@@ -57,6 +64,17 @@ def info_command(
     show("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         show(f"  {name:26} {title}")
+
+
+def _list_file(path: Path, *, as_json: bool) -> None:
+    """Print what a file of another program has."""
+    from fenwear.files.listing import listed_file
+
+    text, content = on_root(MPI.COMM_WORLD, lambda: listed_file(path))
+    if as_json:
+        print_json(content)
+    else:
+        show(text)
 
 
 @app.command("schema")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from mpi4py import MPI
@@ -214,9 +214,16 @@ def mesh_command(
     loaded = load(case, settings)
     _check_msh(output)
     meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion, loaded.names)
-    found = on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
+    rows, text = on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
+    _show_groups(rows, text, output, as_json=as_json)
+
+
+def _show_groups(rows: list[dict[str, Any]], text: str, output: Path, *, as_json: bool) -> None:
+    """Print the groups of a mesh that was written."""
     if as_json:
-        print_json({"mesh": str(output), "groups": [] if found is None else found.rows()})
+        print_json({"mesh": str(output), "groups": rows, "text": text})
+    else:
+        log(text)
     log(f"mesh in {output}")
 
 
@@ -250,10 +257,5 @@ def import_command(
         raise CaseError(InputError("--group", f"expected GROUP=SET, got {wrong!r}"))
     named = {name.strip(): of.strip() for name, _, of in pairs}
     geometry = Geometry(file=str(source), groups=named, unit=unit)  # type: ignore[arg-type]
-    found = on_root(MPI.COMM_WORLD, lambda: write_msh(geometry, None, output, None))
-    if as_json:
-        rows, unused, notes = ([], (), ()) if found is None else (found.rows(), found.unused, found.notes)
-        print_json({"mesh": str(output), "groups": rows, "unused": list(unused), "notes": list(notes)})
-    elif found is not None:
-        log(found.text())
-    log(f"mesh in {output}")
+    rows, text = on_root(MPI.COMM_WORLD, lambda: write_msh(geometry, None, output, None))
+    _show_groups(rows, text, output, as_json=as_json)

@@ -7,7 +7,10 @@ gmsh: "volume 1", "surface 3", "curve 7". Lengths are in mm: OpenCASCADE takes t
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +18,29 @@ import numpy as np
 
 from fenwear.errors import CaseError, InputError
 from fenwear.files.by_gmsh import in_process
-from fenwear.files.groups import BODIES, ENTITIES, MEASURES, POWERS, normal
+from fenwear.files.groups import BODIES, ENTITIES, MEASURES, PLANE, POWERS, normal
 from fenwear.files.mesh import listed
 
+FLAT = 1e-3  # of its length: how deep a flat shape may be, as OpenCASCADE's boxes are larger than shapes
+WORDS = (("vertex",), ("edge",), ("face",), ("solid", "body"))  # what others call points, curves, surfaces, volumes
 GROWTH = 0.3  # of the distance from a part with a size: how much larger elements may be there
 
 
-def entities(gmsh: Any, scale: float = 1.0) -> list[dict[str, Any]]:
-    """Return a row of each part of the shapes in gmsh's current model: name, type, size and box, mm."""
+def entities(gmsh: Any) -> list[dict[str, Any]]:
+    """Return a row of each part of the shapes in gmsh's current model: name, type, size and box, mm.
+
+    Of solids they are volumes and surfaces, of flat shapes surfaces and curves.
+    """
+    whole = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
     rows = []
-    for dim, tag in gmsh.model.getEntities():
-        if dim == 0:
+    for dim, tag in sorted(gmsh.model.getEntities(), key=lambda one: (-one[0], one[1])):
+        if dim < max(whole - 1, 1):
             continue
-        box = scale * np.array(gmsh.model.getBoundingBox(dim, tag))
+        box = np.array(gmsh.model.getBoundingBox(dim, tag)).round(6) + 0.0
         rows.append({
             "name": f"{ENTITIES[dim]} {tag}", "label": gmsh.model.getEntityName(dim, tag).rpartition("/")[2],
             "dim": dim, "type": gmsh.model.getType(dim, tag), "measure": MEASURES[dim],
-            "size": float(gmsh.model.occ.getMass(dim, tag)) * scale**dim, "from": box[:3].round(6).tolist(),
-            "to": box[3:].round(6).tolist(),
+            "size": float(gmsh.model.occ.getMass(dim, tag)), "from": box[:3].tolist(), "to": box[3:].tolist(),
         })  # fmt: skip
     return rows
 
@@ -43,33 +51,75 @@ def entities_text(rows: Sequence[Mapping[str, Any]]) -> str:
     for row in rows:
         span = " to ".join("(" + ", ".join(f"{x:g}" for x in row[end]) + ")" for end in ("from", "to"))
         label = f" {row['label']!r}" if row["label"] else ""
-        lines.append(
-            f"{row['name']}{label}: {row['type']}, {row['measure']} {row['size']:.6g} {POWERS[row['dim']]}, {span} mm"
-        )
+        size = f"{row['measure']} {row['size']:.6g} {POWERS[row['dim']]}"
+        lines.append(f"{row['name']}{label}: {row['type']}, {size}, {span} mm")
     return "\n".join(lines)
 
 
-def read_shapes(gmsh: Any, path: str, name: str, scale: float) -> None:
-    """Read shapes into gmsh's current model, in mm.
+def read_shapes(gmsh: Any, path: Path, scale: float) -> None:
+    """Read shapes into gmsh's current model, in mm; of IGES the closed surfaces as solids.
 
     Raises:
         CaseError: OpenCASCADE cannot read them.
     """
-    in_process(Path(path), shapes=True)
-    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+    in_process(path, shapes=True)
+    if path.suffix.lower() in (".step", ".stp"):
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    gmsh.option.setNumber("Geometry.OCCScaling", scale)
     gmsh.option.setNumber("General.AbortOnError", 2)
     try:
-        shapes = gmsh.model.occ.importShapes(path, highestDimOnly=True)
-        gmsh.model.occ.synchronize()
+        with _quiet():
+            shapes = gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
+            gmsh.model.occ.synchronize()
+            if path.suffix.lower() in (".iges", ".igs") and shapes and _has_depth(gmsh):
+                gmsh.model.occ.remove(gmsh.model.occ.getEntities(), recursive=True)
+                gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
+                gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
+                gmsh.model.occ.synchronize()
+                shapes = _solids(gmsh)
     except Exception as error:  # gmsh raises bare Exception only
         message = f"cannot be read by OpenCASCADE: {str(error)[:160] or 'no reason given'}. Write the file anew."
-        raise CaseError(InputError(name, message)) from None
+        raise CaseError(InputError(path.name, message)) from None
     if not shapes:
-        raise CaseError(InputError(name, "holds no shapes. Export the solids or surfaces of both bodies."))
-    if scale != 1.0:
-        gmsh.model.occ.dilate(shapes, 0, 0, 0, scale, scale, scale)
-        gmsh.model.occ.synchronize()
+        raise CaseError(InputError(path.name, "holds no shapes. Export the solids or surfaces of both bodies."))
+
+
+def _has_depth(gmsh: Any) -> bool:
+    """Return whether surfaces without volumes lie in no plane of x and y."""
+    box = gmsh.model.getBoundingBox(-1, -1)
+    return not gmsh.model.getEntities(3) and box[5] - box[2] > FLAT * (box[3] - box[0])
+
+
+def _solids(gmsh: Any) -> list[tuple[int, int]]:
+    """Make a solid of the surfaces that hang together by their curves, and return the solids."""
+    loose = {tag: set(gmsh.model.getAdjacencies(2, tag)[1].tolist()) for _, tag in gmsh.model.getEntities(2)}
+    solids = []
+    while loose:
+        first = min(loose)
+        shell, edges = [first], loose.pop(first)
+        while near := [tag for tag, own in loose.items() if own & edges]:
+            for tag in near:
+                edges |= loose.pop(tag)
+            shell += near
+        loop = gmsh.model.occ.addSurfaceLoop(shell, sewing=True)
+        solids.append((3, gmsh.model.occ.addVolume([loop])))
+    gmsh.model.occ.synchronize()
+    return solids
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let OpenCASCADE, which prints past gmsh, print nowhere."""
+    sys.stdout.flush()
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def name_parts(
@@ -78,32 +128,86 @@ def name_parts(
     wanted: Mapping[str, str | Sequence[str]],
     dim: int,
     by_role: Callable[[str], str],
+    length: Callable[[str], float],
 ) -> None:
-    """Make physical groups of the parts that have a group's name, or that `wanted` names.
+    """Make physical groups of the parts that have a group's name, or that `wanted` names, by planes too.
 
     Raises:
         CaseError: a part does not exist, or is in two groups.
     """
-    known: dict[str, list[tuple[int, int]]] = {}
-    for row_dim, tag in gmsh.model.getEntities():
-        known.setdefault(normal(f"{ENTITIES[row_dim]} {tag}"), []).append((row_dim, tag))
-        if label := gmsh.model.getEntityName(row_dim, tag):
-            for text in {normal(label), normal(label.rpartition("/")[2])}:
-                known.setdefault(text, []).append((row_dim, tag))
+    known = _known_parts(gmsh)
     starts = tuple(f"{body}_" for body in BODIES)
     groups = {by_role(key): parts for key, parts in known.items() if by_role(key).startswith(starts)}
     groups = {key: parts for key, parts in groups.items() if key not in wanted}
-    problems, owners = [], dict[tuple[int, int], str]()
+    problems: list[InputError] = []
+    planes: list[tuple[str, str]] = []
     for group, value in wanted.items():
         groups[group] = []
         for text in [value] if isinstance(value, str) else value:
-            if text and normal(text) not in known:
+            if text and normal(text) in known:
+                groups[group] += known[normal(text)]
+            elif text and PLANE.fullmatch(text):
+                planes.append((group, text))
+            elif text:
                 close = difflib.get_close_matches(normal(text), known, n=1)
                 hint = f"Did you mean {close[0]!r}? " if close else ""
                 count = ", ".join(f"{len(gmsh.model.getEntities(d))} {ENTITIES[d]}s" for d in range(3, 0, -1))
                 message = f"{name} has no part {text!r}. {hint}It has {count}: `fenwear info {name}` lists them."
                 problems.append(InputError(f"geometry.groups.{group}", message))
-            groups[group] += known.get(normal(text), []) if text else []
+    for group, text in planes:
+        own = [
+            one for key, parts in groups.items() for one in parts if key.partition("_")[0] == group.partition("_")[0]
+        ]
+        try:
+            found = _on_plane(gmsh, text, [one for one in own if one[0] == dim], length)
+        except ValueError as error:
+            problems.append(InputError(f"geometry.groups.{group}", str(error)))
+            continue
+        groups[group] += found
+        if not found:
+            message = f"{name} has no {ENTITIES[dim - 1]} of this body on the plane {text!r}. Correct the place."
+            problems.append(InputError(f"geometry.groups.{group}", message))
+    problems += _make_groups(gmsh, groups, dim)
+    if problems:
+        raise CaseError(problems)
+
+
+def _known_parts(gmsh: Any) -> dict[str, list[tuple[int, int]]]:
+    """Return the parts by their numbers and labels, as names are compared."""
+    known: dict[str, list[tuple[int, int]]] = {}
+    for dim, tag in gmsh.model.getEntities():
+        for word in (ENTITIES[dim], *WORDS[dim]):
+            known.setdefault(normal(f"{word} {tag}"), []).append((dim, tag))
+        if label := gmsh.model.getEntityName(dim, tag):
+            for text in {normal(label), normal(label.rpartition("/")[2])}:
+                known.setdefault(text, []).append((dim, tag))
+    return known
+
+
+def _on_plane(
+    gmsh: Any, text: str, regions: Sequence[tuple[int, int]], length: Callable[[str], float]
+) -> list[tuple[int, int]]:
+    """Return the sides of regions that lie on a plane such as "y = 0 mm".
+
+    Raises:
+        ValueError: it is no length.
+    """
+    match = PLANE.fullmatch(text)
+    assert match is not None
+    at, axis = length(match["at"]), "xyz".index("x" if match["axis"] == "r" else match["axis"])
+    box = np.array(gmsh.model.getBoundingBox(-1, -1))
+    near = FLAT * float((box[3:] - box[:3]).max())
+    found = []
+    for dim, tag in gmsh.model.getBoundary(list(regions), combined=False, oriented=False):
+        own = np.array(gmsh.model.getBoundingBox(dim, tag))
+        if max(abs(own[axis] - at), abs(own[3 + axis] - at)) <= near:
+            found.append((dim, tag))
+    return found
+
+
+def _make_groups(gmsh: Any, groups: Mapping[str, list[tuple[int, int]]], dim: int) -> list[InputError]:
+    """Make the physical groups; return what is wrong with regions that share a part."""
+    problems, owners = [], dict[tuple[int, int], str]()
     for group, parts in groups.items():
         largest = max((d for d, _ in parts), default=0)
         own = sorted({one for one in parts if one[0] == largest})
@@ -116,8 +220,7 @@ def name_parts(
                 problems.append(InputError(f"geometry.groups.{group}", message))
         tag = gmsh.model.addPhysicalGroup(largest, [t for _, t in own])
         gmsh.model.setPhysicalName(largest, tag, group)
-    if problems:
-        raise CaseError(problems)
+    return problems
 
 
 def set_sizes(gmsh: Any, size: float | None, sizes: Mapping[str, float], names: Mapping[str, tuple[int, int]]) -> None:

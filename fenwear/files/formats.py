@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fenwear.errors import CaseError, InputError
-from fenwear.files import binary, by_gmsh, by_meshio
+from fenwear.files import binary, by_gmsh, xml_meshes
 from fenwear.files.deck import read_deck
 from fenwear.files.mesh import USABLE, MeshFile, completed
 
@@ -23,8 +23,8 @@ READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".exo": ("Exodus", binary.read_exodus),
     ".e": ("Exodus", binary.read_exodus),
     ".ex2": ("Exodus", binary.read_exodus),
-    ".vtu": ("VTK", by_meshio.read),
-    ".xdmf": ("XDMF", by_meshio.read),
+    ".vtu": ("VTK", xml_meshes.read_vtu),
+    ".xdmf": ("XDMF", xml_meshes.read_xdmf),
 }
 MESHES = tuple(READERS)
 
@@ -44,7 +44,7 @@ def read_mesh(path: Path) -> MeshFile:
     if not path.is_file():
         raise CaseError(InputError(path.name, "no such file"))
     if path.suffix.lower() not in READERS:
-        message = f"expected a name that ends in {', '.join((*MESHES, *CAD))}. Convert it with gmsh or meshio to .msh."
+        message = f"expected a name that ends in {', '.join((*MESHES, *CAD))}. Convert it to .msh."
         raise CaseError(InputError(path.name, message))
     mesh = READERS[path.suffix.lower()][1](path)
     if not np.isfinite(mesh.points).all():

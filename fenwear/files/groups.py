@@ -85,13 +85,8 @@ class GroupedMesh:
 
     def text(self) -> str:
         """Return the groups with their sizes, and what was left out, in lines."""
-        lines = []
-        for row in self.rows():
-            size = f", {row['measure']} {row['size']:.6g} {POWERS[row['dim']]}" if row["dim"] else ""
-            count = f"{row['elements']:,} {ENTITIES[row['dim']]} elements on {row['nodes']:,} nodes"
-            lines.append(f"{row['group']}: {count}{size} (from {row['set']})")
-        lines += [f"unused sets: {listed(self.unused)}"] if self.unused else []
-        return "\n".join((*lines, *self.notes))
+        unused = [f"unused sets: {listed(self.unused)}"] if self.unused else []
+        return "\n".join((rows_text(self.rows()), *unused, *self.notes))
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row of each group: what it is, and how large."""
@@ -103,6 +98,17 @@ class GroupedMesh:
             }
             for one in sorted(self.groups, key=lambda group: (group.name.partition("_")[0], -group.dim, group.name))
         ]  # fmt: skip
+
+
+def rows_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return rows of groups in lines."""
+    lines = []
+    for row in rows:
+        size = f", {row['measure']} {row['size']:.6g} {POWERS[row['dim']]}" if row["dim"] else ""
+        count = f"{row['elements']:,} {ENTITIES[row['dim']]} elements on {row['nodes']:,} nodes"
+        source = f" (from {row['set']})" if row["set"] != row["group"] else ""
+        lines.append(f"{row['group']}: {count}{size}{source}")
+    return "\n".join(lines)
 
 
 def normal(name: str) -> str:

@@ -68,7 +68,7 @@ def test_what_no_map_is(tmp_path: Path) -> None:
     fine = np.linspace(-0.6, 0.6, 1201)
     np.savez(tmp_path / "fine.npz", height=np.zeros((1201, 61)), x=fine, y=y, unit="mm")
     words = {
-        "holes.npz": "1 holes", "bare.npz": "unit", "small.npz": "over it", "row.npz": "coordinate",
+        "holes.npz": "1 holes.*holes = .fill.", "bare.npz": "unit", "small.npz": "over it", "row.npz": "coordinate",
         "pickle.npz": "cannot be read", "fine.npz": "grid.nodes", "none.npz": "cannot be read", "map.txt": "ends with",
     }  # fmt: skip
     for name, word in words.items():

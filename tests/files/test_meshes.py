@@ -22,9 +22,11 @@ SIZES = {"across": 6, "punch_layers": 3, "strip_layers": 4}
 
 def sizes_of(path: Path, groups: dict[str, str] | None = None, unit: str | None = None) -> dict[str, float]:
     """Return the length or area of each group."""
-    found = write_msh(Geometry(file=str(path), groups=groups or {}, unit=unit), None, path.with_suffix(".msh"), None)
-    assert found is not None
-    return {row["group"]: row["size"] for row in found.rows()}
+    rows, text = write_msh(
+        Geometry(file=str(path), groups=groups or {}, unit=unit), None, path.with_suffix(".msh"), None
+    )
+    assert all(f"{row['group']}: {row['elements']:,}" in text for row in rows)
+    return {row["group"]: row["size"] for row in rows}
 
 
 @pytest.mark.parametrize("way", SAME)
@@ -76,7 +78,7 @@ def test_sets_of_other_names_are_mapped(tmp_path: Path) -> None:
 
 
 def written(folder: Path, suffix: str) -> Path:
-    """Write the blocks in the format of another program, as gmsh or meshio does, or by hand."""
+    """Write the blocks in the format of another program, as gmsh or VTK does, or by hand."""
     (folder / "d.inp").write_text(BASE)
     sizes_of(folder / "d.inp")
     path = folder / f"d{suffix}"
@@ -89,29 +91,75 @@ def written(folder: Path, suffix: str) -> Path:
             gmsh.write(str(path))
     elif suffix == ".exo":
         write_exodus(path)
+    elif suffix == ".med":
+        write_med(path, read_mesh(folder / "d.inp"))
     else:
-        write_by_meshio(path, read_mesh(folder / "d.inp"))
+        write_vtu(path, read_mesh(folder / "d.inp"))
     return path
 
 
-def write_by_meshio(path: Path, mesh: MeshFile) -> None:
-    """Write blocks and the lines of their contacts, with the numbers 1 to 4 as cell data, in MED with names."""
-    meshio = pytest.importorskip("meshio")
-    lines, sets = [], {one.name: one for one in mesh.sets}
-    for name in ("STRIP_CONTACT", "PUNCH_CONTACT"):
-        nodes = sets[name].members
-        lines.append(np.column_stack([nodes[:-1], nodes[1:]]))
+def numbered(mesh: MeshFile) -> tuple[Any, Any, list[int]]:
+    """Return the blocks' quadrilaterals, the lines of their contacts, and how many each part has."""
+    sets = {one.name: one for one in mesh.sets}
+    lines = [np.column_stack([n[:-1], n[1:]]) for n in (sets[f"{b}_CONTACT"].members for b in ("STRIP", "PUNCH"))]
     quads = [block.nodes for block in mesh.blocks]
-    cells = [("quad", np.vstack(quads)), ("line", np.vstack(lines))]
-    sign = -1 if path.suffix == ".med" else 1
-    numbers = [
-        np.repeat([sign, 2 * sign], list(map(len, quads))),
-        np.repeat([3 * sign, 4 * sign], list(map(len, lines))),
-    ]
-    name = "cell_tags" if sign < 0 else "material"
-    new = meshio.Mesh(mesh.points, cells, cell_data={name: numbers})
-    new.cell_tags = {-1: ["STRIP BODY"], -2: ["punch_body"], -3: ["strip_contact"], -4: ["Punch_Contact"]}
-    meshio.write(path, new)
+    return np.vstack(quads), np.vstack(lines), list(map(len, (*quads, *lines)))
+
+
+def write_vtu(
+    path: Path, mesh: MeshFile, mode: str = "Binary", packer: str = "ZLib", wide: int = 32, coded: int = 1
+) -> None:
+    """Write blocks and the lines of their contacts, with the numbers 1 to 4 as an array of cells."""
+    pyvista = pytest.importorskip("pyvista")
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    quads, lines, counts = numbered(mesh)
+    grid = pyvista.UnstructuredGrid({9: quads, 3: lines}, mesh.points)
+    grid.cell_data["material"] = np.repeat([1, 2, 3, 4], counts)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    getattr(writer, f"SetDataModeTo{mode}")()
+    getattr(writer, f"SetCompressorTypeTo{packer}")()
+    writer.SetHeaderType(wide)
+    writer.SetEncodeAppendedData(coded)
+    writer.Write()
+
+
+@pytest.mark.parametrize(
+    "how",
+    [("Ascii", "None"), ("Binary", "None", 64), ("Binary", "LZMA"), ("Appended", "None", 32, 0),
+     ("Appended", "ZLib", 64), ("Appended", "ZLib", 32, 0)],
+    ids=str,
+)  # fmt: skip
+def test_arrays_of_vtu_in_every_way(tmp_path: Path, how: tuple[Any, ...]) -> None:
+    """As text, in base64, appended, packed or not."""
+    (tmp_path / "d.inp").write_text(BASE)
+    mesh = read_mesh(tmp_path / "d.inp")
+    write_vtu(tmp_path / "d.vtu", mesh, *how)
+    found = read_mesh(tmp_path / "d.vtu")
+    assert {one.name: found.measure(one) for one in found.sets} == pytest.approx(
+        {"material 1": 80, "material 2": 40, "material 3": 20, "material 4": 10}
+    )
+
+
+def write_med(path: Path, mesh: MeshFile) -> None:
+    """Write blocks and the lines of their contacts with Salome's groups."""
+    import h5py
+
+    quads, lines, counts = numbered(mesh)
+    families = np.repeat([-1, -2, -3, -4], counts)
+    with h5py.File(path, "w") as file:
+        step = file.create_group("ENS_MAA/mesh/-0000000000000000001-0000000000000000001")
+        file["ENS_MAA/mesh"].attrs["ESP"] = 2
+        step["NOE/COO"] = mesh.points[:, :2].T.ravel()
+        step["NOE/COO"].attrs["NBR"] = len(mesh.points)
+        for kind, nodes, own in (("QU4", quads, families[: len(quads)]), ("SE2", lines, families[len(quads) :])):
+            step[f"MAI/{kind}/NOD"], step[f"MAI/{kind}/FAM"] = (nodes + 1).T.ravel(), own
+        for number, name in enumerate(("STRIP BODY", "punch_body", "strip_contact", "Punch_Contact"), 1):
+            family = file.create_group(f"FAS/mesh/ELEME/FAM_{-number}")
+            family.attrs["NUM"] = -number
+            family["GRO/NOM"] = np.array([name.encode().ljust(80, b"\0")], dtype="V80")
 
 
 def write_exodus(path: Path) -> None:

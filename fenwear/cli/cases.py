@@ -157,11 +157,10 @@ def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: boo
     """Tell what the first cycle of a case with stick comes to."""
     from fenwear.assembly import assemble
     from fenwear.cli.partial_slip import check_text
-    from fenwear.plausibility.large import large_warnings
 
     system = system or assemble(case)
     text = check_text(case, system)
-    for warning in [*plausibility_warnings(case), *large_warnings(system)]:
+    for warning in plausibility_warnings(case):
         log(f"warning: {warning}")
     if full:
         print_case(case)

@@ -43,7 +43,7 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     if stuck == closed:
         regime = "full stick"
     seen = Seen.of_pressure(system, records.pressure, "in the first cycle")
-    texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown")]
+    texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown", "large")]
     warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
     return (
         f"{setup}\n"

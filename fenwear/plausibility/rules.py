@@ -441,9 +441,9 @@ RULES: dict[str, Rule] = {
     "large": Rule(
         beyond_small_strain,
         "punch.loads",
-        "the {body} moves by up to {farthest:.2g} mm: where it is strained it stretches by {stretched:.2g} % and turns by "
-        "{turned:.2g} degrees. The linear theory, of small strains and rotations, is off by some {percent:.0f} % there. "
-        "Reduce the load or the approach, or use a program for large displacements",
+        "the {body} moves by up to {farthest:.2g} mm: where it is strained it stretches by {stretched:.2g} % and turns "
+        "by {turned:.2g} degrees. The linear theory, of small strains and rotations, is off by some {percent:.0f} % "
+        "there. Reduce the load or the approach, or use a program for large displacements",
         ("start", "first"),
     ),
     "clipped": Rule(

@@ -25,9 +25,10 @@ def test_an_axis_that_is_none_of_the_disc() -> None:
 
 
 def test_nothing_wears_on_the_axis_itself() -> None:
-    """A pin that turns on its own axis has no pressure that wears it evenly."""
+    """Where wear goes by v^2 no pressure that has an integral wears a pin evenly that turns on its own axis."""
     placed = place_case(load_case("pin-on-disc", [*COARSE, "geometry.parameters.track_radius=0",
-                                                  "geometry.parameters.around=2"]))  # fmt: skip
+                                                  "geometry.parameters.around=2",
+                                                  "wear.punch={coefficient=1e-8, speed_exponent=2}"]))  # fmt: skip
     with pytest.raises(CaseError, match=r"motion\.centre: lies within the contact"):
         placed.optimum(1)
 

@@ -36,6 +36,7 @@ from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.regions import Regions, any_split, regions_opposite
+from fenwear.sliding.spin import node_rates
 from fenwear.sliding.ways import SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
@@ -178,9 +179,11 @@ class ContactSetup:
     @cached_property
     def sliding_ratio(self) -> Array:
         """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
-        return np.array(
-            [self.field_of(phase).rate(pair.opposite, pair.normal) for phase, pair in enumerate(self.pairs)]
-        )
+        return self._rates(1.0)
+
+    def _rates(self, power: float) -> Array:
+        """Return what each node slides in each phase for a unit of the stroke's law (phases, n), see `node_rates`."""
+        return np.array([node_rates(self.field_of(phase), pair, power) for phase, pair in enumerate(self.pairs)])
 
     def field_of(self, phase: int) -> SlidingField:
         """Return the sliding field of a phase, in its direction of the motion or as a step of a table."""
@@ -223,8 +226,9 @@ class ContactSetup:
         """The wear rule of both bodies over the phases of the motion."""
         slid = []
         for law in self.sliding.wear:
-            exponent = 1.0 if law is None else law.speed_exponent
-            slid.append(self.motion.sliding(exponent)[:, None] * self.sliding_ratio**exponent)
+            a, b = (1.0, 1.0) if law is None else (law.speed_exponent, law.pressure_exponent)
+            rates = self.sliding_ratio if a == b else self._rates(a / b)
+            slid.append(self.motion.sliding(a)[:, None] * rates**a)
         split = any_split(self._regions, self.sliding.wear)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings, split)
 
@@ -441,7 +445,7 @@ class ContactSetup:
         """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
         motion, pair = self.motion, self.pair
         found = [np.asarray(phase.speed * own) for phase, own in zip(motion.phases, self.sliding_ratio, strict=True)]
-        mean = motion.mean_speed * self.sliding.field.rate(pair.opposite, pair.normal)
+        mean = motion.mean_speed * node_rates(self.sliding.field, pair)
         return (*found, self.path.sum(axis=0) / motion.period if motion.steps else mean)
 
     @cached_property
@@ -558,7 +562,7 @@ class ContactSetup:
             zone: Nodes in contact (n,) bool; by default all.
 
         Raises:
-            CaseError: a node of the contact lies on the axis of rotation, nothing slides one way, or nodes stick.
+            CaseError: nothing slides at a node on the axis of rotation, nothing slides one way, or nodes stick.
             ConvergenceError: a pressure_threshold or a pressure_cap leaves no optimum.
         """
         if self.motion.steps:
@@ -567,8 +571,8 @@ class ContactSetup:
         if self.sticks:
             message = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
             raise CaseError(InputError("contact.law", message))
-        slides = self.sliding.field.rate(self.pair.opposite, self.pair.normal)
-        if not (slides > ROUNDING * slides.max()).all():
+        slides = np.min([one.sum(axis=0) / one.max() for one in self.wear.sliding], axis=0)
+        if not (slides > ROUNDING).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
         found = self._optimum(direction, zone, None)

@@ -34,6 +34,7 @@ from fenwear.interface import Interface, RigidEquilibrium
 from fenwear.layers import Layers
 from fenwear.layers.between import SOFT
 from fenwear.parallel import all_together
+from fenwear.sliding.spin import node_rates
 from fenwear.sliding.wear import WornDepths
 
 T = TypeVar("T")
@@ -498,8 +499,7 @@ def heating_friction(system: ContactSetup, mu: Array | None = None, phase: int |
         phase: Its number; None for the field of the whole motion.
     """
     mu = system.friction.values(system.conditions(None)) if mu is None else mu
-    field = system.sliding.field if phase is None else system.field_of(phase)
-    return mu * field.rate(system.pair.opposite, system.pair.normal)
+    return mu * (node_rates(system.sliding.field, system.pair) if phase is None else system.sliding_ratio[phase])
 
 
 def heating_frictions(system: ContactSetup) -> Array:

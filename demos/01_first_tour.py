@@ -182,7 +182,7 @@ plt.show()
 # to the load, and the periodicity, the change of pressure against one cycle ago over the pressure scale.
 
 # %%
-keys = ("half_cycles", "stop", "mean_pressure_MPa", "wear_mm", "rightward", "leftward", "periodicity")
+keys = ("half_cycles", "stop", "nominal_pressure_MPa", "wear_mm", "rightward", "leftward", "periodicity")
 print(json.dumps({key: summary[key] for key in (*keys, "largest_equilibrium_error")}, indent=2))
 
 # %% [markdown]

@@ -19,7 +19,7 @@ from fenwear.bodies.ready import ready_geometries
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history, roughness, sheet, steps, surfaces, table_cycle
+from fenwear.results import coating, creep, registry, roughness, sheet, steps, table_cycle
 from fenwear_verify.suite import registered
 from fenwear_verify.validation import Experiment, experiments
 from fenwear_verify.validation.command import draw, markdown
@@ -110,39 +110,30 @@ class Commands(Written):
                 yield from _table(("option", "does"), rows)
 
 
-def _of_surfaces() -> dict[str, Any]:
-    """Return the variables that are others in solids and rings."""
-    plane = {**history.VARIABLES, **history.STRIP_VARIABLES}
-    found = surfaces.on_surfaces(plane)
-    return {name: variable for name, variable in found.items() if plane.get(name, ("", "", ""))[1:] != variable[1:]}
-
-
 class Results(Written):
     """The variables of history.nc."""
 
     def lines(self) -> Iterable[str]:
         """Return a table of each group."""
-        terms = {**history.HEAT_TERMS, **history.HEAT_CROSSING}
-        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in terms.items()}
+        plane = registry.on_surfaces([*registry.IN_RUN, *registry.OF_STRIP])
+        others = [one for one in plane if one.name in registry.ON_SURFACES]
         groups: dict[str, Any] = {
-            "In every run": history.VARIABLES,
-            "What a tribometer measures; with _strip of the strip": {
-                **sheet.SLIDING,
-                **{
-                    name: (over, unit, text.format(body="punch"))
-                    for name, (over, unit, text) in {
-                        **sheet.OF_A_BODY,
-                        **sheet.of_the_scar(("x",), ("length", "width")),
-                    }.items()
-                },
-            },
-            "Where the strip wears": history.STRIP_VARIABLES,
-            "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
-            "With a program, where the strip turns": history.ANGULAR_SPEED,
-            "With heat": {**history.HEAT_VARIABLES, **heat},
-            "With heat.track": history.BULK,
-            "Of solids and rings instead, or as well": _of_surfaces(),
-            "Of solids in a cycle that is a table": surfaces.on_surfaces(table_cycle.VARIABLES),
+            "In every run": registry.IN_RUN,
+            "What a tribometer measures; with _strip of the strip": (
+                *sheet.SLIDING,
+                *sheet.TURNING,
+                *sheet.of_a_plane_body("punch"),
+                *sheet.of_a_body("punch"),
+                *sheet.of_the_scar("punch", ("x",), ("length", "width")),
+            ),
+            "Where the strip wears": registry.OF_STRIP,
+            "With a program": registry.OF_PROGRAM,
+            "With heat": registry.OF_HEAT,
+            "With heat.track": registry.OF_TRACK,
+            "Of solids and rings in place of those": others,
+            "Of a coated body, with _strip of the strip": coating.of_body("punch"),
+            "Of a body that creeps, with _strip of the strip": creep.of_member("punch"),
+            "Of solids in a cycle that is a table": table_cycle.VARIABLES,
             "Of rough surfaces, with _strip of the strip": roughness.of_body("punch"),
             "With contact.law = coulomb": steps.VARIABLES,
             "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,
@@ -152,8 +143,14 @@ class Results(Written):
             yield f"\n**{title}**\n"
             yield from _table(
                 ("variable", "over", "unit", "meaning"),
-                ((_code(n), ", ".join(d), u, _plain(text)) for n, (d, u, text) in variables.items()),
+                ((_code(n), ", ".join(d), u, _plain(text)) for n, d, u, text in self._rows(variables)),
             )
+
+    @staticmethod
+    def _rows(variables: Any) -> Iterable[tuple[str, tuple[str, ...], str, str]]:
+        if isinstance(variables, dict):
+            return [(name, *one) for name, one in variables.items()]
+        return [(one.name, one.dims, one.unit, one.long_name) for one in variables]
 
 
 class Cases(Written):

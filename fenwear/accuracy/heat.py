@@ -27,7 +27,7 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
     fineness = None if exchange is None else exchange.fineness
     if fineness is None or last.heat is None:
         return {}
-    known = {"heat steps": fineness.change, "heat basis": fineness.difference}
+    known = {"heat_steps": fineness.change, "heat_basis": fineness.difference}
     return {source: _of(last, values, share) for source, share in known.items() if share is not None}
 
 
@@ -36,10 +36,10 @@ def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contributio
     exchange = with_reduced_heat(system).exchange
     if exchange is None or exchange.fineness is None or system.heat is None:
         return {}
-    start = {"temperature": system.heat.initial}
+    start = {"largest_temperature": system.heat.initial}
     return {
         source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
-        for source, share in (("heat steps", exchange.fineness.change), ("heat basis", exchange.fineness.difference))
+        for source, share in (("heat_steps", exchange.fineness.change), ("heat_basis", exchange.fineness.difference))
         if share is not None
     }
 
@@ -54,11 +54,10 @@ def _of(last: Block, values: Values, share: float) -> Contribution:
     for quantity, value in values.items():
         relative = pressure * abs(value.number)
         found[quantity] = {
-            "temperature": share * abs(rise),
-            "pressure": relative,
-            "depth": min(relative, depth),
-            "volume": 0.0,
-        }[quantity.name]
+            "largest_temperature": share * abs(rise),
+            "largest_depth": min(relative, depth),
+            "worn_volume": 0.0,
+        }.get(quantity.name, relative)
     return found
 
 

@@ -5,14 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 from fenwear.accuracy.told import Uncertainty
-from fenwear.accuracy.values import Contribution, Quantity
+from fenwear.accuracy.values import BODIES, Contribution, Quantity
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
-from fenwear.results.degrees import degrees_of
+from fenwear.results.degrees import KELVIN, degrees_of
+from fenwear.results.registry import known
 
-KEYS = {"depth": "largest_depth_mm", "volume": "worn_volume_mm3"}
 HIGHEST = 8  # degree of elements
-WORDS = {"depth": "worn depth", "volume": "worn volume", "pressure": "largest pressure", "temperature": "temperature"}
+WORDS = {
+    "largest_depth": "worn depth",
+    "worn_volume": "worn volume",
+    "largest_pressure": "largest pressure",
+    "largest_pressure_in_cycle": "largest pressure",
+    "mean_pressure": "mean pressure",
+    "largest_temperature": "temperature",
+}
 
 
 def table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
@@ -29,14 +36,16 @@ def table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
 def _named(system: Tribosystem, numbers: Contribution) -> dict[str, Any]:
     named: dict[str, Any] = {}
     for quantity, number in numbers.items():
-        if quantity.name in KEYS:
-            named.setdefault(quantity.of, {})[KEYS[quantity.name]] = number
-        elif quantity.name == "temperature":
-            named[f"largest_temperature_{degrees_of(system.case).unit}"] = number
+        registered = known(quantity.name)
+        assert registered is not None
+        if quantity.of in BODIES:
+            named.setdefault(quantity.of, {})[registered.key] = number
         elif quantity.of:
-            named.setdefault(_way(system, quantity), {})["largest_pressure_MPa"] = number
+            named.setdefault(_way(system, quantity), {})[registered.key] = number
+        elif registered.unit == KELVIN.unit:
+            named[f"{quantity.name}_{degrees_of(system.case).unit}"] = number
         else:
-            named["largest_pressure_in_cycle_MPa"] = number
+            named[registered.key] = number
     return named
 
 
@@ -65,14 +74,14 @@ def _remedy(system: Tribosystem, source: str) -> str:
     tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"
     return {
         "mesh": _finer(case),
-        "wear steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
+        "wear_steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
         if jumps
         else 'run.integration = "jump"',
-        "slip steps": f"stick.step_tolerance = {case.stick.step_tolerance / 2:.2g}",
+        "slip_steps": f"stick.step_tolerance = {case.stick.step_tolerance / 2:.2g}",
         "positions": f"motion.positions = {2 * positions - positions % 2}",
         "following": f"geometry.follow_wear = {follow / 2:.2g}",
-        "heat steps": f"heat.steps = {steps}",
-        "heat basis": tolerance,
+        "heat_steps": f"heat.steps = {steps}",
+        "heat_basis": tolerance,
     }.get(source, "")
 
 
@@ -90,6 +99,11 @@ def _finer(case: Case) -> str:
     )
 
 
+def in_words(source: str) -> str:
+    """Return a source of uncertainty for people."""
+    return source.replace("_", " ")
+
+
 def text(system: Tribosystem, found: Uncertainty) -> str:
     """Return in a few lines how uncertain the numbers are, what of, and what would help."""
     told, helps, total = [], remedies(system, found), found.total
@@ -98,11 +112,11 @@ def text(system: Tribosystem, found: Uncertainty) -> str:
         if not shares:
             continue
         worst = max(shares, key=lambda quantity: shares[quantity])
-        by = f", most by the {found.largest(worst)}" if name in helps else ""
+        by = f", most by the {in_words(found.largest(worst))}" if name in helps else ""
         # A share of kelvins tells nothing, nor one of a rise above a temperature that bodies have in part.
-        size = f"{total[worst]:.2g} K" if name == "temperature" else f"{100 * shares[worst]:.2g} %"
+        size = f"{total[worst]:.2g} K" if name == "largest_temperature" else f"{100 * shares[worst]:.2g} %"
         told.append(f"{words} {size}{by}")
     lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
-    lines += [f"not told of the {source}: {why}" for source, why in found.untold.items()]
+    lines += [f"not told of the {in_words(source)}: {why}" for source, why in found.untold.items()]
     lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]
     return "\n".join(lines)

@@ -99,8 +99,10 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
             coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
             found["mesh"] = of_mesh(values, coarse, lower.ratio)
         of_jumps = _apart(before, short, SAFETY * share)
-        if last.steps and (warmest := values.get(Quantity("temperature"))) is not None:  # by the last jump's own error
-            of_jumps[Quantity("temperature")] = getattr(last.steps[-1], "jump_error", 0.0) * abs(warmest.number)
+        if (
+            last.steps and (warmest := values.get(Quantity("largest_temperature"))) is not None
+        ):  # by the last jump's own error
+            of_jumps[Quantity("largest_temperature")] = getattr(last.steps[-1], "jump_error", 0.0) * abs(warmest.number)
         for source, contribution in _steps(again, before, of_jumps, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
@@ -128,7 +130,7 @@ def order_of(quantity: Quantity, value: Value) -> float:
     displacements in the energy norm: 2 of elements of degree 1, with which those of degree 2 are compared, and at
     closed sharp corners, r^(1/2) at worst, whose order in the degree is twice that in the size of elements; else more.
     """
-    if quantity.name == "volume":
+    if quantity.name == "worn_volume":
         return OF_VOLUME
     return AT_EDGE if value.at_edge else INSIDE
 
@@ -148,13 +150,13 @@ def _steps(
     case = last.system.case
     positions, follow = last.system.motion.positions, case.geometry.follow_wear
     if case.run.integration == "jump":
-        yield "wear steps", of_jumps
+        yield "wear_steps", of_jumps
     else:
-        yield "wear steps", _of_half_cycles(before, first, last)
+        yield "wear_steps", _of_half_cycles(before, first, last)
     if last.system.sticks:
         fineness = last.system.law_state.fineness
         if fineness is not None:
-            yield "slip steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
+            yield "slip_steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
     fewer = max(2, 2 * (positions // 4) + positions % 2)
     if positions > fewer:
         other, factor = again.otherwise(motion={"positions": fewer}).values(), fewer / (positions - fewer)
@@ -184,9 +186,9 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
     for body, depth, start in (("punch", last.wear, first.wear), ("strip", last.wear_strip, first.wear_strip)):
         rate = float(start[0].max()) / int(first.half_cycle[0])
         mean = float(depth[-1].max()) / int(last.half_cycle[-1])
-        found[Quantity("depth", body)] = abs(rate - mean) / 2
+        found[Quantity("largest_depth", body)] = abs(rate - mean) / 2
     return {
-        quantity: found.get(quantity, late if quantity.name == "pressure" and np.isfinite(late) else 0.0)
+        quantity: found.get(quantity, late if "pressure" in quantity.name and np.isfinite(late) else 0.0)
         for quantity in before
     }
 

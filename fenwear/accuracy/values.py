@@ -6,23 +6,24 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fenwear.arrays import Array, Mask
+from fenwear.arrays import Array
 from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block, SteadyState
-from fenwear.results.surfaces import surface_cells
+from fenwear.results.surfaces import rim, surface_cells
 
 BODIES = ("punch", "strip")
 SAME = 1e-4  # of the surface's extent: nodes that are one
 
 
 class Quantity(NamedTuple):
-    """What a number is of: depth or volume of a body, pressure of a half-cycle of the cycle, or temperature.
+    """What a number is: a quantity of the registry, of a body, of a half-cycle or of the whole contact.
 
     Attributes:
-        name: "depth", "volume", "pressure" or "temperature".
+        name: Of the quantity.
         of: Body, or number of the half-cycle in the cycle; "" for a number of the whole contact.
     """
 
@@ -84,26 +85,25 @@ def values_of(last: Block) -> Values:
     depths, surfaces = (last.wear[-1], last.wear_strip[-1]), (system.pair.punch, system.pair.strip)
     for body, law, depth, surface in zip(BODIES, system.sliding.wear, depths, surfaces, strict=True):
         if law is not None:
-            found[Quantity("depth", body)] = _largest(depth, surface)
-            found[Quantity("volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
+            found[Quantity("largest_depth", body)] = _largest(depth, surface)
+            found[Quantity("worn_volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
     found |= _pressures(system, last)
     if last.heat is not None:
         sides: list[Array] = [last.heat.temperature_punch[-1], last.heat.temperature_strip[-1]]
         warmer = max(sides, key=lambda side: float(side.max()))
-        found[Quantity("temperature")] = _largest(warmer, system.pair.punch)
+        found[Quantity("largest_temperature")] = _largest(warmer, system.pair.punch)
     return found
 
 
 def values_of_steady(state: SteadyState) -> Values:
     """Return the numbers of a cyclic steady state: the largest pressure of each half-cycle, and the temperature."""
     surface, strokes = state.system.pair.punch, len(state.directions)
-    found = {
-        Quantity("pressure", str((k + 1) % strokes)): _largest(np.asarray(pressure), surface)
-        for k, pressure in enumerate(state.pressure)
-    }
+    found = _of_half_cycles(state.system, np.arange(1, strokes + 1), state.pressure)
     if state.heat is not None:
         sides = [*state.heat.punch, *state.heat.strip]
-        found[Quantity("temperature")] = _largest(np.asarray(max(sides, key=lambda side: float(side.max()))), surface)
+        found[Quantity("largest_temperature")] = _largest(
+            np.asarray(max(sides, key=lambda side: float(side.max()))), surface
+        )
     return found
 
 
@@ -111,11 +111,18 @@ def _pressures(system: ContactSetup, last: Block) -> Values:
     surface, strokes = system.pair.punch, system.motion.half_cycles
     if last.steps:
         steps: Array = np.concatenate([one.pressure for one in last.steps[-strokes:]])
-        return {Quantity("pressure"): _largest(steps[np.argmax(steps.max(axis=1))], surface)}
-    return {
-        Quantity("pressure", str(int(number) % strokes)): _largest(np.asarray(pressure), surface)
-        for number, pressure in zip(last.half_cycle[-strokes:], last.pressure[-strokes:], strict=True)
-    }
+        return {Quantity("largest_pressure_in_cycle"): _largest(steps[np.argmax(steps.max(axis=1))], surface)}
+    return _of_half_cycles(system, last.half_cycle[-strokes:], last.pressure[-strokes:])
+
+
+def _of_half_cycles(system: ContactSetup, numbers: NDArray[np.int64], pressure: Array) -> Values:
+    """Return the largest and the mean pressure of half-cycles of these numbers (k,), from their pressures (k, n)."""
+    found, surface, weights = Values(), system.pair.punch, system.pair.weights
+    for number, row in zip(numbers, np.asarray(pressure), strict=True):
+        of, area = str(int(number) % system.motion.half_cycles), float(weights @ (row > 0))
+        found[Quantity("largest_pressure", of)] = _largest(np.asarray(row), surface)
+        found[Quantity("mean_pressure", of)] = Value(float(weights @ row) / (area or 1.0))
+    return found
 
 
 def _largest(values: Array, surface: ContactSurface) -> Value:
@@ -125,17 +132,3 @@ def _largest(values: Array, surface: ContactSurface) -> Value:
     near = np.unique(cells[(cells == node).any(axis=1)])
     at_edge = bool(rim(surface)[node] or (values[near] <= 0).any())
     return Value(float(values[node]), at_edge, surface.x, values, surface.weights)
-
-
-def rim(surface: ContactSurface) -> Mask:
-    """Return which pressure nodes lie on the rim of a contact surface (n,): on a side of one linear facet alone."""
-    cells = surface_cells(surface)
-    found: Mask = np.zeros(len(surface.nodes), dtype=bool)
-    if cells.shape[1] == 2:
-        nodes, count = np.unique(cells, return_counts=True)
-        found[nodes[count == 1]] = True
-        return found
-    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)  # corners come around
-    pairs, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
-    found[pairs[count == 1].ravel()] = True
-    return found

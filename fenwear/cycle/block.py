@@ -16,7 +16,7 @@ from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.state import RunState, pressure_scales
-from fenwear.cycle.totals import Totals
+from fenwear.cycle.totals import Totals, stacked
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import TERMS
 from fenwear.interface import RigidEquilibrium
@@ -325,8 +325,8 @@ class Recorder:
             np.array([row.worn.punch for row in rows]),
             np.array([row.worn.strip for row in rows]),
             np.concatenate([middle.contact.rigid for middle in middles]),
-            _stacked([row.totals for row in rows]),
-            _stacked(adds),
+            stacked([row.totals for row in rows]),
+            stacked(adds),
             _weighed(np.abs(pressure - optima), weights) / (2 * np.maximum(_weighed(pressure, weights), 1e-300)),
             changes,
             self._balances(),
@@ -411,7 +411,3 @@ class Recorder:
 def _weighed(values: Array, weights: Array) -> Array:
     """Return the integrals of rows (k, n) by weights (n,); a product would round as the places in memory have it."""
     return np.asarray((values * weights).sum(axis=1))
-
-
-def _stacked(totals: Sequence[Totals]) -> Totals:
-    return Totals(*(np.array([getattr(t, name) for t in totals]) for name in ("sums", "energy", "pressure")))

@@ -190,17 +190,27 @@ def approach(rigid: RigidEquilibrium) -> Array:
     return found
 
 
-def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
-    """Return what a cycle adds at pressures (m, n) of its phases, with coefficients at their conditions.
+def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> list[Totals]:
+    """Return what each phase of a cycle adds at pressures (m, n), with coefficients at their conditions.
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
     """
     wear = system.wear.phases(conditions)
-    adds = none_yet(system)
-    for k, state in enumerate(conditions):
-        adds += PhaseMeter(system, k, system.friction.values(state), wear.some([k]))(pressure[k])
-    return adds
+    return [
+        PhaseMeter(system, k, system.friction.values(state), wear.some([k]))(pressure[k])
+        for k, state in enumerate(conditions)
+    ]
+
+
+def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
+    """Return what a cycle adds, as `phase_totals`."""
+    return sum(phase_totals(system, pressure, conditions), none_yet(system))
+
+
+def stacked(totals: Sequence[Totals]) -> Totals:
+    """Return k totals as one of k rows."""
+    return Totals(*(np.array([getattr(t, name) for t in totals]) for name in ("sums", "energy", "pressure")))
 
 
 def opposite_densities(system: ContactSetup, phase: int) -> tuple[Array | None, Array | None]:

@@ -6,7 +6,7 @@ Which nodes are opposite is found by `patches` and `overlap`, gaps and weights a
 
 from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance
 from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium
-from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material, transfer_at
+from fenwear.interface.pair import ContactPair, check_distance, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
 __all__ = [
@@ -17,7 +17,6 @@ __all__ = [
     "PressureCompliance",
     "RigidEquilibrium",
     "check_distance",
-    "interpolation",
     "is_translation",
     "pair",
     "pass_material",

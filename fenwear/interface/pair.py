@@ -89,10 +89,6 @@ class ContactPair:
         """Return the gap opened by depths worn off both bodies (n,), mm."""
         return punch + self.wear_interpolation @ strip
 
-    def interpolate(self, values: Array, x: Array) -> Array:
-        """Return the finite-element function of nodal `values` (n,) of a plane contact at abscissae `x`, mm."""
-        return interpolation(self.x, self.punch.degree, np.atleast_1d(x)) @ values
-
 
 def pair(
     punch: ContactSurface,
@@ -313,26 +309,3 @@ def _check_facing(punch: ContactSurface, normal: Array, facing: Array, placement
 
 def _not_facing(reason: str) -> None:
     raise CaseError(InputError("geometry", f"the contact surfaces do not face each other: {reason}"))
-
-
-def interpolation(nodes: Array, degree: int, x: Array) -> Array:
-    """Return the matrix of piecewise Lagrange interpolation from `nodes` to `x`.
-
-    Args:
-        nodes: Ascending abscissae; every facet has degree + 1 of them, its ends shared.
-        x: Abscissae inside the nodes' range.
-    """
-    ends = nodes[::degree]
-    facet = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(ends) - 2)
-    columns = facet[:, None] * degree + np.arange(degree + 1)
-    matrix = np.zeros((len(x), len(nodes)))
-    np.put_along_axis(matrix, columns, lagrange(nodes[columns], x), axis=1)
-    return matrix
-
-
-def lagrange(nodes: Array, x: Array) -> Array:
-    """Return the Lagrange polynomials of `nodes` (..., k) at `x` (...), shape (..., k)."""
-    difference = x[..., None, None] - nodes[..., None, :]
-    spacing = nodes[..., :, None] - nodes[..., None, :]
-    same = np.eye(nodes.shape[-1], dtype=bool)
-    return (np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)).prod(axis=-1)

@@ -16,12 +16,11 @@ from fenwear.life.data import DataSet, Series, measured_folder, read_data
 from fenwear.life.forward import Forward, forward
 from fenwear.life.least_squares import LeastSquares, repeated, without_values
 from fenwear.life.lifetime import Lifetime, lifetime
-from fenwear.life.model import Model
+from fenwear.life.model import Model, Snapshot
 from fenwear.life.noise import Noise
 from fenwear.life.quantities import Quantity, evaluate, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Sensitivity, sensitivity
-from fenwear.life.snapshot import Snapshot
 from fenwear.life.unknowns import Unknown
 
 __all__ = [

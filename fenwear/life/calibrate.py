@@ -27,7 +27,7 @@ from fenwear.life.identifiable import hardly_known, known_together, not_determin
 from fenwear.life.keys import nearest_possible
 from fenwear.life.least_squares import STEP, LeastSquares
 from fenwear.life.noise import FEW, SMOOTH, Noise, in_order, neighbours_ratio
-from fenwear.life.quantities import GROWING, UNITS
+from fenwear.life.quantities import GROWING, unit_of
 from fenwear.life.scatter import Scatter
 from fenwear.life.unknowns import ScaledUnknown, Unknown
 
@@ -179,7 +179,7 @@ class Calibration:
             base += "" if np.isnan(trace.tilt) else f", tilt {trace.tilt:.3g} mm/mm"
             lines.append(f"  {trace.name}: {trace.series.quantity}, {len(trace.series.values)} measurements, "
                          f"rms residual {np.sqrt(np.mean(trace.residual**2)):.4g} "
-                         f"{UNITS[trace.series.quantity]}{base}".rstrip())  # fmt: skip
+                         f"{unit_of(trace.series.quantity)}{base}".rstrip())  # fmt: skip
         lines += [f"  not known: {line}" for line in self.not_known] + [f"  {line}" for line in self.remarks]
         return "\n".join(lines)
 

@@ -20,7 +20,7 @@ from fenwear.life.keys import with_values
 from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
 from fenwear.life.model import Model
 from fenwear.life.pictures import life_figure, residuals, save, tornado
-from fenwear.life.quantities import UNITS, cycles_of, parse_amount, parse_quantity
+from fenwear.life.quantities import cycles_of, parse_amount, parse_quantity, unit_of
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
 from fenwear.life.unknowns import parse_unknown
@@ -181,7 +181,7 @@ def _residual_table(found: Calibration) -> str:
             rows.append(
                 [trace.name, row, series.quantity, "" if series.x is None else float(series.x[k]),
                  float(series.after[k]), series.counted, float(series.values[k]), float(trace.predicted[k]),
-                 UNITS[series.quantity]]
+                 unit_of(series.quantity)]
             )  # fmt: skip
     heading = ["file", "row", "quantity", "x (mm)", "after", "counted in", "measured", "fitted", "unit"]
     return _table(heading, rows)

@@ -31,13 +31,16 @@ from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.files.table import TableError, read_table
 from fenwear.life.noise import Noise
-from fenwear.life.quantities import UNITS, Quantity, of_case, parse_amount
+from fenwear.life.quantities import GROWING, Quantity, of_case, parse_amount, registered_name, unit_of
+from fenwear.results.registry import names_known
 
+# Words for what is measured, and the registry's names of it; a column may have any name of the registry, too.
 MEASURED = {
-    "depth": "mm", "height": "mm", "volume": "mm^3", "mass": "N*s^2/mm", "scar_width": "mm", "friction": "",
-    "temperature": "K",
+    "depth": "largest_depth", "height": "wear", "volume": "worn_volume", "mass": "worn_volume",
+    "friction": "friction_coefficient", "temperature": "largest_temperature",
 }  # fmt: skip
-PLACES = {"x": "mm"}
+PROFILES = ("depth", "height", "wear")  # what has places
+OTHERS = ("x", "after", "sigma")  # columns that are not measured
 DIRECTIVES = ("set", "after", "body", "sigma", "density", "scatter")
 LEAST_ROWS = 3
 _COUNTED = re.compile(
@@ -112,10 +115,20 @@ def measured_folder() -> Path:
     return Path(__file__).parent / "measured"
 
 
+def _name(column: str) -> str:
+    """Return the registry's name of what a column has, one number at a time."""
+    return registered_name(MEASURED.get(column, column), at_a_place=False)
+
+
+def _unit(column: str) -> str:
+    """Return the internal unit of a column."""
+    return "N*s^2/mm" if column == "mass" else unit_of(_name(column))
+
+
 class _Reader:
     def __init__(self, path: Path, case: Case) -> None:
         self.path, self.case = path, case
-        known = [*PLACES, "after", *MEASURED, "sigma"]
+        known = ["x", "after", *MEASURED, "sigma", *names_known()]
         try:
             self.table = read_table(path, known, DIRECTIVES)
             self._check_heads()
@@ -141,12 +154,13 @@ class _Reader:
             how = "" if least == 1 else ", or sigma, how sure they are"
             raise self._fail("", f"expected at least {least} {'row' if least == 1 else 'rows'} of numbers{how}, "
                              f"got {len(lines)}")  # fmt: skip
-        measured = [name for name in names if name in MEASURED]
+        measured = [name for name in names if name not in OTHERS]
         case = changed_case(self.case, *self.settings) if self.settings else self.case
         series: list[Series] = []
         for name in measured:
-            values, sigma, quantity = self._measured(name, only=len(measured) == 1)
-            wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", UNITS[quantity], body)
+            values, sigma = self._measured(name, only=len(measured) == 1)
+            quantity = "wear" if "x" in names else _name(name)
+            wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", unit_of(quantity), body)
             of_case(wanted, case, str(self.path))
             x = self._column("x", "mm") if "x" in names else None
             whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity, x))
@@ -172,8 +186,8 @@ class _Reader:
         """
         if "after" not in self.table.names or not (after == 0).any():
             return
-        for name in (name for name in self.table.names if name in MEASURED and name not in ("friction", "temperature")):
-            values = self._column(name, MEASURED[name])
+        for name in (name for name in self.table.names if _name(name) in (*GROWING, "wear")):
+            values = self._column(name, _unit(name))
             wrong = np.flatnonzero((after == 0) & (values != 0))
             if len(wrong):
                 row = self.table.lines[int(wrong[0])]
@@ -203,10 +217,10 @@ class _Reader:
                 message = f"has no unit; expected one in brackets, such as '{head.name} ({example})'"
                 raise TableError(f"column {head.name!r}", message)
         names = self.table.names
-        measured = [name for name in names if name in MEASURED]
+        measured = [name for name in names if name not in OTHERS]
         if not measured:
             raise TableError("", f"no measured column; expected one of {', '.join(MEASURED)}")
-        if "x" in names and (len(measured) > 1 or measured[0] not in ("depth", "height")):
+        if "x" in names and (len(measured) > 1 or measured[0] not in PROFILES):
             raise TableError("column 'x'", "expected with one column depth or height, and no other measurement")
 
     def _after(self) -> tuple[Array, str]:
@@ -255,11 +269,9 @@ class _Reader:
                 f"row {lines[int(wrong[0]) + 1]}, column 'after'", "expected amounts that rise from row to row"
             )
 
-    def _measured(self, name: str, *, only: bool) -> tuple[Array, Array | None, str]:
-        """Return values, standard deviations and the name of the quantity."""
-        unit, quantity, factor = MEASURED[name], name, 1.0
-        if name == "height":
-            quantity, factor = "depth", -1.0
+    def _measured(self, name: str, *, only: bool) -> tuple[Array, Array | None]:
+        """Return values and standard deviations."""
+        unit, factor = _unit(name), -1.0 if name == "height" else 1.0
         if name == "mass":
             text = self.directives.get("density")
             if text is None:
@@ -270,14 +282,13 @@ class _Reader:
                 factor = 1 / convert(text, "N*s^2/mm^4")
             except (ValueError, ZeroDivisionError) as error:
                 raise self._fail("# density", str(error)) from None
-            quantity = "volume"
         lines = self.table.lines
         values = factor * self._column(name, unit)
         if name == "friction" and (values < 0).any():
             row = lines[int(np.flatnonzero(values < 0)[0])]
             raise self._fail(f"row {row}, column 'friction'", "expected zero or more")
         sigma = self._sigma(unit, only=only)
-        return values, None if sigma is None else np.abs(factor) * sigma, quantity
+        return values, None if sigma is None else np.abs(factor) * sigma
 
     def _sigma(self, unit: str, *, only: bool) -> Array | None:
         names, lines = self.table.names, self.table.lines

@@ -23,8 +23,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import ConvergenceError
-from fenwear.life.model import steady_snapshot
-from fenwear.life.snapshot import Snapshot
+from fenwear.life.model import Snapshot, steady_snapshot
 from fenwear.sliding.pressure_law import PressureLaw
 
 
@@ -70,7 +69,7 @@ class SteadyTangent:
 
     def __init__(self, system: Tribosystem, snapshot: Snapshot) -> None:
         self.system = system
-        pressure = touching(snapshot.pressure)
+        pressure = touching(snapshot.phase_pressure)
         self.closed: Mask = pressure > 0
         self.touched: Mask = np.asarray(self.closed.any(axis=0))
         velocity = np.array([snapshot.velocity[name] for name in system.rigid.mode_names])

@@ -18,17 +18,16 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, Renewal, critical_speed, follow, jump, running_in, steady
-from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
-from fenwear.cycle.totals import SUMS, Totals, cycle_totals
+from fenwear.cycle.steady_cycle import SteadyCycle, steady_cycle
+from fenwear.cycle.totals import Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
-from fenwear.life.snapshot import Snapshot, WornSurface, contacts_of, edge_moved
 from fenwear.plausibility import system_warnings
-from fenwear.sliding.friction import ContactConditions
+from fenwear.results.contacts import within
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.final import FinalShape
+from fenwear.stick.final import FinalShape, cycle_of_final
 
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
@@ -248,7 +247,8 @@ class Model:
         system = self.system(values, settings)
         self.evaluations += 1
         if system.sticks:
-            return _of_final_shape(system)
+            end = cycle_of_final(cast(FinalShape, steady(system)))  # under Coulomb's law
+            return Snapshot(np.inf, end, end.rate, end.phase_pressure)
         state = steady(system, properties_within=WITHIN if self.warming else None)
         return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
 
@@ -296,152 +296,104 @@ class Model:
         return system
 
 
-def _of_final_shape(system: Tribosystem) -> Snapshot:
-    """Return the shape to which partial slip wears: where nothing that slips carries pressure, and nothing wears on."""
-    found = cast(FinalShape, steady(system))  # under Coulomb's law
-    system = found.system
-    none = Totals(np.zeros(len(SUMS)), np.zeros(0), np.zeros(0))
-    surfaces = _worn_surfaces(system, found.worn, found.worn.times(0.0), none)
-    thickness = system.bodies.punch.thickness
-    for body, own in surfaces.items():
-        assert own.depth is not None
-        surfaces[body] = replace(own, volume=thickness * float(own.weights @ own.depth))
-    warm = None if found.temperature is None else found.temperature[None]
-    return Snapshot(np.inf, surfaces, system.pair.x, system.pair.weights, found.pressures, warm, 0.0, {},
-                    _stroke(system), system.motion.period, contacts_of(system.pair.punch))  # fmt: skip
+@dataclass(frozen=True)
+class Snapshot:
+    """The end of a cycle, or the cyclic steady state, of which quantities are computed as of a run.
 
-
-def _stroke(system: Tribosystem) -> float:
-    """Return how far the strip is moved in a cycle, mm, mean over the contact."""
-    weights = system.pair.weights
-    each = np.array([phase.distance for phase in system.motion.phases])
-    return float(each @ (system.sliding_ratio @ weights)) / float(weights.sum())
-
-
-def _of_steps(block: Block) -> Snapshot:
-    """Return the end of the last cycle of a block whose law resolves half-cycles."""
-    system, strokes = block.system, block.system.motion.half_cycles
-    steps: tuple[Any, ...] = block.steps[-strokes:]
-    adds = Totals(block.adds.sums[-strokes:].sum(axis=0), np.zeros(0), np.zeros(0))
-    worn = reduce(WornDepths.__add__, [one.wear for one in steps])
-    surfaces = _worn_surfaces(system, block.end.worn, worn, adds, block.end.totals)
-    records = [one.records for one in steps]
-    warm = np.concatenate([one.temperature for one in records]) if records[0].heat.size else None
-    path = float(adds.of("load_path"))
-    return Snapshot(
-        float(block.half_cycle[-1] // strokes),
-        surfaces,
-        system.pair.x,
-        system.pair.weights,
-        np.concatenate([one.pressure for one in records]),
-        warm,
-        float(adds.of("work")) / path if path > 0 else 0.0,
-        {},
-        _stroke(system),
-        system.motion.period,
-        contacts_of(system.pair.punch),
-    )
-
-
-def _worn_surfaces(
-    system: Tribosystem, depth: WornDepths | None, rate: WornDepths, adds: Totals, totals: Totals | None = None
-) -> dict[str, WornSurface]:
-    """Return both bodies' worn surfaces, nodes ascending along x.
-
-    Args:
-        system: The bodies.
-        depth: Worn so far; None in a steady state, whose depth grows without end.
-        rate: Worn in a cycle.
-        adds: What a cycle adds to the totals.
-        totals: So far.
+    Attributes:
+        cycle: Its number; infinite for the steady state.
+        end: The half-cycles of the cycle.
+        rate: Depths worn in a cycle.
+        phase_pressure: In each phase or time step of the cycle (m, n), MPa.
+        renewals: What a run made anew since the last one, each after a half-cycle.
     """
-    facing = system.pair
-    nodes = {
-        "punch": (facing.punch, facing.x, facing.weights),
-        "strip": (facing.strip, facing.strip.abscissa, facing.strip.weights),
-    }
-    surfaces = {}
-    for body, (surface, x, weights) in nodes.items():
-        order, volume = np.argsort(x, kind="stable"), f"volume_{body}"
-        surfaces[body] = WornSurface(
-            x[order],
-            weights[order],
-            None if depth is None else getattr(depth, body)[order],
-            getattr(rate, body)[order],
-            None if totals is None else float(totals.of(volume)),
-            float(adds.of(volume)),
-            {name: own[order] for name, own in contacts_of(surface).items()},
-        )
-    return surfaces
+
+    cycle: float
+    end: Block | SteadyCycle
+    rate: WornDepths
+    phase_pressure: Array
+    renewals: tuple[tuple[int, Renewal], ...] = ()
+
+    @property
+    def velocity(self) -> Mapping[str, float]:
+        """Rigid-body wear per cycle of each mode, mm and rad; empty in a run."""
+        return self.end.velocity if isinstance(self.end, SteadyCycle) else {}
+
+    @property
+    def parts(self) -> bool:
+        """Whether the surfaces are apart at some nodes in some phase."""
+        return bool((self.phase_pressure == 0).any())
+
+    def within(self, contact: str, asked: str) -> Snapshot:
+        """Return the snapshot of one named contact, or of all for "".
+
+        Raises:
+            CaseError: none has this name; names what asked for it.
+        """
+        if not contact:
+            return self
+        pair = self.end.system.pair
+        if contact not in pair.punch.names:
+            names = ", ".join(pair.punch.names)
+            known = f"known are {names}" if names else "the contacts have no names"
+            raise CaseError(InputError(asked, f"no contact is called {contact!r}; {known}"))
+        masks = [
+            one.nodes_of(contact) if contact in one.names else np.zeros(len(one.weights), dtype=bool)
+            for one in (pair.punch, pair.strip)
+        ]
+        rate = WornDepths(*(np.where(own, depth, 0.0) for own, depth in zip(masks, self.depths_of_rate, strict=True)))
+        return replace(self, end=within(self.end, contact, self.rate), rate=rate)
+
+    @property
+    def depths_of_rate(self) -> tuple[Array, Array]:
+        """Depths worn in a cycle off punch (n,) and strip (n_strip,), mm."""
+        return self.rate.punch, self.rate.strip
+
+    def at_cycle(self, cycle: float) -> Snapshot:
+        """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""
+        if not isinstance(self.end, Block) or cycle == self.cycle:
+            return replace(self, cycle=cycle)
+        end, more = self.end, cycle - self.cycle
+        totals = end.totals + cycle_of(end).times(more)
+        wear, wear_strip = end.wear + more * self.rate.punch, end.wear_strip + more * self.rate.strip
+        return replace(self, cycle=cycle, end=replace(end, wear=wear, wear_strip=wear_strip, totals=totals))
 
 
-def _surfaces(
-    system: Tribosystem, pressure: Array, states: Sequence[ContactConditions], adds: Totals, end: RunState | None
-) -> dict[str, WornSurface]:
-    """Return both bodies' worn surfaces at pressures of the phases (m, n)."""
-    rate = system.wear.phases(states).worn(pressure)
-    depth, totals = (None, None) if end is None else (end.worn, end.totals)
-    return _worn_surfaces(system, depth, rate, adds, totals)
+def edge_moved(run: Sequence[Snapshot]) -> bool:
+    """Return whether an edge of contact or scar has moved within the mesh in a run, be it there and back."""
+    ends = [one.end for one in run if isinstance(one.end, Block)]
+    if len({end.pressure.shape[1] for end in ends}) > 1:  # a grid has grown with the scar
+        return True
+    masks = [np.array([(one.phase_pressure > 0).any(axis=0) for one in run])]
+    masks += [np.array([getattr(end, body)[-1] > 0 for end in ends]) for body in ("wear", "wear_strip") if ends]
+    return any(bool((mask != mask[0]).any()) for mask in masks)
 
 
-def _snapshot(
-    system: Tribosystem,
-    cycle: float,
-    pressure: Array,
-    end: RunState | None,
-    temperature: Array | None,
-    velocity: Mapping[str, float],
-) -> Snapshot:
-    """Return the end of a cycle of these pressures (m, n), or the steady state where there is no end."""
-    latest = None if temperature is None else (temperature[-1, 0], temperature[-1, 1])
-    worn, done = (None, None) if end is None else (end.worn, end.half_cycle)
-    states = [system.conditions(k, np.asarray(p), latest, worn, done) for k, p in enumerate(pressure)]
-    if end is None and system.layers.memory is not None:
-        rest = system.rested(states)
-        states = [system.conditions(k, np.asarray(p), latest, rest, done) for k, p in enumerate(pressure)]
-    adds = cycle_totals(system, pressure, states)
-    path = float(adds.of("load_path"))
-    return Snapshot(
-        cycle,
-        _surfaces(system, pressure, states, adds, end),
-        system.pair.x,
-        system.pair.weights,
-        pressure,
-        temperature,
-        float(adds.of("work")) / path if path > 0 else 0.0,
-        velocity,
-        float(adds.of("distance")),
-        system.motion.period,
-        contacts_of(system.pair.punch),
-    )
+def cycle_of(end: Block | SteadyCycle) -> Totals:
+    """Return what all half-cycles of the last cycle add to the totals."""
+    adds, strokes = end.adds, end.system.motion.half_cycles
+    return Totals(*(rows[-strokes:].sum(axis=0) for rows in (adds.sums, adds.energy, adds.pressure)))
 
 
 def _of_block(block: Block) -> Snapshot:
     """Return the end of the last cycle of a block."""
+    system, contacts, end = block.system, joined(block.end.contacts), block.end
+    strokes = system.motion.half_cycles
     if block.steps:
-        return _of_steps(block)
-    system, contacts = block.system, joined(block.end.contacts)
-    pressure = block.pressure if contacts is None else contacts.pressure
-    heat, temperature = block.heat, None
-    if heat is not None:
-        temperature = np.stack([heat.temperature_punch, heat.temperature_strip], axis=1)
-    cycle = int(block.half_cycle[-1]) // system.motion.half_cycles
-    return _snapshot(system, float(cycle), pressure, block.end, temperature, {})
+        steps: tuple[Any, ...] = block.steps[-strokes:]
+        rate = reduce(WornDepths.__add__, [one.wear for one in steps])
+        pressure = np.concatenate([one.records.pressure for one in steps])
+    else:
+        pressure, heat = block.pressure if contacts is None else contacts.pressure, block.heat
+        latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
+        states = [system.conditions(k, np.asarray(p), latest, end.worn, end.half_cycle) for k, p in enumerate(pressure)]
+        rate = system.wear.phases(states).worn(pressure)
+    return Snapshot(float(block.half_cycle[-1] // strokes), block, rate, pressure)
 
 
 def steady_snapshot(
     system: Tribosystem, pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
 ) -> Snapshot:
     """Return the steady state of these pressures (m, n) of the phases, with heat of these conductances (m, n)."""
-    heat, temperature = cycle_heat(system), None
-    if heat is not None:
-        if conductances is None:
-            conductances = heat.conductances(touching(pressure))
-        end = heat.jump(heat.initial(), np.inf, conductances)
-        state, rows = heat.exchange.at(end.state(pressure)), []
-        for phase in range(len(pressure)):
-            p = np.asarray(pressure[phase])
-            state, _ = heat.exchange.half_cycle(state, phase, p, conductances[phase])
-            rows.append(np.stack(heat.exchange.contact_temperatures(state, phase)))
-        temperature = np.array(rows)
-    return _snapshot(system, np.inf, pressure, None, temperature, velocity)
+    end = steady_cycle(system, pressure, velocity, conductances)
+    return Snapshot(np.inf, end, end.rate, pressure)

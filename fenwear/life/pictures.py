@@ -11,7 +11,7 @@ import numpy as np
 
 from fenwear.life.calibrate import Calibration
 from fenwear.life.lifetime import Lifetime
-from fenwear.life.quantities import UNITS
+from fenwear.life.quantities import unit_of
 from fenwear.life.sensitivity import Sensitivity
 from fenwear.report.style import BLUE, GREY, RED, panels, reference_line
 from fenwear.results.disk import writing
@@ -49,7 +49,7 @@ def residuals(calibration: Calibration) -> Figure:
     for k, trace in enumerate(traces):
         fit, rest = axes[2 * k : 2 * k + 2]
         series = trace.series
-        factor, unit = (1e3, "µm") if UNITS[series.quantity] == "mm" else (1.0, UNITS[series.quantity] or "-")
+        factor, unit = (1e3, "µm") if unit_of(series.quantity) == "mm" else (1.0, unit_of(series.quantity) or "-")
         x = series.after if series.x is None else series.x
         order = np.argsort(x, kind="stable")
         fit.plot(x, factor * series.values, ".", color=GREY, markersize=3, label="measured")

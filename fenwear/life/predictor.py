@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, InputError
 from fenwear.life.data import DataSet, Series
-from fenwear.life.model import Course, Model
-from fenwear.life.quantities import UNITS, Quantity, cycles_of
-from fenwear.life.snapshot import Snapshot
+from fenwear.life.model import Course, Model, Snapshot
+from fenwear.life.quantities import Quantity, cycles_of, padded, registered_name, unit_of
+from fenwear.results.surfaces import at_places, rim
 
 
 class Predictor:
@@ -62,7 +63,8 @@ class Predictor:
 def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[float, float], *, strict: bool) -> Array:
     ends = np.array([s.cycle for s in snapshots])
     predicted = np.empty(len(series.values))
-    quantity = Quantity(series.quantity, series.quantity, "snapshot", UNITS[series.quantity], series.body)
+    name = registered_name(series.quantity, at_a_place=series.x is not None)
+    quantity = Quantity(name, name, "snapshot", unit_of(name), series.body)
     for amount in np.unique(series.after):
         cycles = cycles_of((float(amount), series.counted), *measures)
         snapshot = snapshots[int(np.argmin(np.abs(ends - cycles)))].at_cycle(cycles)
@@ -75,22 +77,27 @@ def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[floa
 
 
 def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> Array:
-    """Return the depth at places (k,); nothing is worn beyond the contact surface.
+    """Return the depth at places along x, in a solid at y = 0 (k,); nothing is worn beyond the contact surface.
 
     Raises:
         CaseError: the scar reaches the end of the modelled contact surface, and the profile beyond it.
     """
-    surface = snapshot.surfaces[series.body]
-    depth = np.zeros(len(surface.x)) if surface.depth is None else surface.depth
-    edge = 1e-9 * (surface.x[-1] - surface.x[0])
-    worn = 1e-3 * float(depth.max())
-    cut = (x.min() < surface.x[0] - edge and depth[0] > worn) or (x.max() > surface.x[-1] + edge and depth[-1] > worn)
-    if strict and cut:
-        raise CaseError(
-            InputError(
-                "geometry",
-                f"the profile goes from x = {x.min():g} to {x.max():g} mm, and the scar reaches the end of the contact "
-                f"surface, which goes from {surface.x[0]:g} to {surface.x[-1]:g} mm; expected a wider one",
+    surface: ContactSurface = getattr(snapshot.end.system.pair, series.body)
+    depth: Array = getattr(snapshot.end, "wear_strip" if series.body == "strip" else "wear")[-1]
+    places = padded(x[:, None], surface.dim - 1)
+    found = at_places(surface, depth, places)
+    beyond = np.isnan(found)
+    if strict and beyond.any():
+        nodes = surface.abscissa[:, None] if surface.dim == 2 else surface.x[:, :2]
+        ends = np.flatnonzero(rim(surface))
+        nearest = [ends[np.linalg.norm(nodes[ends] - place, axis=1).argmin()] for place in places[beyond]]
+        if (depth[nearest] > 1e-3 * depth.max()).any():
+            low, high = surface.abscissa.min(), surface.abscissa.max()
+            raise CaseError(
+                InputError(
+                    "geometry",
+                    f"the profile goes from x = {x.min():g} to {x.max():g} mm, and the scar reaches the end of the "
+                    f"contact surface, which goes from {low:g} to {high:g} mm; expected a wider one",
+                )
             )
-        )
-    return np.interp(x, surface.x, depth, left=0.0, right=0.0)
+    return np.where(beyond, 0.0, found)

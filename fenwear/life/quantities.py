@@ -1,15 +1,19 @@
 """Quantities of interest: named numbers with units, of the end of any cycle, of a steady state, or of a whole run.
 
-    depth of strip at 3 mm after 3600 m      steady pressure      cycles until depth 0.2 mm      run-in distance
+    wear of strip at 3 mm after 3600 m       steady largest_pressure
+    cycles until largest_depth 0.2 mm        run_in_distance
 
-A quantity is written as: [steady] NAME [of punch|strip] [in CONTACT] [at X] [after AMOUNT], or
-cycles|distance|time until NAME [of punch|strip] [in CONTACT] [at X to] LEVEL, where CONTACT is one that has a name.
+A quantity is written as: [steady] NAME [of punch|strip] [in CONTACT] [at X[, Y]] [after AMOUNT], or
+cycles|distance|time until NAME [of punch|strip] [in CONTACT] [at X[, Y] to] LEVEL, where CONTACT is one that has a
+name. NAME is that of the registry (`fenwear.results.registry`), by which runs compute it, too. In the plane a place is
+x, or the length along a curve; in rings r; in solids x and y, y being 0 by default.
 """
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,46 +25,33 @@ from fenwear.case import Case
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.life.model import Course, Model
-from fenwear.life.snapshot import Snapshot, WornSurface, edge_moved
-from fenwear.results.scar import extents
+from fenwear.life.model import Course, Model, Snapshot, cycle_of, edge_moved
+from fenwear.results import registry
+from fenwear.results.quantity import RECORD
+from fenwear.results.quantity import Quantity as Registered
+from fenwear.results.surfaces import at_places
 
 LIMIT = 10_000_000  # cycles after which a level counts as never reached
 
-UNITS = {
-    "depth": "mm",
-    "volume": "mm^3",
-    "scar_width": "mm",
-    "contact_width": "mm",
-    "pressure": "MPa",
-    "temperature": "K",
-    "friction": "",
-    "volume_rate": "mm^3",
-    "lambda_F": "mm",
-    "lambda_M": "rad",
+# What quantities were called here; a value at nodes without a place is the largest, see `registry.LARGEST`.
+OLD_NAMES = {
+    "depth": "wear",
+    "volume": "worn_volume",
+    "volume_rate": "worn_volume_increment",
+    "friction": "friction_coefficient",
+    "run-in cycles": "run_in_cycles",
+    "run-in distance": "run_in_distance",
+    "critical speed": "critical_speed",
 }
-MEANINGS = {
-    "depth": "worn depth, the largest or at x",
-    "volume": "worn volume",
-    "scar_width": "width over which the depth is beyond a hundredth of its largest",
-    "contact_width": "width in contact, of the phase with the widest",
-    "pressure": "largest contact pressure, or at x",
-    "temperature": "largest temperature of the contact surfaces, or at x",
-    "friction": "mean friction coefficient of a cycle",
-    "volume_rate": "volume worn in a cycle",
-    "lambda_F": "approach of the bodies by wear in a cycle, of a steady state",
-    "lambda_M": "rotation of the punch by wear in a cycle, of a steady state",
-}
-OF_A_BODY = ("depth", "volume", "scar_width", "volume_rate")
-IN_A_CONTACT = (*OF_A_BODY, "contact_width", "pressure", "temperature")
-AT_A_PLACE = ("depth", "pressure", "temperature")
-GROWING = ("depth", "volume", "scar_width")  # what a life can be counted to
-OF_RUNS = ("depth", "volume", "scar_width")  # grow without end: no steady state knows them
+GROWING = ("wear", "largest_depth", "worn_volume", "worn_area", "scar_width", "scar_length")  # that lives count to
+OF_NODES = ("contact_width", "contact_area")  # what is counted in nodes
 LIVES = {"cycles": "", "distance": "mm", "time": "s"}
-WHOLE = {"run-in cycles": "", "run-in distance": "mm", "critical speed": "mm/s"}
+WARMER = ("temperature_punch", "temperature_strip")  # the larger of which is the temperature at a place
+WHOLE = {"run_in_cycles": "", "run_in_distance": "mm", "critical_speed": "mm/s"}
+MAIN = ("largest_depth", "worn_volume", "scar_width", "largest_pressure", "largest_temperature", *WHOLE)
 
 _PLAIN = re.compile(
-    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>[\w-]+))?( in (?P<contact>[\w-]+))?( at (?P<at>.+?))?"
+    r"(?P<steady>steady )?(?P<name>\w+)( of (?P<body>[\w-]+))?( in (?P<contact>[\w-]+))?( at (?P<at>.+?))?"
     r"( after (?P<after>.+))?"
 )
 _UNTIL = re.compile(
@@ -80,7 +71,7 @@ class Quantity:
         kind: snapshot: of the end of a cycle; steady; life: until a level; whole: of the case.
         unit: Of its value.
         body: punch or strip.
-        at: Position x, mm; None for the largest.
+        at: Place of what has values at nodes, mm: x, in a solid x and y; None of what is one number.
         after: Cycles, distance (mm) or time (s) at which it is taken, with what it is; None for the end of the run.
         level: Up to which a life counts.
         life: Whether that is counted in cycles, distance or time.
@@ -92,7 +83,7 @@ class Quantity:
     kind: Kind
     unit: str
     body: str = "punch"
-    at: float | None = None
+    at: tuple[float, ...] | None = None
     after: tuple[float, str] | None = None
     level: float = 0.0
     life: str = "cycles"
@@ -103,23 +94,77 @@ class Quantity:
         """Its text with its unit."""
         return f"{self.text} ({self.unit or '-'})"
 
+    @property
+    def of_strip(self) -> str:
+        """How the names of what is the strip's end."""
+        return "_strip" if self.body == "strip" else ""
+
     def of_snapshot(self, snapshot: Snapshot) -> float:
-        """Return its value at the end of a cycle or in a steady state.
+        """Return its value at the end of a cycle or in a steady state, as a run computes it.
 
         Raises:
             CaseError: the snapshot does not know it.
         """
-        return _VALUES[self.name](self, self._own(snapshot))
+        own = self._own(snapshot)
+        if self.name.startswith("lambda_"):
+            return self._velocity(own)
+        known = registry.quantities_of(own.end.system)
+        if self.at is None:
+            return float(self._registered(known, self.name + self.of_strip, own).of_cycle(own.end))
+        fields = WARMER if self.name == "temperature" else (self.name + self.of_strip,)
+        found = [self._registered(known, name, own) for name in fields]
+        on_strip = found[0].dims[-1].endswith("_strip")
+        return self._at_place(own, np.max([one.of_cycle(own.end) for one in found], axis=0), on_strip=on_strip)
+
+    def _at_place(self, snapshot: Snapshot, values: Array, *, on_strip: bool) -> float:
+        """Return what nodal values (n,) are at its place.
+
+        Raises:
+            CaseError: it is beside the contact.
+        """
+        pair, places = snapshot.end.system.pair, np.array([self.at])
+        surface = pair.strip if on_strip else pair.punch
+        own = surface.nodes_of(self.contact) if self.contact else None
+        found = at_places(surface, values, padded(places, surface.dim - 1), own)
+        if np.isnan(found).any():
+            x = surface.abscissa if own is None else surface.abscissa[own]
+            place = ", ".join(f"{one:g}" for one in places[0])
+            message = f"{place} mm is not on the contact, which goes from {x.min():g} to {x.max():g} mm"
+            raise CaseError(InputError(self.text, message))
+        return float(found[0])
+
+    def _registered(self, known: Mapping[str, Registered], name: str, snapshot: Snapshot) -> Registered:
+        """Return the quantity of the registry.
+
+        Raises:
+            CaseError: this system has none of the name, or not in a steady state, or not of one contact.
+        """
+        found = known.get(name)
+        if found is None:
+            names = ", ".join(one.name for one in known.values() if one.dims == RECORD)
+            raise CaseError(InputError(self.text, f"this case has no {name}; expected one of {names}"))
+        if np.isinf(snapshot.cycle) and not found.steady:
+            raise CaseError(InputError(self.text, f"a steady state has no {name}: it is of a run"))
+        if self.contact and not found.nodal:
+            raise CaseError(InputError(self.text, f"{name} is of all contacts together; leave out 'in {self.contact}'"))
+        return found
+
+    def _velocity(self, snapshot: Snapshot) -> float:
+        if self.name not in snapshot.velocity:
+            known = " and ".join(snapshot.velocity) or "none"
+            raise CaseError(InputError(self.text, f"the punch does not move so; its rigid motions are {known}"))
+        return snapshot.velocity[self.name]
 
     def rate(self, snapshot: Snapshot) -> float:
         """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
-        surface = self._own(snapshot).surfaces[self.body]
-        if self.name == "volume":
-            return surface.volume_rate
-        if self.name == "depth" and surface.depth is not None:
-            if self.at is not None:
-                return _at(surface.x, surface.rate, self.at, self.text)
-            return float(surface.rate[int(np.argmax(surface.depth))])
+        own = self._own(snapshot)
+        depth: Array = getattr(own.rate, self.body)
+        if self.name == "worn_volume":
+            return float(cycle_of(own.end).of(f"volume_{self.body}"))
+        if self.at is not None:
+            return self._at_place(own, depth, on_strip=self.body == "strip")
+        if self.name == "largest_depth":
+            return float(depth[int(getattr(own.end, f"wear{self.of_strip}")[-1].argmax())])
         return float("nan")
 
     def _own(self, snapshot: Snapshot) -> Snapshot:
@@ -129,7 +174,8 @@ class Quantity:
             CaseError: there is none, or its body's surface has none of this name.
         """
         own = snapshot.within(self.contact, self.text)
-        if self.body not in own.surfaces and self.name in OF_A_BODY:
+        names = getattr(own.end.system.pair, self.body).names
+        if self.contact and self.contact not in names:
             raise CaseError(InputError(self.text, f"the surface of the {self.body} is not named by contacts"))
         return own
 
@@ -171,36 +217,71 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
         CaseError: it names none; says what is known.
     """
     words = " ".join(text.split())
-    if words in WHOLE:
-        return Quantity(words, words, "whole", WHOLE[words])
+    whole = OLD_NAMES.get(words, words)
+    if whole in WHOLE:
+        return Quantity(words, whole, "whole", WHOLE[whole])
     match = _UNTIL.fullmatch(words)
-    if match is not None and match["name"] in UNITS:
+    if match is not None and registered_name(match["name"], at_a_place=match["at"] is not None):
         return _life(words, match, option, names)
     match = _PLAIN.fullmatch(words)
-    if match is None or match["name"] not in UNITS:
-        known = ", ".join([*UNITS, *WHOLE])
-        examples = "'depth of punch at 3 mm after 3600 m', 'steady pressure' or 'cycles until depth 0.2 mm'"
-        raise CaseError(InputError(option, f"expected a quantity such as {examples}, got {text!r}; known are {known}"))
-    name, is_steady = match["name"], match["steady"] is not None
-    if is_steady and (name in OF_RUNS or match["after"]):
-        raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
+    name = "" if match is None else registered_name(match["name"], at_a_place=match["at"] is not None)
+    if match is None or not name:
+        raise CaseError(InputError(option, _unknown(text, "" if match is None else match["name"])))
+    is_steady = match["steady"] is not None
     if name.startswith("lambda_") and not is_steady:
         raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
     body, at = _place(name, match, words, option, names)
+    if is_steady and (match["after"] or not registered(name, body).steady):
+        raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
     after = None if match["after"] is None else parse_amount(match["after"], option)
     kind: Kind = "steady" if is_steady else "snapshot"
-    return Quantity(words, name, kind, UNITS[name], body, at, after, contact=match["contact"] or "")
+    return Quantity(words, name, kind, unit_of(name), body, at, after, contact=match["contact"] or "")
+
+
+def _unknown(text: str, word: str) -> str:
+    """Return what is to be said of a text that names no quantity."""
+    if registered_name(word, at_a_place=False):
+        return f"{word} is one number; a place goes with wear, pressure and other values at nodes, got {text!r}"
+    listed = [*registry.names_known(), *registry.LARGEST, *OLD_NAMES, *WHOLE]
+    near = difflib.get_close_matches(word or text, listed, n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(MAIN)} and others of the results"
+    examples = "'wear of punch at 3 mm after 3600 m', 'steady largest_pressure' or 'cycles until largest_depth 0.2 mm'"
+    return f"expected a quantity such as {examples}, got {text!r}; {hint}"
+
+
+def registered_name(word: str, *, at_a_place: bool) -> str:
+    """Return the registry's name of a quantity, of values at a place or of one number; "" where it has none."""
+    name = OLD_NAMES.get(word, word)
+    if at_a_place:
+        field = registry.known(WARMER[0] if name == "temperature" else name)
+        return "" if field is None or field.dims[1:] not in (("x",), ("x_strip",)) else name
+    name = registry.LARGEST.get(name, name)
+    found = registry.known(name)
+    return "" if found is None or found.dims not in (RECORD, ()) else name
+
+
+def registered(name: str, body: str = "punch") -> Registered:
+    """Return what the registry has of a name; of the strip where the strip has its own."""
+    names = (f"{name}_strip", name) if body == "strip" else (name, f"{name}_punch")
+    return next(found for one in names if (found := registry.known(one)) is not None)
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a quantity of the registry, as keys of a case are given."""
+    unit = re.sub(r"(?<=m)(?=[23])", "^", registered(OLD_NAMES.get(name, name)).unit)
+    return "" if unit == "1" else unit
 
 
 def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
-    name, life = match["name"], match["life"] or "cycles"
+    life = match["life"] or "cycles"
+    name = registered_name(match["name"], at_a_place=match["at"] is not None)
     if life not in LIVES:
         raise CaseError(InputError(option, f"expected cycles, distance or time until a level, got {words!r}"))
     if name not in GROWING:
         raise CaseError(InputError(option, f"expected one of {', '.join(GROWING)} with a level, got {words!r}"))
     body, at = _place(name, match, words, option, names)
     try:
-        level = convert(match["level"], UNITS[name])
+        level = convert(match["level"], unit_of(name))
     except ValueError as error:
         raise CaseError(InputError(option, f"{words!r}: {error}")) from None
     if re.fullmatch(r"[-+\d.eE]+", match["level"]):
@@ -210,24 +291,32 @@ def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quanti
     return Quantity(words, name, "life", LIVES[life], body, at, None, level, life, match["contact"] or "")
 
 
-def _place(name: str, match: re.Match[str], words: str, option: str, names: Names) -> tuple[str, float | None]:
+def _place(
+    name: str, match: re.Match[str], words: str, option: str, names: Names
+) -> tuple[str, tuple[float, ...] | None]:
+    """Return the body and the place of a quantity."""
     body = names.role_of(match["body"] or "punch")
-    if body not in ("punch", "strip") or (match["body"] and name not in OF_A_BODY):
-        raise CaseError(
-            InputError(
-                option, names.told(f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
-            )
-        )
-    if match["contact"] and name not in IN_A_CONTACT:
-        raise CaseError(InputError(option, f"expected a contact behind {', '.join(IN_A_CONTACT)} only, got {words!r}"))
+    if body not in ("punch", "strip") or (
+        body == "strip" and (name == "temperature" or registry.known(f"{name}_strip") is None)
+    ):
+        message = "expected 'of punch', or 'of strip' behind what each body has"
+        raise CaseError(InputError(option, names.told(f"{message}, such as wear and worn_volume, got {words!r}")))
+    if match["contact"] and not registered(name, body).nodal:
+        raise CaseError(InputError(option, f"{name} is of all contacts together: expected no contact, got {words!r}"))
     if match["at"] is None:
         return body, None
-    if name not in AT_A_PLACE:
-        raise CaseError(InputError(option, f"expected a place behind {', '.join(AT_A_PLACE)} only, got {words!r}"))
+    parts = [part.strip() for part in match["at"].split(",")]
     try:
-        return body, convert(match["at"], "mm")
+        if len(parts) > 2:
+            raise ValueError(f"expected x, or x and y, got {match['at']!r}")
+        return body, tuple(convert(part, "mm") for part in parts)
     except ValueError as error:
         raise CaseError(InputError(option, f"{words!r}: {error}")) from None
+
+
+def padded(places: Array, count: int) -> Array:
+    """Return places (k, c) of so many coordinates, mm: zero where none is given."""
+    return np.column_stack([places, np.zeros((len(places), max(0, count - places.shape[1])))])[:, :count]
 
 
 def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
@@ -236,89 +325,14 @@ def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
     Raises:
         CaseError: it needs heat, or the wear of a body that does not wear.
     """
-    if quantity.name in ("temperature", "critical speed") and case.heat is None:
+    if (quantity.name == "critical_speed" or "temperature" in quantity.name) and case.heat is None:
         raise CaseError(InputError(option, f"{quantity.text!r} needs the table heat, which the case does not have"))
-    if quantity.name in OF_A_BODY and getattr(case.wear, quantity.body) is None:
+    worn = quantity.name in (*GROWING, "worn_volume_increment", "worn_mass")
+    if worn and getattr(case.wear, quantity.body) is None:
         other = "strip" if quantity.body == "punch" else "punch"
         message = f"{quantity.text!r}: the case has no wear.{quantity.body}; expected it 'of {other}'"
         raise CaseError(InputError(option, message))
-    return replace(quantity, unit="rad/s") if quantity.name == "critical speed" and case.turns else quantity
-
-
-# ---- Values of a snapshot ---------------------------------------------------------------------
-
-
-def _at(x: Array, values: Array, place: float, text: str) -> float:
-    slack = 1e-9 * (x[-1] - x[0])
-    if not x[0] - slack <= place <= x[-1] + slack:
-        raise CaseError(InputError(text, f"x = {place:g} mm is not on the contact, from {x[0]:g} to {x[-1]:g} mm"))
-    return float(np.interp(place, x, values))
-
-
-def _worn(quantity: Quantity, snapshot: Snapshot) -> tuple[WornSurface, Array]:
-    surface = snapshot.surfaces[quantity.body]
-    if surface.depth is None:
-        raise CaseError(InputError(quantity.text, "a steady state knows no worn depth: it grows without end"))
-    return surface, surface.depth
-
-
-def _depth(quantity: Quantity, snapshot: Snapshot) -> float:
-    surface, depth = _worn(quantity, snapshot)
-    return float(depth.max()) if quantity.at is None else _at(surface.x, depth, quantity.at, quantity.text)
-
-
-def _volume(quantity: Quantity, snapshot: Snapshot) -> float:
-    _worn(quantity, snapshot)
-    return snapshot.surfaces[quantity.body].volume or 0.0
-
-
-def _scar_width(quantity: Quantity, snapshot: Snapshot) -> float:
-    surface, depth = _worn(quantity, snapshot)
-    nodes = np.arange(len(depth) - 1)
-    return float(extents(depth[None], surface.x[:, None], np.stack([nodes, nodes + 1], axis=1))[0, 0])
-
-
-def _contact_width(_: Quantity, snapshot: Snapshot) -> float:
-    return float(((snapshot.pressure > 0) @ snapshot.weights).max())
-
-
-def _pressure(quantity: Quantity, snapshot: Snapshot) -> float:
-    highest = snapshot.pressure.max(axis=0)
-    return float(highest.max()) if quantity.at is None else _at(snapshot.x, highest, quantity.at, quantity.text)
-
-
-def _temperature(quantity: Quantity, snapshot: Snapshot) -> float:
-    if snapshot.temperature is None:
-        raise CaseError(InputError(quantity.text, "needs the table heat, which the case does not have"))
-    highest = snapshot.temperature.max(axis=(0, 1))
-    return float(highest.max()) if quantity.at is None else _at(snapshot.x, highest, quantity.at, quantity.text)
-
-
-def _volume_rate(quantity: Quantity, snapshot: Snapshot) -> float:
-    return snapshot.surfaces[quantity.body].volume_rate
-
-
-def _velocity(quantity: Quantity, snapshot: Snapshot) -> float:
-    if quantity.name not in snapshot.velocity:
-        known = " and ".join(snapshot.velocity) or "none"
-        raise CaseError(InputError(quantity.text, f"the punch does not move so; its rigid motions are {known}"))
-    return snapshot.velocity[quantity.name]
-
-
-_VALUES: Mapping[str, Callable[[Quantity, Snapshot], float]] = {
-    "depth": _depth,
-    "volume": _volume,
-    "scar_width": _scar_width,
-    "contact_width": _contact_width,
-    "pressure": _pressure,
-    "temperature": _temperature,
-    "friction": lambda _, snapshot: snapshot.friction,
-    "volume_rate": _volume_rate,
-    "lambda_F": _velocity,
-    "lambda_M": _velocity,
-}
-
-# ---- Values of a run ---------------------------------------------------------------------------
+    return replace(quantity, unit="rad/s") if quantity.name == "critical_speed" and case.turns else quantity
 
 
 def cycles_of(amount: tuple[float, str], distance: float, period: float) -> float:
@@ -367,7 +381,7 @@ def evaluate(
     """
     if quantity.kind == "steady":
         state = model.steady(values, settings)
-        of_nodes = quantity.name == "contact_width" and state.parts
+        of_nodes = quantity.name in OF_NODES and state.parts
         return quantity.of_snapshot(state), Path(rough=of_nodes, grain=_grain(quantity, state))
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
@@ -388,7 +402,7 @@ def evaluate(
 
 
 def _grain(quantity: Quantity, snapshot: Snapshot) -> float:
-    return float(snapshot.weights.max()) if quantity.name == "contact_width" else 0.0
+    return float(snapshot.end.system.pair.weights.max()) if quantity.name in OF_NODES else 0.0
 
 
 def _whole(
@@ -399,10 +413,10 @@ def _whole(
     distance: float,
     path: Path | None,
 ) -> tuple[float, Path]:
-    if quantity.name == "critical speed":
+    if quantity.name == "critical_speed":
         return model.critical_speed(values, settings), Path()
     cycles, course = model.run_in(values, settings, None if path is None else path.course)
-    return cycles * distance if quantity.name == "run-in distance" else cycles, Path(course)
+    return cycles * distance if quantity.name == "run_in_distance" else cycles, Path(course)
 
 
 def lives(model: Model, quantities: Sequence[Quantity], values: Mapping[str, float], limit: int = LIMIT) -> Array:

@@ -28,10 +28,9 @@ from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.keys import Key, find_key, with_values
 from fenwear.life.linearised import SteadyTangent, differentiable
-from fenwear.life.model import Model
+from fenwear.life.model import Model, Snapshot
 from fenwear.life.quantities import Path, Quantity, evaluate, of_case, parse_quantity
 from fenwear.life.ranks import everywhere, share
-from fenwear.life.snapshot import Snapshot
 from fenwear.life.window import over_window
 
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small

@@ -10,6 +10,7 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.heat.exchange import TERMS
 from fenwear.report.style import (
     BLUE,
     BODY_COLOURS,
@@ -26,7 +27,6 @@ from fenwear.report.style import (
     run_style,
     strip_moves,
 )
-from fenwear.results.history import HEAT_TERMS
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ def peak_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
         "largest_temperature": f"largest temperature ({temperature_unit(history)})",
     }
     over = {name: label for name, label in over.items() if name in history}
+    if "contact_width" in over:
+        over.pop("contact_area", None)  # the same, times the thickness
     figure, axes = panels(len(over), 2.5, look=look)
     for ax, (name, label) in zip(axes, over.items(), strict=True):
         by_direction(ax, history, name, look)
@@ -223,7 +225,7 @@ WHERE_HEAT_GOES = {
     "debris": "carried off by debris",
     "carried": "carried out by the strip",
 }
-assert WHERE_HEAT_GOES.keys() == HEAT_TERMS.keys() - {"friction"}
+assert WHERE_HEAT_GOES.keys() == set(TERMS) - {"friction"}
 
 
 def heat_balance_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:

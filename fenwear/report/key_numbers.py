@@ -13,6 +13,7 @@ from fenwear.case.names import Names
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 from fenwear.results.reading import in_current_names
+from fenwear.results.sheet import LINES, OF_CONTACT
 
 UNITS = {
     "_per_s": "1/s",
@@ -26,32 +27,18 @@ UNITS = {
     "_mJ": "mJ",
     "_seconds": "s",
 }
+# What is no line of the sheet, which has words for the others.
 LABELS = {
     "half_cycles": "half-cycles done",
-    "half_cycle": "half-cycle",
     "stop": "how the run stopped",
     "setup_seconds": "time for meshes and operators",
     "half_cycles_seconds": "time for the half-cycles",
-    "largest_pressure_MPa": "largest pressure",
     **{f"largest_pressure_at_{axis}_mm": f"where the pressure is largest, {axis}" for axis in "rxyz"},
     "pressure_beside_largest_MPa": "mean pressure of the nodes beside it",
     "nodes_across_contact": "nodes across the contact",
     "nodes_along_sliding": "nodes across the contact, along the sliding",
     "nodes_across_sliding": "nodes across the contact, across the sliding",
-    "contact_width_mm": "width in contact",
-    "largest_temperature_degC": "largest temperature of the contact surfaces at the end",
-    "largest_temperature_of_run_degC": "largest temperature of the contact surfaces over the run",
-    "largest_temperature_K": "largest temperature of the contact surfaces at the end",
-    "largest_temperature_of_run_K": "largest temperature of the contact surfaces over the run",
     "largest_temperature_of_run_half_cycle": "half-cycle in which it was largest",
-    "wear_mm": "worn depth of the punch",
-    "pressure_MPa": "contact pressure",
-    "mean_pressure_MPa": "mean pressure",
-    "contact_area_mm2": "area in contact",
-    "temperature_punch_K": "temperature of the punch",
-    "temperature_punch_degC": "temperature of the punch",
-    "temperature_strip_degC": "temperature of the strip",
-    "temperature_strip_K": "temperature of the strip",
     "heat_mJ": "heat of the last half-cycle",
     "heat_steps": "time steps of the heat in each half-cycle, the fewest of all stages",
     "heat_change_by_halving_steps": "largest change of contact temperatures by halving them, relative",
@@ -60,7 +47,6 @@ LABELS = {
     "heat_gain": "largest share of a change of pressure that its friction heat of a half-cycle gives back; from 1 on "
     "contact may have several answers",
     "wear_step_over_explicit_limit": "wear of a half-cycle over the limit of explicit steps",
-    "periodicity": "periodicity: change of pressure against one cycle ago, over the pressure scale",
     "growth_rate_per_s": "growth rate of disturbances of the final state; below 0 they die out",
     "largest_complementarity_error": "largest error of p >= 0, gap >= 0 and p gap = 0, over their scales",
     "largest_equilibrium_error": "largest error of the force and moment balance, over the load",
@@ -149,6 +135,7 @@ def _words(name: str) -> str:
     bare, bracket, index = name.partition("[")
     words = LABELS.get(bare)
     if words is None:
-        suffix = next((suffix for suffix in UNITS if bare.endswith(suffix)), "")
-        words = bare.removesuffix(suffix).replace("_", " ")
+        line = {**LINES, **OF_CONTACT}.get(bare)
+        stem = bare.removesuffix(next((suffix for suffix in UNITS if bare.endswith(suffix)), ""))
+        words = stem.replace("_", " ") if line is None or line.label.startswith(("...", "at ")) else line.label
     return words + bracket + index

@@ -22,6 +22,7 @@ from fenwear.report.style import STANDARD, Style
 from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.registry import known
 from fenwear.results.sheet import BODIES, LINES, OF_CONTACT, UNCERTAINTY, shown
 
 REPORT = "report.html"
@@ -180,8 +181,9 @@ def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
 
 def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
     if not summary:
-        units = {"largest_pressure": "_MPa", "contact_width": "_mm", "contact_area": "_mm2", "periodicity": ""}
-        last = {name + unit: float(history[name][-1]) for name, unit in units.items() if name in history}
+        names = ("largest_pressure", "contact_width", "contact_area", "periodicity")
+        shown_first = [one for name in names if name in history and (one := known(name)) is not None]
+        last = {one.key: float(history[one.name][-1]) for one in shown_first}
         return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
     single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}

@@ -54,7 +54,7 @@ def roughness_of(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, F
     figure, (ax,) = panels(1, 2.4, share_x=False, look=look)
     symbols = ("Sa", "Sq") if "y" in history else ("Ra", "Rq")
     for number, (body, end) in enumerate(bodies.items()):
-        for k, (name, symbol) in enumerate(zip(("roughness_mean", "roughness_rms"), symbols, strict=True)):
+        for k, (name, symbol) in enumerate(zip(("roughness_Sa", "roughness_Sq"), symbols, strict=True)):
             line = run_style(2 * number + k)
             ax.plot(x, 1e3 * history[f"{name}{end}"], label=f"{symbol}, {body}", **line, **mark_few(x))
     ax.set_ylabel(f"{', '.join(symbols)} (µm)")

@@ -31,7 +31,9 @@ def uncertainty_rows(summary: dict[str, Any]) -> list[UncertainNumber]:
         line = lines[key]
         parts = sorted(((own.get(path, 0.0), source) for source, own in sources.items()), reverse=True)
         made_of = [
-            f"{source} {100 * part / number:.0f} %" for part, source in parts if number and part > SMALL * number
+            f"{source.replace('_', ' ')} {100 * part / number:.0f} %"
+            for part, source in parts
+            if number and part > SMALL * number
         ]
         value, within = (number_text(shown(one, line)) for one in (numbers[path], float(f"{number:.1e}")))
         label = f"{line.label}, {of}" if of else line.label

@@ -15,11 +15,11 @@ from fenwear.arrays import Array
 from fenwear.assembly import ContactSetup
 from fenwear.cycle import Block
 from fenwear.layers.between import DEBRIS, PLASTIC
-
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
+from fenwear.results.quantity import Variable
 
 OF_DEBRIS: dict[str, Variable] = {
     "debris_thickness": (("half_cycle", "x"), "mm", "thickness of the debris between the surfaces at the end"),
+    "largest_debris_thickness": (("half_cycle",), "mm", "largest thickness of the debris at the end"),
     "debris_volume": (("half_cycle",), "mm3", "volume of the debris between the surfaces at the end"),
     "ejected_volume": (("half_cycle",), "mm3", "volume of the debris ejected from the start"),
     "debris_balance_error": (("half_cycle",), "1", "worn volume that is neither stored nor ejected, over the worn one"),
@@ -29,6 +29,7 @@ ON_STRIP: dict[str, Variable] = {
 }
 OF_FLOW: dict[str, Variable] = {
     "plastic_depth": (("half_cycle", "x"), "mm", "depth that has flown beyond the hardness, apart from wear"),
+    "largest_plastic_depth": (("half_cycle",), "mm", "largest depth that has flown beyond the hardness"),
     "plastic_volume": (("half_cycle",), "mm3", "volume that has flown beyond the hardness, apart from wear"),
 }
 STATE, STATES = "state_", "states"  # how variables of states begin; where summary.json has them
@@ -73,7 +74,11 @@ def values(block: Block) -> dict[str, Array]:
     found: dict[str, Array] = {}
     if PLASTIC in rows:
         depth = block.between[:, rows.index(PLASTIC)]
-        found = {"plastic_depth": depth, "plastic_volume": depth @ areas}
+        found = {
+            "plastic_depth": depth,
+            "largest_plastic_depth": depth.max(axis=1),
+            "plastic_volume": depth @ areas,
+        }
     found |= _states(block)
     if system.layers.debris is None:
         return found
@@ -90,33 +95,19 @@ def values(block: Block) -> dict[str, Array]:
         **found,
         **on_strip,
         "debris_thickness": lies,
+        "largest_debris_thickness": lies.max(axis=1),
         "debris_volume": stored @ areas,
         "ejected_volume": ejected @ areas,
         "debris_balance_error": np.abs(fed - (stored + ejected) @ areas) / np.maximum(fed, 1e-300),
     }
 
 
-def numbers(last: Block) -> dict[str, Any]:
-    """Return the key numbers at the end of a run, for summary.json."""
-    found = values(last)
-    told: dict[str, Any] = {}
-    if "plastic_volume" in found:
-        told["plastic_volume_mm3"] = float(found["plastic_volume"][-1])
-        told["largest_plastic_depth_mm"] = float(found["plastic_depth"][-1].max())
-    if states := _states(last):
-        units = {name: unit for name, (_, unit, _) in _of_states(last.system).items()}
-        told[STATES] = {
-            name.removeprefix(STATE): {"unit": units[name], **_extent(_weights(last, name), rows[-1])}
-            for name, rows in states.items()
-        }
-    if "debris_volume" not in found:
-        return told
+def states(last: Block) -> dict[str, dict[str, Any]]:
+    """Return mean, smallest and largest of the states that laws remember at the end of a run, for summary.json."""
+    units = {name: unit for name, (_, unit, _) in _of_states(last.system).items()}
     return {
-        **told,
-        "debris_volume_mm3": float(found["debris_volume"][-1]),
-        "ejected_volume_mm3": float(found["ejected_volume"][-1]),
-        "largest_debris_thickness_mm": float(found["debris_thickness"][-1].max()),
-        "debris_balance_error": float(found["debris_balance_error"][-1]),
+        name.removeprefix(STATE): {"unit": units[name], **_extent(_weights(last, name), rows[-1])}
+        for name, rows in _states(last).items()
     }
 
 

@@ -14,23 +14,31 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import ContactSetup
 from fenwear.cycle import Block
 from fenwear.cycle.state import RunState
+from fenwear.results.quantity import Variable
+from fenwear.results.scar import EDGE
 from fenwear.sliding.coating import CoatedBody, left_of
 from fenwear.sliding.wear import coefficient
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
+SHARES = {"worn_through_of_scar": "scar", "worn_through_of_surface": "surface"}
+
+
+def of_body(body: str) -> dict[str, Variable]:
+    """Return the variables of a coated body."""
+    end = BODIES[body]
+    left = f"coating of the {body} that is left at the end of the half-cycle"
+    text = "share of the {}'s coated {} in which the coating is worn through at the end of the half-cycle"
+    return {
+        f"coating{end}": (("half_cycle", f"x{end}"), "mm", left),
+        **{f"{name}{end}": (("half_cycle",), "1", text.format(body, of)) for name, of in SHARES.items()},
+        f"least_coating{end}": (("half_cycle",), "mm", f"least {left}"),
+    }
 
 
 def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of coatings."""
-    found: dict[str, Variable] = {}
-    for (body, end), thickness in zip(BODIES.items(), placed.coatings, strict=True):
-        if thickness is not None:
-            text = f"coating of the {body} that is left at the end of the half-cycle"
-            found[f"coating{end}"] = (("half_cycle", f"x{end}"), "mm", text)
-            share = f"share of the {body}'s coated surface that is worn through at the end of the half-cycle"
-            found[f"coating_worn_through{end}"] = (("half_cycle",), "1", share)
-    return found
+    coated = zip(BODIES, placed.coatings, strict=True)
+    return {name: one for body, own in coated if own is not None for name, one in of_body(body).items()}
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -39,22 +47,13 @@ def values(block: Block) -> dict[str, Array]:
     surfaces = ((pair.weights, block.wear), (pair.strip.weights, block.wear_strip))
     for end, thickness, (weights, depth) in zip(BODIES.values(), block.system.coatings, surfaces, strict=True):
         if thickness is not None:
-            coated = weights * (thickness > 0)
-            found[f"coating{end}"] = left_of(thickness, depth)
+            coated, left = weights * (thickness > 0), left_of(thickness, depth)
             through = (depth >= thickness) @ coated
-            found[f"coating_worn_through{end}"] = np.asarray(through / max(float(coated.sum()), 1e-300))
+            scar = (depth > EDGE * depth.max(axis=1, keepdims=True)) @ coated
+            found |= {f"coating{end}": left, f"least_coating{end}": left.min(axis=1)}
+            found[f"worn_through_of_scar{end}"] = np.asarray(through / np.maximum(scar, 1e-300))
+            found[f"worn_through_of_surface{end}"] = np.asarray(through / max(float(coated.sum()), 1e-300))
     return found
-
-
-def body_numbers(last: Block, body: str) -> dict[str, float]:
-    """Return the key numbers of a body at the end of a run, for its part of summary.json; none without a coating."""
-    found, end = values(last), BODIES[body]
-    if f"coating{end}" not in found:
-        return {}
-    return {
-        "coating_worn_through": float(found[f"coating_worn_through{end}"][-1]),
-        "least_coating_mm": float(found[f"coating{end}"][-1].min()),
-    }
 
 
 def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> dict[str, float]:

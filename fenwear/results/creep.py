@@ -7,28 +7,30 @@ contact nodes in the middle of a half-cycle. Its volume is the integral over the
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import Block
+from fenwear.results.quantity import Variable
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 ENDS = {"punch": "", "strip": "_strip", "layer": "_layer"}  # how the names of variables end
+
+
+def of_member(name: str) -> dict[str, Variable]:
+    """Return the variables of a body or layer that creeps."""
+    end = ENDS[name]
+    depth = f"depth that the {name} has crept at the end of the half-cycle, apart from wear"
+    volume = f"volume that the {name} has crept over the contact nodes, at the end of the half-cycle"
+    return {
+        f"creep_depth{end}": (("half_cycle", "x"), "mm", depth),
+        f"creep_volume{end}": (("half_cycle",), "mm3", volume),
+        f"largest_creep_depth{end}": (("half_cycle",), "mm", f"largest {depth}"),
+    }
 
 
 def variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of what creeps."""
-    found: dict[str, Variable] = {}
-    for member in () if system.creep is None else system.creep.members:
-        name, end = member.name, ENDS[member.name]
-        text = f"depth that the {name} has crept at the end of the half-cycle, apart from wear"
-        found[f"creep_depth{end}"] = (("half_cycle", "x"), "mm", text)
-        volume = f"volume that the {name} has crept over the contact nodes, at the end of the half-cycle"
-        found[f"creep_volume{end}"] = (("half_cycle",), "mm3", volume)
-    return found
+    members = () if system.creep is None else system.creep.members
+    return {name: one for member in members for name, one in of_member(member.name).items()}
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -40,21 +42,5 @@ def values(block: Block) -> dict[str, Array]:
     for name, depth in system.creep.depths(block.crept.T).items():
         found[f"creep_depth{ENDS[name]}"] = depth.T
         found[f"creep_volume{ENDS[name]}"] = areas @ depth
+        found[f"largest_creep_depth{ENDS[name]}"] = depth.max(axis=0)
     return found
-
-
-def body_numbers(last: Block, body: str) -> dict[str, float]:
-    """Return the key numbers of a body at the end of a run, for its part of summary.json; none where it creeps not."""
-    found = values(last)
-    if f"creep_volume{ENDS[body]}" not in found:
-        return {}
-    depth = found[f"creep_depth{ENDS[body]}"][-1]
-    return {
-        "creep_volume_mm3": float(found[f"creep_volume{ENDS[body]}"][-1]),
-        "largest_creep_depth_mm": float(np.max(depth)),
-    }
-
-
-def numbers(last: Block) -> dict[str, Any]:
-    """Return those of the layer, for summary.json."""
-    return {key.replace("creep", "layer_creep", 1): value for key, value in body_numbers(last, "layer").items()}

@@ -23,13 +23,14 @@ from fenwear.case import Case
 from fenwear.case.program import stages_of
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
-from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
+from fenwear.results import roughness, steps, table_cycle
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.netcdf import Netcdf
+from fenwear.results.quantity import Variable, computed
+from fenwear.results.registry import quantities_of
 from fenwear.results.scar import conforming
-from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, part_columns, surface_columns
+from fenwear.results.surfaces import Column, on_mesh, part_columns, surface_columns
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -43,108 +44,12 @@ INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, g
 
 Rows = dict[str, NDArray[Any]]  # of variables, by their names
 
-# name: (dimensions, units, long_name); a Block has an attribute of each name but the weights
-VARIABLES = {
-    "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
-    "time": (("half_cycle",), "s", "time at the end of the half-cycle"),
-    "direction": (
-        ("half_cycle",),
-        "1",
-        "sliding direction of the strip: 1 rightward or counterclockwise, -1 leftward or clockwise",
-    ),
-    "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
-    "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),
-    "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
-    "largest_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
-    "contact_width": (("half_cycle",), "mm", "width in contact"),
-    "worn_area_increment": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
-    "optimum_distance": (
-        ("half_cycle",),
-        "1",
-        "share of the load that is carried elsewhere than in the optimum: half the integral of their difference",
-    ),
-    "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the pressure scale"),
-    "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
-    "complementarity_error": (("half_cycle",), "1", "largest error of p >= 0, gap >= 0, p gap = 0 over their scales"),
-    "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
-    "weight": (("half_cycle", "x"), "mm", "length that each contact node stands for, on the mesh of the half-cycle"),
-}
-
-IN_BLOCK = {new: old for old, (new, *_) in RENAMED.items()}
 INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 
-# the same with heat; the names of a BlockHeat, terms of the balance by their position
-HEAT_VARIABLES = {
-    "temperature_punch": (("half_cycle", "x"), "K", "temperature of the punch's contact surface at the end"),
-    "temperature_strip": (("half_cycle", "x"), "K", "temperature of the strip's contact surface at the end"),
-    "largest_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces at the end"),
-    "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
-    "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
-}
-BULK = {"temperature_bulk": (("half_cycle",), "K", "temperature of the bulk of the strip's closed track at the end")}
-HEAT_TERMS = {
-    "friction": "heat made by friction in the half-cycle",
-    "debris": "heat carried off by debris",
-    "stored": "heat gained by both bodies",
-    "convected": "heat lost to the surroundings",
-    "held": "heat lost through boundaries of held temperature",
-    "carried": "heat that the strip's material carries out of the model",
-}
-HEAT_CROSSING = {
-    "into_punch": "heat that enters the punch across the contact in the half-cycle",
-    "into_strip": "heat that enters the strip across the contact in the half-cycle",
-}
 
-
-# the same where the strip wears
-STRIP_VARIABLES = {
-    "wear_strip": (("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle"),
-    "worn_area_increment_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
-    "weight_strip": (
-        ("half_cycle", "x_strip"),
-        "mm",
-        "length swept by the punch that each node stands for, on the mesh of the half-cycle; of a closed track that of "
-        "its meshed part",
-    ),
-}
-
-
-# the same with a program: what acted
-PROGRAM_VARIABLES = {
-    "load": (("half_cycle",), "N", "normal force on the contact, the mean of the cycle"),
-    "load_factor": (("half_cycle",), "1", "all loads over those of the case"),
-    "speed": (("half_cycle",), "mm s-1", "mean sliding speed"),
-}
-ANGULAR_SPEED = {"speed": (("half_cycle",), "rad s-1", "mean angular speed of the strip")}
-AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
-
-
-def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+def variables_of(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of a history by their names: dimensions, units, long name."""
-    case = system.case
-    variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
-    if case.program is not None:
-        turning = ANGULAR_SPEED if case.turns else {}
-        variables = {**variables, **PROGRAM_VARIABLES, **turning, **({} if case.heat is None else AMBIENT)}
-    if case.heat is not None:
-        told = {**HEAT_TERMS, **HEAT_CROSSING}
-        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in told.items()}
-        variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
-    variables = {
-        **variables,
-        **sheet.variables(system),
-        **between.variables(system),
-        **coating.variables(system),
-        **creep.variables(system),
-        **roughness.variables(system),
-        **place.variables(system),
-        **steps.variables(system),
-        **table_cycle.variables(system),
-    }
-    variables = {name: (axes, unit, case.names.told(text)) for name, (axes, unit, text) in variables.items()}
-    if case.model.kind == "plane":
-        return variables
-    return on_surfaces(variables)
+    return {name: (one.dims, one.unit, one.long_name) for name, one in quantities_of(system).items() if one.dims}
 
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
@@ -209,25 +114,8 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    rooms = (sheet, between, coating, creep, place, roughness, steps, table_cycle)
-    own = {name: value for room in rooms for name, value in room.values(block).items()}
-    return {name: own[name] if name in own else _values(block, name) for name in names}
-
-
-def _values(block: Block, name: str) -> NDArray[Any]:
-    """Return the values of a variable over a block's half-cycles."""
-    name = IN_BLOCK.get(name, name)
-    if name in ("weight", "weight_strip"):  # meshes that follow the wear change them
-        pair = block.system.pair
-        weights = pair.weights if name == "weight" else pair.strip.weights
-        return np.broadcast_to(weights, (len(block), len(weights)))
-    if name in (*VARIABLES, *STRIP_VARIABLES, *PROGRAM_VARIABLES, *AMBIENT) or block.heat is None:
-        return getattr(block, name)
-    if name == "heat_balance_error":
-        return block.heat.balance_error
-    if name in HEAT_VARIABLES or name in BULK:
-        return getattr(block.heat, name)
-    return block.heat.terms[:, (*TERMS, *CROSSING).index(name.removeprefix("heat_"))]
+    known = quantities_of(block.system)
+    return computed(block, [known[name] for name in names])
 
 
 def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:

@@ -22,7 +22,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
 from fenwear.results.forces import node_forces
-from fenwear.results.sheet import Variable
+from fenwear.results.quantity import Variable
 from fenwear.sliding.wear import WornDepths
 
 TRUE = 1e-3  # of the radius: how far the points of a round surface may be from a circle
@@ -98,7 +98,7 @@ def values(block: Block) -> dict[str, Array]:
 
 
 def numbers(last: Block, contact: str = "") -> dict[str, float]:
-    """Return the eccentricity at the end of a run, of the only contact or a named one, for summary.json; or nothing."""
+    """Return the eccentricity at the end of a run in a named contact, or the only one, for its sheet; or nothing."""
     bore = bores_of(last.system).get(contact)
     if bore is None:
         return {}

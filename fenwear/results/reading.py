@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,9 +24,15 @@ OLD_NAMES = (
     (r"^scar_(\w+?)_1_percent", r"scar_\1"),
     (r"^scar_(\w+?)_5(?!_percent)", r"scar_\1_5_percent"),
     (r"^largest_pressure_of_cycle", "largest_pressure_in_cycle"),
+    (r"^coating_worn_through", "worn_through_of_surface"),
+    (r"^layer_creep_volume", "creep_volume_layer"),
+    (r"^largest_layer_creep_depth", "largest_creep_depth_layer"),
 )
 # Names that have come to mean something else: only in files that have one of those above.
-TAKEN_NAMES = ((r"^largest_temperature", "largest_temperature_of_run"),)
+TAKEN_NAMES = (
+    (r"^largest_temperature(?!_of_run)", "largest_temperature_of_run"),
+    (r"^friction_coefficient", "mean_friction_coefficient"),
+)
 OLDER = (
     "of an older fenwear, in which worn_area and worn_volume were those of a half-cycle and not from the start; "
     "expected the results of this version: run the case anew"
@@ -49,20 +55,40 @@ def load_history(directory: Path) -> xarray.Dataset:
     return history.rename(current_names(map(str, history.variables)))
 
 
-def current_names(names: Iterable[str]) -> dict[str, str]:
-    """Return the present name of each of a file's names that has changed, by its old one."""
+def current_names(names: Iterable[str], *, old: bool = False) -> dict[str, str]:
+    """Return the present name of each of a file's names that has changed, by its old one.
+
+    Args:
+        names: In the file, or in a table of it.
+        old: Whether other names of the file show that it is an older one.
+    """
     known = [*names]
     found = {name: _replaced(name, OLD_NAMES) for name in known}
-    if any(name != new for name, new in found.items()):
+    if old or any(name != new for name, new in found.items()):
         found = {name: _replaced(name, TAKEN_NAMES) if new == name else new for name, new in found.items()}
     return {name: new for name, new in found.items() if new != name}
 
 
-def in_current_names(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of an older summary with the present names of all quantities."""
-    inner = {key: in_current_names(value) if isinstance(value, dict) else value for key, value in tables.items()}
-    new = current_names(inner)
-    return {new.get(key, key): value for key, value in inner.items()}
+def in_current_names(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an older summary with the present names of all quantities; one of today as it is."""
+    if not any(current_names(names) for names in _names(summary)):
+        return dict(summary)
+    found = _renamed(summary)
+    if "mean_pressure_MPa" in found:  # was the load over the meshed surface; now only of what touches
+        found["pressure_over_surface_MPa"] = found.pop("mean_pressure_MPa")
+    return found
+
+
+def _names(tables: Mapping[str, Any]) -> Iterator[list[str]]:
+    yield list(tables)
+    for value in tables.values():
+        if isinstance(value, Mapping):
+            yield from _names(value)
+
+
+def _renamed(tables: Mapping[str, Any]) -> dict[str, Any]:
+    new = current_names(tables, old=True)
+    return {new.get(key, key): _renamed(one) if isinstance(one, Mapping) else one for key, one in tables.items()}
 
 
 def _replaced(name: str, table: Iterable[tuple[str, str]]) -> str:
@@ -73,8 +99,9 @@ def _replaced(name: str, table: Iterable[tuple[str, str]]) -> str:
 
 def is_older(names: Iterable[Hashable]) -> bool:
     """Return whether the names of a history are those of a version in which worn volumes were of one half-cycle."""
-    worn = [str(name) for name in names if str(name).startswith(("worn_area", "worn_volume"))]
-    return bool(worn) and not any("_increment" in name for name in worn)
+    known = {str(name) for name in names}
+    stem = "worn_area" if "worn_area" in known or "worn_area_strip" in known else "worn_volume"
+    return bool(known & {stem, f"{stem}_strip"}) and not known & {f"{stem}_increment", f"{stem}_increment_strip"}
 
 
 def _unreadable(path: Path, error: Exception) -> CaseError:

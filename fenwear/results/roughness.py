@@ -14,14 +14,14 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
+from fenwear.results.quantity import Variable
 from fenwear.results.surfaces import Column
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
 ON_HULL = 1e-9  # spacings: rounding
 NAMES = {
-    "roughness_mean": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
-    "roughness_rms": ("mm", "root mean square of the same heights (Sq) of the {}"),
+    "roughness_Sa": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
+    "roughness_Sq": ("mm", "root mean square of the same heights (Sq) of the {}"),
 }
 ENDS = {"punch": "", "strip": "_strip"}
 
@@ -58,7 +58,7 @@ def of_body(body: str) -> dict[str, Variable]:
 
 def values(block: Block) -> dict[str, Array]:
     """Return them for each half-cycle of a block by name (k,)."""
-    found = {}
+    found = dict[str, Array]()
     for body in _rough(block.system):
         rows = np.array([sa_sq(worn_heights(block, body, k)) for k in range(len(block))]).reshape(-1, 2)
         found |= {f"{name}{ENDS[body]}": column for name, column in zip(NAMES, rows.T, strict=True)}
@@ -68,15 +68,6 @@ def values(block: Block) -> dict[str, Array]:
 def sa_sq(z: Array) -> tuple[float, float]:
     """Return Sa and Sq of heights over their mean (n,), in their unit."""
     return float(np.abs(z).mean()), float(np.sqrt((z**2).mean()))
-
-
-def body_numbers(last: Block, body: str) -> dict[str, float]:
-    """Return the roughness of a body at the end of a run, for its part of summary.json; none of one without."""
-    if body not in _rough(last.system):
-        return {}
-    return dict(
-        zip(("roughness_Sa_mm", "roughness_Sq_mm"), sa_sq(worn_heights(last, body, len(last) - 1)), strict=True)
-    )
 
 
 def worn_heights(block: Block, body: str, row: int) -> Array:

@@ -15,9 +15,8 @@ In the plane worn area is volume over thickness.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import reduce
-from operator import or_
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,11 +26,10 @@ from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results import coating, creep, roughness, table_cycle
+from fenwear.results.quantity import RECORD, InTable, Quantity, numbers
 from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end
 ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and width differ by a tenth at most
@@ -40,90 +38,183 @@ WEAR_RATE = "mm3/(N m)"
 UNCERTAINTY, WITHIN = "uncertainty", "... numerical uncertainty"
 COLUMN = 12  # characters of a column of the printed sheet
 
-SLIDING: dict[str, Variable] = {
-    "cycles": (("half_cycle",), "1", "cycles done"),
-    "sliding_distance": (("half_cycle",), "mm", "sliding distance from the start, mean over the load"),
-    "normal_force": (("half_cycle",), "N", "load: normal force of the contact, mean over the half-cycle"),
-    "pressure_integral": (
-        ("half_cycle",),
-        "N",
-        "integral of the pressure over the contact, mean over the half-cycle; more than the load on curved contacts",
-    ),
-    "friction_force": (
-        ("half_cycle",),
-        "N",
-        "friction force: resultant of friction, mean over what is slid in the half-cycle",
-    ),
-    "friction_work": (("half_cycle",), "mJ", "work of friction from the start"),
-    "dissipated_energy": (("half_cycle", "x"), "mJ/mm2", "work of friction per area from the start"),
-    "pressure_sum": (
-        ("half_cycle", "x"),
-        "MPa",
-        "pressure added up over the half-cycles from the start: over their number the difference of two is the mean",
-    ),
-}
-TURNING: dict[str, Variable] = {
-    "friction_torque": (("half_cycle",), "N mm", "torque of friction about the axis, mean over the half-cycle"),
-}
-OF_A_BODY: dict[str, Variable] = {
-    "worn_area": (("half_cycle",), "mm2", "cross-section worn off the {body} from the start"),
-    "worn_volume": (("half_cycle",), "mm3", "volume worn off the {body} from the start"),
-    "worn_mass": (("half_cycle",), "mg", "mass worn off the {body} from the start"),
-    "wear_rate": (
-        ("half_cycle",),
-        WEAR_RATE,
-        "specific wear rate of the {body} in the half-cycle, over load and sliding distance",
-    ),
-    "mean_wear_rate": (
-        ("half_cycle",),
-        WEAR_RATE,
-        "specific wear rate of the {body} from the start, over load and sliding distance",
-    ),
-    "law_wear_rate": (
-        ("half_cycle",),
-        WEAR_RATE,
-        "specific wear rate of the {body} in the half-cycle, over the sliding of the pressure: that of the law",
-    ),
-    "mean_law_wear_rate": (
-        ("half_cycle",),
-        WEAR_RATE,
-        "specific wear rate of the {body} from the start, over the sliding of the pressure: that of the law",
-    ),
-    "largest_depth": (("half_cycle",), "mm", "largest worn depth of the {body} at the end of the half-cycle"),
-}
+
+def _over(above: Array, below: Array, otherwise: Array | float = np.nan) -> Array:
+    """Return the quotient, or another value where nothing slides or presses."""
+    return np.where(below > 0, above, otherwise) / np.where(below > 0, below, 1.0)
 
 
-def variables(placed: ContactSetup) -> dict[str, Variable]:
-    """Return the variables of the sheet: of the bodies that wear, masses where a density is known."""
-    found, plane = {**SLIDING, **(TURNING if turns(placed) else {})}, _is_plane(placed)
-    surfaces = (placed.pair.punch, placed.pair.strip)
-    for (body, end), surface, law, density in zip(
-        BODIES.items(), surfaces, placed.sliding.wear, placed.bodies.densities, strict=True
-    ):
-        if law is None:
-            continue
-        missing = {"worn_area": not plane, "worn_mass": density is None}
-        own = {name: variable for name, variable in OF_A_BODY.items() if not missing.get(name)}
-        geometry = scar_geometry(placed, surface)
-        own |= of_the_scar(tuple(places(placed, surface, geometry)), geometry.names)
-        found |= {f"{name}{end}": (over, unit, text.format(body=body)) for name, (over, unit, text) in own.items()}
-    return found
+def _integral(records: Any) -> Array:
+    """Return the integral of the pressure over the contact (k,), N."""
+    pair, thickness = records.system.pair, records.system.bodies.punch.thickness
+    return np.asarray(thickness * (records.pressure * pair.weights).sum(axis=1))
 
 
-def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, Variable]:
-    """Return the variables of a scar: where it is deepest, and its extents by their names."""
-    found: dict[str, Variable] = {
-        f"largest_depth_at_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {place}")
-        for axis, place in PLACES.items()
-        if axis in along
+def _contact_area(records: Any) -> Array:
+    """Return the area in contact (k,), mm²."""
+    return np.asarray(records.contact_width * records.system.bodies.punch.thickness)
+
+
+def _angles(records: Any) -> Array:
+    """Return the angle of each half-cycle (k,), rad."""
+    motion = records.system.motion
+    each = np.array([phase.distance for phase in motion.phases]).reshape(motion.half_cycles, -1).sum(axis=1)
+    return np.asarray(each[(records.half_cycle - 1) % motion.half_cycles])
+
+
+CONTACT = (
+    Quantity("largest_pressure", RECORD, "MPa", "largest contact pressure", lambda b: b.pressure.max(axis=1),
+             "largest", steady=True, nodal=True),
+    Quantity("contact_area", RECORD, "mm2", "area in contact", _contact_area, "largest", steady=True, nodal=True),
+    Quantity("mean_pressure", RECORD, "MPa", "mean contact pressure over the area in contact",
+             lambda b: _over(_integral(b), _contact_area(b), 0.0), "largest", steady=True, nodal=True),
+)  # fmt: skip
+SLIDING = (
+    Quantity("cycles", RECORD, "1", "cycles done", lambda b: b.half_cycle / b.system.motion.half_cycles, of="sliding"),
+    Quantity("sliding_distance", RECORD, "mm", "sliding distance from the start, mean over the load",
+             lambda b: b.totals.of("distance"), of="sliding"),
+    Quantity("normal_force", RECORD, "N", "load: normal force of the contact, mean over the half-cycle",
+             lambda b: _over(b.adds.of("load_distance"), b.adds.of("distance"), b.load),  # at rest: what rests
+             "mean", steady=True, of="sliding"),
+    Quantity("pressure_integral", RECORD, "N", "integral of the pressure over the contact, mean over the half-cycle; "
+             "more than the load on curved contacts", _integral, "mean", steady=True, nodal=True, of="sliding"),
+    Quantity("friction_force", RECORD, "N",
+             "friction force: resultant of friction, mean over what is slid in the half-cycle",
+             lambda b: _over(b.adds.of("drag_distance"), b.adds.of("distance"), 0.0), "mean", steady=True,
+             of="sliding"),
+    Quantity("friction_coefficient", RECORD, "1", "friction coefficient: mean over the sliding of the pressure",
+             lambda b: _over(b.adds.of("work"), b.adds.of("load_path"), 0.0), "mean", steady=True,
+             of="sliding"),
+    Quantity("friction_work", RECORD, "mJ", "work of friction from the start", lambda b: b.totals.of("work"),
+             of="sliding"),
+    Quantity("mean_friction_coefficient", RECORD, "1", "friction coefficient from the start: mean over the sliding of "
+             "the pressure", lambda b: _over(b.totals.of("work"), b.totals.of("load_path")), of="sliding"),
+    Quantity("friction_over_load", RECORD, "1", "work of friction from the start over load and sliding distance",
+             lambda b: _over(b.totals.of("work"), b.totals.of("load_distance")), of="sliding"),
+    Quantity("largest_energy", RECORD, "mJ/mm2", "largest work of friction per area from the start",
+             lambda b: b.totals.energy.max(axis=1), nodal=True, of="sliding"),
+    Quantity("dissipated_energy", ("half_cycle", "x"), "mJ/mm2", "work of friction per area from the start",
+             lambda b: b.totals.energy, nodal=True),
+    Quantity("pressure_sum", ("half_cycle", "x"), "MPa", "pressure added up over the half-cycles from the start: over "
+             "their number the difference of two is the mean", lambda b: b.totals.pressure, nodal=True),
+)  # fmt: skip
+TURNING = (
+    Quantity("friction_torque", RECORD, "N mm", "torque of friction about the axis, mean over the half-cycle",
+             lambda b: _over(b.adds.of("work"), _angles(b), 0.0), "mean", steady=True, of="sliding"),
+)  # fmt: skip
+
+
+def of_a_body(body: str) -> tuple[Quantity, ...]:
+    """Return the quantities of the wear of a body."""
+    end, volume, mass = BODIES[body], f"volume_{body}", f"mass_{body}"
+
+    def rate(which: str, path: str) -> Callable[[Any], Array]:
+        return lambda b: 1e3 * _over(getattr(b, which).of(volume), getattr(b, which).of(path))
+
+    rates = (
+        ("wear_rate", f"specific wear rate of the {body} in the half-cycle, over load and sliding distance", "adds",
+         "load_distance"),
+        ("mean_wear_rate", f"specific wear rate of the {body} from the start, over load and sliding distance", "totals",
+         "load_distance"),
+        ("law_wear_rate", f"specific wear rate of the {body} in the half-cycle, over the sliding of the pressure: that "
+         "of the law", "adds", "load_path"),
+        ("mean_law_wear_rate", f"specific wear rate of the {body} from the start, over the sliding of the pressure: "
+         "that of the law", "totals", "load_path"),
+    )  # fmt: skip
+    return (
+        Quantity(f"worn_volume{end}", RECORD, "mm3", f"volume worn off the {body} from the start",
+                 lambda b: b.totals.of(volume), nodal=True, of=body),
+        Quantity(f"worn_volume_increment{end}", RECORD, "mm3", f"volume worn off the {body} in the half-cycle",
+                 lambda b: b.adds.of(volume), "sum", steady=True, nodal=True),
+        Quantity(f"worn_mass{end}", RECORD, "mg", f"mass worn off the {body} from the start",
+                 lambda b: b.totals.of(mass), of=body),
+        *(
+            Quantity(f"{name}{end}", RECORD, WEAR_RATE, text, rate(which, path), of=body)
+            for name, text, which, path in rates
+        ),
+        Quantity(f"largest_depth{end}", RECORD, "mm", f"largest worn depth of the {body} at the end of the half-cycle",
+                 lambda b: _depth(b, body).max(axis=1), nodal=True, of=body),
+    )  # fmt: skip
+
+
+def of_a_plane_body(body: str) -> tuple[Quantity, ...]:
+    """Return what the wear of a body comes to in a cross-section."""
+
+    def over_thickness(which: str) -> Callable[[Any], Array]:
+        return lambda b: getattr(b, which).of(f"volume_{body}") / b.system.bodies.punch.thickness
+
+    end = BODIES[body]
+    return (
+        Quantity(f"worn_area{end}", RECORD, "mm2", f"cross-section worn off the {body} from the start",
+                 over_thickness("totals"), nodal=True, of=body),
+        Quantity(f"worn_area_increment{end}", RECORD, "mm2", f"cross-section worn off the {body} in the half-cycle",
+                 over_thickness("adds"), "sum", steady=True, nodal=True),
+    )  # fmt: skip
+
+
+def of_the_scar(body: str, along: Iterable[str], extents: Iterable[str]) -> tuple[Quantity, ...]:
+    """Return where the scar of a body is deepest, and its extents by their names."""
+    end, scar = BODIES[body], SCARS[body]
+    texts = {"length": "along the sliding", "width": "along the contact" if tuple(along) == ("x",) else
+             "across the sliding"}  # fmt: skip
+    return (
+        *(
+            Quantity(f"largest_depth_at_{axis}{end}", RECORD, "mm", f"where the worn depth of the {body} is largest, "
+                     f"{PLACES[axis]}", InTable(scar, f"largest_depth_at_{axis}"), nodal=True,
+                     of=body)
+            for axis in along
+        ),
+        *(
+            Quantity(f"scar_{name}{share}{end}", RECORD, "mm", f"{name} of the {body}'s scar {texts[name]} at "
+                     f"{100 * SHARES[share]:g} % of its largest depth", InTable(scar, f"scar_{name}{share}"),
+                     nodal=True, of=body)
+            for name in extents
+            for share in SHARES
+        ),
+    )  # fmt: skip
+
+
+def _depth(records: Any, body: str) -> Array:
+    """Return the worn depth of a body (k, n), mm."""
+    return np.asarray(getattr(records, f"wear{BODIES[body]}"))
+
+
+def _scar(records: Any, body: str) -> dict[str, Array]:
+    """Return where the scars of a body are deepest, and how far they reach (k,), mm."""
+    system = records.system
+    surface, depth = getattr(system.pair, body), _depth(records, body)
+    geometry, deepest = scar_geometry(system, surface), depth.argmax(axis=1)
+    return {
+        **{f"largest_depth_at_{axis}": x[deepest] for axis, x in places(system, surface, geometry).items()},
+        **{
+            f"scar_{name}{end}": extent
+            for end, share in SHARES.items()
+            for name, extent in geometry.extents(depth, share).items()
+        },
     }
-    way = "along the contact" if along == ("x",) else "across the sliding"
-    texts = {"length": "along the sliding", "width": way}
-    for name in extents:
-        for end, share in SHARES.items():
-            text = f"{name} of the {{body}}'s scar {texts[name]} at {100 * share:g} % of its largest depth"
-            found[f"scar_{name}{end}"] = (("half_cycle",), "mm", text)
-    return found
+
+
+SCARS: Mapping[str, Callable[[Any], Mapping[str, Array]]] = {body: partial(_scar, body=body) for body in BODIES}
+
+
+def quantities(placed: ContactSetup) -> list[Quantity]:
+    """Return the quantities of the sheet: of the bodies that wear, masses where a density is known."""
+    found = [*SLIDING, *(TURNING if turns(placed) else ())]
+    return [*found, *(one for body in BODIES for one in of_body(placed, body))]
+
+
+def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
+    """Return the quantities of a body that wears; none of another."""
+    number = list(BODIES).index(body)
+    if placed.sliding.wear[number] is None:
+        return []
+    geometry = scar_geometry(placed, surface := getattr(placed.pair, body))
+    weighed = placed.bodies.densities[number] is not None
+    return [
+        *(of_a_plane_body(body) if _is_plane(placed) else ()),
+        *(one for one in of_a_body(body) if weighed or "mass" not in one.name),
+        *of_the_scar(body, places(placed, surface, geometry), geometry.names),
+    ]
 
 
 def places(placed: ContactSetup, surface: ContactSurface, geometry: ScarGeometry) -> dict[str, Array]:
@@ -148,62 +239,9 @@ def _is_plane(placed: ContactSetup) -> bool:
     return placed.bodies.punch.law.kind in ("stress", "strain")
 
 
-def values(block: Block) -> dict[str, Array]:
-    """Return the sheet of each half-cycle of a block by name: (k,), and (k, n) along the contact."""
-    system, totals, adds = block.system, block.totals, block.adds
-    thickness = system.bodies.punch.thickness
-    found = {
-        "cycles": block.half_cycle / system.motion.half_cycles,
-        "sliding_distance": totals.of("distance"),
-        "normal_force": _over(adds.of("load_distance"), adds.of("distance"), block.load),  # at rest: what rests
-        "pressure_integral": thickness * (block.pressure * system.pair.weights).sum(axis=1),
-        "friction_force": _over(adds.of("drag_distance"), adds.of("distance"), np.zeros(len(block))),
-        **({"friction_torque": _over(adds.of("work"), _angles(block), np.zeros(len(block)))} if turns(system) else {}),
-        "friction_work": totals.of("work"),
-        "dissipated_energy": totals.energy,
-        "pressure_sum": totals.pressure,
-    }
-    depths = ((system.pair.punch, block.wear), (system.pair.strip, block.wear_strip))
-    for (body, end), law, (surface, depth) in zip(BODIES.items(), system.sliding.wear, depths, strict=True):
-        if law is None:
-            continue
-        volume = totals.of(f"volume_{body}")
-        deepest, geometry = depth.argmax(axis=1), scar_geometry(system, surface)
-        own = {
-            "worn_area": volume / thickness,
-            "worn_volume": volume,
-            "worn_mass": totals.of(f"mass_{body}"),
-            "wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_distance")),
-            "mean_wear_rate": 1e3 * _over(volume, totals.of("load_distance")),
-            "law_wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
-            "mean_law_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
-            "largest_depth": depth.max(axis=1),
-            **{f"largest_depth_at_{axis}": x[deepest] for axis, x in places(system, surface, geometry).items()},
-            **{
-                f"scar_{name}{at}": extent
-                for at, share in SHARES.items()
-                for name, extent in geometry.extents(depth, share).items()
-            },
-        }
-        found |= {f"{name}{end}": value for name, value in own.items()}
-    return found
-
-
 def turns(placed: ContactSetup) -> bool:
     """Return whether the strip turns, so that friction has a torque."""
     return any(placed.sliding.field.turn) and not placed.motion.steps
-
-
-def _angles(block: Block) -> Array:
-    """Return the angle of each half-cycle (k,), rad."""
-    motion = block.system.motion
-    each = np.array([phase.distance for phase in motion.phases]).reshape(motion.half_cycles, -1).sum(axis=1)
-    return np.asarray(each[(block.half_cycle - 1) % motion.half_cycles])
-
-
-def _over(above: Array, below: Array, otherwise: Array | float = np.nan) -> Array:
-    """Return the quotient, or another value where nothing slides or presses."""
-    return np.where(below > 0, above, otherwise) / np.where(below > 0, below, 1.0)
 
 
 class Line(NamedTuple):
@@ -228,7 +266,8 @@ LINES = {
     "pressure_integral_N": Line("integral of the pressure", "N"),
     "friction_force_N": Line("friction force", "N"),
     "friction_torque_N_mm": Line("friction torque", "N m", 1e-3),
-    "friction_coefficient": Line("friction coefficient, mean", ""),
+    "mean_friction_coefficient": Line("friction coefficient, mean", ""),
+    "friction_coefficient": Line("... in the last half-cycle", ""),
     "friction_over_load": Line("work of friction over load and distance", ""),
     "friction_work_mJ": Line("work of friction", "J", 1e-3),
     "eccentricity_mm": Line("eccentricity of the shaft in the bore", "µm", 1e3),
@@ -250,7 +289,6 @@ LINES = {
     "heat_mJ.into_strip": Line("... into the strip", "J", 1e-3),
     "largest_force_N": Line("largest tangential force in the last cycle", "N"),
     "largest_torque_N_mm": Line("largest torque in the last cycle", "N m", 1e-3),
-    "largest_pressure_in_cycle_MPa": Line("largest pressure in it", "MPa"),
     "largest_traction_MPa": Line("largest tangential traction in it", "MPa"),
     "largest_stick_traction_MPa": Line("... where it sticks", "MPa"),
     "largest_surface_stress_MPa": Line("largest stress along the sliding in the strip's surface", "MPa"),
@@ -271,6 +309,8 @@ LINES = {
             ("last_through_half_cycle", "... last so far in half-cycle", ""),
         )
     },
+    "nominal_pressure_MPa": Line("nominal pressure: load over the projected area", "MPa"),
+    "largest_pressure_in_cycle_MPa": Line("largest pressure at any time of the last cycle", "MPa"),
     "shakedown_limit_MPa": Line("shakedown limit of the largest pressure", "MPa"),
     "plastic_volume_mm3": Line("plastic volume, apart from wear", "mm³"),
     "largest_plastic_depth_mm": Line("... depth, largest", "µm", 1e3),
@@ -290,14 +330,15 @@ LINES = {
     "depth_per_million_cycles_mm": Line("largest depth per million cycles, last", "µm", 1e3),
     "mean_cross_shear": Line("cross-shear ratio, mean over the work of friction", ""),
     "largest_cross_shear": Line("... largest", ""),
-    "coating_worn_through": Line("coating worn through, share of it", "%", 100),
+    "worn_through_of_scar": Line("coating worn through, share of the scar", "%", 100),
+    "worn_through_of_surface": Line("... of the coated surface", "%", 100),
     "least_coating_mm": Line("... least that is left", "µm", 1e3),
     "creep_volume_mm3": Line("crept volume, apart from wear", "mm³"),
     "largest_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
     "roughness_Sa_mm": Line("roughness Sa where it has worn, without its form", "µm", 1e3),
     "roughness_Sq_mm": Line("... Sq", "µm", 1e3),
-    "layer_creep_volume_mm3": Line("crept volume of the layer", "mm³"),
-    "largest_layer_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
+    "creep_volume_layer_mm3": Line("crept volume of the layer", "mm³"),
+    "largest_creep_depth_layer_mm": Line("... depth, largest", "µm", 1e3),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
     **{f"largest_depth_at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
     **{
@@ -310,55 +351,19 @@ OF_CONTACT = {
     "largest_pressure_MPa": Line("largest pressure", "MPa"),
     **{f"largest_pressure_at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
     "pressure_beside_largest_MPa": Line("mean of the nodes beside it", "MPa"),
+    "mean_pressure_MPa": Line("mean pressure over the area in contact", "MPa"),
     "contact_width_mm": Line("width in contact", "mm"),
     "contact_area_mm2": Line("area in contact", "mm²"),
     "nodes_across_contact": Line("nodes across the contact", ""),
     "nodes_along_sliding": Line("nodes across it, along the sliding", ""),
     "nodes_across_sliding": Line("... across the sliding", ""),
 }
-OF_SUMMARY = {
-    "worn_area_mm2": "worn_area",
-    "worn_volume_mm3": "worn_volume",
-    "worn_mass_mg": "worn_mass",
-    "mean_wear_rate_mm3_per_N_m": "mean_wear_rate",
-    "wear_rate_mm3_per_N_m": "wear_rate",
-    "mean_law_wear_rate_mm3_per_N_m": "mean_law_wear_rate",
-    "law_wear_rate_mm3_per_N_m": "law_wear_rate",
-    "largest_depth_mm": "largest_depth",
-    **{f"largest_depth_at_{axis}_mm": f"largest_depth_at_{axis}" for axis in PLACES},
-    **{f"scar_{name}{end}_mm": f"scar_{name}{end}" for name in ("length", "width") for end in SHARES},
-}
 
 
-def sheet(last: Block) -> dict[str, Any]:
-    """Return the sheet at the end of a run, for summary.json: of the sliding, and of each body that wears."""
-    known, row = variables(last.system), {name: value[-1] for name, value in values(last).items()}
-    path, carried = (float(last.totals.of(name)[-1]) or np.nan for name in ("load_path", "load_distance"))
-    found: dict[str, Any] = {
-        "sliding": {
-            "half_cycles": int(last.half_cycle[-1]),
-            "cycles": float(row["cycles"]),
-            "time_s": float(last.time[-1]),
-            "sliding_distance_mm": float(row["sliding_distance"]),
-            "normal_force_N": float(row["normal_force"]),
-            "pressure_integral_N": float(row["pressure_integral"]),
-            "friction_force_N": float(row["friction_force"]),
-            **({"friction_torque_N_mm": float(row["friction_torque"])} if turns(last.system) else {}),
-            "friction_coefficient": float(row["friction_work"]) / path,
-            "friction_over_load": float(row["friction_work"]) / carried,
-            "friction_work_mJ": float(row["friction_work"]),
-            "largest_energy_mJ_per_mm2": float(row["dissipated_energy"].max()),
-            **table_cycle.sliding_numbers(last),
-        }
-    }
-    for body, end in BODIES.items():
-        own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
-        if own:
-            own |= _diameters(own) | table_cycle.body_numbers(last, body)
-        rooms = (creep, coating, roughness)
-        if own := reduce(or_, (room.body_numbers(last, body) for room in rooms), own):
-            found[body] = own
-    return found
+def body_numbers(records: Block, body: str, known: Iterable[Quantity]) -> dict[str, float]:
+    """Return what is worn off a body at the end of a run, and what else is of it; none of a body that stays."""
+    own = numbers(records, body, known)
+    return own | _diameters(own)
 
 
 def _diameters(own: Mapping[str, float]) -> dict[str, float]:

@@ -19,7 +19,8 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.cycle.block import BlockHeat
 from fenwear.interface import ContactPair
-from fenwear.results.surfaces import Column, Variable
+from fenwear.results.quantity import Variable
+from fenwear.results.surfaces import Column
 from fenwear.stick.edge import beside, stick_edges, zone_width
 from fenwear.stick.strain import along_sliding, directions
 
@@ -209,33 +210,42 @@ def surface_stress(case: Case, records: TimeStepRecords) -> Array:
     return young / (1 - nu**2) * both - nu / (1 - nu) * records.pressure
 
 
+OF_CYCLE = {
+    "largest_force": ("N", "largest tangential force in the cycle"),
+    "largest_torque": ("N mm", "largest torque in the cycle"),
+    "largest_traction": ("MPa", "largest tangential traction in the cycle"),
+    "largest_stick_traction": ("MPa", "largest tangential traction in the cycle where it sticks"),
+    "largest_surface_stress": ("MPa", "largest stress along the sliding in the strip's surface in the cycle"),
+    "friction_work_of_cycle": ("mJ", "work of friction in the cycle"),
+    "steps_per_half_cycle": ("1", "time steps of a half-cycle, mean over the cycle"),
+}
+
+
 @of_time_steps
-def numbers(last: Block) -> dict[str, Any]:
-    """Return the key numbers of the time steps of the last cycle of a run; none of a law without them."""
+def of_cycle(last: Block) -> dict[str, float]:
+    """Return the numbers of the time steps of the last cycle, by `OF_CYCLE`; none of a law without them."""
     system = last.system
     found = values(last)
     cycle = slice(-system.motion.half_cycles, None)
-    solid = system.pair.punch.dim == 3
     traction = np.abs(found["traction"][cycle])
-    if solid:
+    if system.pair.punch.dim == 3:
         traction = np.hypot(traction, found["traction_across"][cycle])
     stuck = traction[found["stick"][cycle] == 1]
-    size = "stick_area" if solid else "stick_width"
-    unit = "mm2" if solid else "mm"
     force = np.nanmax(np.abs(found["tangential_force"][cycle]))
-    turning = any(system.sliding.field.turn)
     return {
-        "largest_torque_N_mm" if turning else "largest_force_N": float(force),
-        "largest_pressure_in_cycle_MPa": float(np.nanmax(found["step_pressure"][cycle])),
-        "largest_traction_MPa": float(np.nanmax(traction)),
-        "largest_stick_traction_MPa": float(stuck.max(initial=0.0)),
-        "largest_surface_stress_MPa": float(np.nanmax(found["surface_stress"][cycle])),
-        "friction_work_of_cycle_mJ": float(found["friction_work_increment"][cycle].sum()),
-        "energy_ratio": float(found["energy_ratio"][cycle].mean()),
-        f"{size}_{unit}": float(found[size][-1]),
-        f"{size}_within_{unit}": float(found[f"{size}_within"][-1]),
+        "largest_torque" if any(system.sliding.field.turn) else "largest_force": float(force),
+        "largest_traction": float(np.nanmax(traction)),
+        "largest_stick_traction": float(stuck.max(initial=0.0)),
+        "largest_surface_stress": float(np.nanmax(found["surface_stress"][cycle])),
+        "friction_work_of_cycle": float(found["friction_work_increment"][cycle].sum()),
         "steps_per_half_cycle": len(system.law_state.problem.program.steps) / system.motion.half_cycles,
     }
+
+
+def names_of_cycle(system: Tribosystem) -> list[str]:
+    """Return the names of what `of_cycle` tells of a system."""
+    other = "largest_force" if any(system.sliding.field.turn) else "largest_torque"
+    return [name for name in OF_CYCLE if name != other] if system.sticks else []
 
 
 @of_time_steps

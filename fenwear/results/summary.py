@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.cycle import Block
+from fenwear.cycle.totals import approach
 from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.results import between, creep, place, sheet, steps
+from fenwear.results import between, place, sheet, table_cycle
 from fenwear.results.contacts import CONTACTS, contact_sheets
 from fenwear.results.degrees import degrees_of
+from fenwear.results.quantity import numbers
+from fenwear.results.registry import quantities_of
 from fenwear.results.scar import conforming
 from fenwear.results.shakedown import shakedown_limit
+from fenwear.results.surfaces import at_places
 from fenwear.results.zone import ContactNet, contact_net, without_noise
 from fenwear.versions import versions
 
@@ -30,19 +34,14 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         extremes: What was largest over all half-cycles: errors, and the temperature in K; and numbers of the run.
         run: How the run went: stop, times, warnings.
     """
-    plane = system.case.model.kind == "plane"
     return {
         "title": system.case.title,
         **({"names": system.names.by_roles} if system.names.given else {}),
         "half_cycles": int(last.half_cycle[-1]),
         **run,
-        **sheet.sheet(last),
-        **place.numbers(last),
-        **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
-        **between.numbers(last),
-        **creep.numbers(last),
+        **sheet_of(last),
+        **_contact_summary(system, last),
         **({} if (limit := shakedown_limit(system)) is None else {"shakedown_limit_MPa": limit[0]}),
-        **steps.numbers(last),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         **({CONTACTS: contacts} if (contacts := contact_sheets(last)) else {}),
         "periodicity": float(last.periodicity[-1]),
@@ -52,6 +51,17 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "ranks": system.comm.size,
         "versions": versions(),
     }
+
+
+def sheet_of(last: Block) -> dict[str, Any]:
+    """Return what the registry has for the tables of a summary, and for its top."""
+    known = list(quantities_of(last.system).values())
+    sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
+    sliding |= {**numbers(last, "sliding", known), **table_cycle.sliding_numbers(last)}
+    bodies = {body: sheet.body_numbers(last, body, known) for body in sheet.BODIES}
+    bodies = {body: own | table_cycle.body_numbers(last, body) for body, own in bodies.items() if own}
+    states = {between.STATES: found} if (found := between.states(last)) else {}
+    return {"sliding": sliding, **bodies, **states, **numbers(last, "end", known)}
 
 
 def net_of(placed: ContactSetup) -> ContactNet:
@@ -66,61 +76,52 @@ def _places(system: Tribosystem) -> NDArray[np.float64]:
     return without_noise(places, float(np.ptp(x)))
 
 
-def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    pair, places, phases = system.pair, _places(system), system.motion.half_cycles
-    net = net_of(system)
-    return {
-        "mean_pressure_MPa": system.rigid.mean_pressure,
-        "x_mm": places.tolist(),
-        "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **{
-            system.direction_words[int(d)]: {
-                "half_cycle": int(last.half_cycle[-phases:][i]),
-                "largest_pressure_MPa": float(last.largest_pressure[-phases:][i]),
-                "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
-                **net.numbers(last.pressure[-phases:][i]),
-                "contact_width_mm": float(last.contact_width[-phases:][i]),
-            }
-            for i, d in enumerate(last.direction[-phases:])
-        },
-    }
+def _at(system: Tribosystem, values: NDArray[np.float64]) -> list[float | None]:
+    """Return nodal values at the three places; None in a gap between parts of the contact."""
+    found = at_places(system.pair.punch, values, _places(system))
+    return [None if np.isnan(one) else float(one) for one in found]
 
 
-def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    """Return the key numbers of solids and rings: their scars, and the contact of the last cycle.
+def nominal_pressure(placed: ContactSetup, load: float) -> float | None:
+    """Return a load (N) over the contact's area as the load sees it, MPa; None where that is no pressure.
 
-    The mean pressure is that over what is in contact; over the nominal contact only where the surfaces lie on each
-    other before they wear.
+    So of surfaces that lie on each other before they wear, and of a shaft in a bore: F / (D L).
     """
-    pair, phases, net = system.pair, system.motion.half_cycles, net_of(system)
-    mean = {"mean_pressure_MPa": system.rigid.mean_pressure} if conforming(pair) else {}
-    cycle = slice(-phases, None)
-    rows = zip(
-        last.direction[cycle], last.half_cycle[cycle], last.pressure[cycle], last.contact_width[cycle], strict=True
-    )
-    return {
-        **mean,
-        **{
-            system.direction_words[int(d)]: {
-                "half_cycle": int(number),
-                "largest_pressure_MPa": float(pressure.max()),
-                "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),
-                **net.numbers(np.asarray(pressure)),
-                "contact_area_mm2": float(area),
-            }
-            for d, number, pressure, area in rows
-        },
-    }
+    if not (conforming(placed.pair) or place.bores_of(placed)):
+        return None
+    seen = np.maximum(np.einsum("id,id->i", placed.pair.normal, approach(placed.rigid)), 0.0)
+    area = placed.bodies.punch.thickness * float(placed.pair.weights @ seen)
+    return load / area if area > 0 else None
+
+
+def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    """Return the contact of each half-cycle of the last cycle; in the plane with depths and pressures at three places.
+
+    Pressures over what is in contact; over the nominal contact only where the surfaces lie on each other.
+    """
+    net, cycle = net_of(system), slice(-system.motion.half_cycles, None)
+    known, nominal = quantities_of(system), nominal_pressure(system, float(last.load[-1]))
+    sizes = [name for name in ("contact_width", "contact_area") if name in known]
+    wanted = [known[name] for name in ("half_cycle", "direction", "largest_pressure", "mean_pressure", *sizes)]
+    rows = {one.key: np.asarray(one.compute(last))[cycle] for one in wanted}
+    plane = system.case.model.kind == "plane"
+    found: dict[str, Any] = {} if nominal is None else {"nominal_pressure_MPa": nominal}
+    if plane:
+        found |= {"x_mm": _places(system).tolist(), "wear_mm": _at(system, last.wear[-1])}
+    for k, pressure in enumerate(map(np.asarray, last.pressure[cycle])):
+        at = {"pressure_MPa": _at(system, pressure)} if plane else {}
+        numbers = {key: row[k].item() for key, row in rows.items() if key != "direction"}
+        found[system.direction_words[int(rows["direction"][k])]] = {**numbers, **at, **net.numbers(pressure)}
+    return found
 
 
 def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str, Any]:
     assert last.heat is not None
     heat, along, degrees = last.heat, {}, degrees_of(system.case)
     if system.case.model.kind == "plane":
-        places, interpolate = _places(system), system.pair.interpolate
+        sides = {"punch": heat.temperature_punch, "strip": heat.temperature_strip}
         along = {
-            f"temperature_punch_{degrees.unit}": degrees.of(interpolate(heat.temperature_punch[-1], places)).tolist(),
-            f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
+            f"temperature_{body}_{degrees.unit}": _at(system, degrees.of(side[-1])) for body, side in sides.items()
         }
     return {
         f"largest_temperature_{degrees.unit}": float(heat.largest_temperature[-1]) - degrees.zero,

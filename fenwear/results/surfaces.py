@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.subcells import linear_cells
@@ -18,7 +19,9 @@ from fenwear.interface import ContactPair
 from fenwear.sliding.chart import SlidingChart, sliding_chart
 from fenwear.sliding.field import SlidingField
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
+SEAM = 3.0  # chords of an element, along a curve: farther apart its ends lie on both sides of a closed curve's seam
+UPRIGHT = 1e-6  # of the squares of a facet's sides: seen from above it is a line
+ON_FACET = 1e-9  # of a facet: rounding
 
 
 class Column(NamedTuple):
@@ -35,36 +38,6 @@ class Column(NamedTuple):
     attributes: dict[str, Any]
 
 
-# name in a plane model: name and meaning in a solid
-RENAMED = {
-    "contact_width": ("contact_area", "mm2", "area in contact"),
-    "worn_area_increment": ("worn_volume_increment", "mm3", "volume worn off the punch in the half-cycle"),
-    "worn_area_increment_strip": ("worn_volume_increment_strip", "mm3", "volume worn off the strip in the half-cycle"),
-    "weight": ("weight", "mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
-    "weight_strip": (
-        "weight_strip",
-        "mm2",
-        "swept area that each node stands for, on the mesh of the half-cycle",
-    ),
-    "direction": (
-        "direction",
-        "1",
-        "sliding direction of the strip: 1 forward or counterclockwise, -1 backward or clockwise",
-    ),
-}
-DIMENSIONS = {"x": "node", "x_strip": "node_strip"}
-
-
-def on_surfaces(variables: dict[str, Variable]) -> dict[str, Variable]:
-    """Return the variables of plane models as those of solids and rings have them."""
-    found: dict[str, Variable] = {}
-    for name, (dimensions, units, text) in variables.items():
-        over = tuple(DIMENSIONS.get(d, d) for d in dimensions)
-        new, unit, meaning = RENAMED.get(name, (name, units, text))
-        found[new] = (over, unit, meaning)
-    return found
-
-
 def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     """Return the pressure nodes around each linear facet (f, 2, 3 or 4)."""
     number = np.full(len(surface.trace), -1)
@@ -74,6 +47,53 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     cells = number[surface.facets[:, linear_cells(surface.cell, surface.degree)]]
     cells = cells.reshape(-1, cells.shape[-1])
     return cells[(cells >= 0).all(axis=1)]
+
+
+def at_places(surface: ContactSurface, values: Array, places: Array, own: Mask | None = None) -> Array:
+    """Return nodal values at places on a surface (k,), linear on each of its facets; NaN beside it.
+
+    Args:
+        surface: The contact surface of a body.
+        values: At its pressure nodes (n,).
+        places: Abscissae along a curve (k,), mm; in a solid x and y (k, 2). Where several facets lie one above the
+            other, the largest value counts.
+        own: Nodes whose facets count (n,).
+    """
+    cells = surface_cells(surface)
+    cells = cells if own is None else cells[own[cells].all(axis=1)]
+    if surface.dim == 2:
+        begin, end = surface.abscissa[cells].T
+        chord = np.linalg.norm(surface.x[cells[:, 1]] - surface.x[cells[:, 0]], axis=1)
+        seam = np.abs(end - begin) > SEAM * chord  # of a closed curve
+        begin, end = np.where(seam, np.maximum(begin, end), begin), np.where(seam, np.maximum(begin, end) + chord, end)
+        cells = np.where((seam & (surface.abscissa[cells[:, 0]] < begin))[:, None], cells[:, ::-1], cells)
+        share = (places.reshape(-1, 1) - begin) / (end - begin)
+        shares = np.stack([1 - share, share], axis=-1)
+    else:
+        cells = np.concatenate([cells[:, [0, k, k + 1]] for k in range(1, cells.shape[1] - 1)])
+        corners = surface.x[cells][:, :, :2]
+        sides = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
+        flat = np.abs(np.linalg.det(sides)) > UPRIGHT * (np.linalg.norm(sides, axis=1) ** 2).sum(axis=1)
+        cells, corners, sides = cells[flat], corners[flat], sides[flat]
+        two = np.einsum("fij,kfj->kfi", np.linalg.inv(sides), places[:, None] - corners[:, 0])
+        shares = np.concatenate([1 - two.sum(axis=-1, keepdims=True), two], axis=-1)
+    inside = (shares > -ON_FACET).all(axis=-1)
+    found = np.where(inside, (shares * values[cells]).sum(axis=-1), -np.inf).max(axis=1, initial=-np.inf)
+    return np.asarray(np.where(np.isfinite(found), found, np.nan))
+
+
+def rim(surface: ContactSurface) -> Mask:
+    """Return which pressure nodes lie on the rim of a contact surface (n,): on a side of one linear facet alone."""
+    cells = surface_cells(surface)
+    found: Mask = np.zeros(len(surface.nodes), dtype=bool)
+    if cells.shape[1] == 2:
+        nodes, count = np.unique(cells, return_counts=True)
+        found[nodes[count == 1]] = True
+        return found
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)  # corners come around
+    pairs, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    found[pairs[count == 1].ravel()] = True
+    return found
 
 
 def surface_columns(placed: ContactSetup) -> dict[str, Column]:

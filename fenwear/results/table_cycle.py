@@ -149,7 +149,6 @@ def sliding_numbers(last: Block) -> dict[str, float]:
     return {
         "mean_way_of_cycle_mm": float(areas @ cycle.ways / areas.sum()),
         "largest_way_of_cycle_mm": float(cycle.ways.max()),
-        "largest_pressure_in_cycle_MPa": float(cycle.pressure.max()),
     }
 
 

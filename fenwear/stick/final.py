@@ -32,6 +32,8 @@ import scipy.optimize
 
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
+from fenwear.cycle.steady_cycle import SteadyCycle, heat_of
+from fenwear.cycle.totals import none_yet, stacked
 from fenwear.errors import ConvergenceError
 from fenwear.layers.between import PLASTIC
 from fenwear.sliding.wear import WornDepths
@@ -419,3 +421,14 @@ def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
         less = sum(lost(middle)) < depth
         low, high = np.where(less, middle, low), np.where(less, high, middle)
     return np.minimum(lost(high)[0], depth)
+
+
+def cycle_of_final(found: FinalShape) -> SteadyCycle:
+    """Return the half-cycles of the end of partial-slip wear, with the pressures of their ends: nothing wears on."""
+    system = found.system
+    strokes, steps = system.motion.half_cycles, system.law_state.problem.program.steps
+    ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
+    adds, rate = stacked([none_yet(system)] * strokes), found.worn.times(0.0)
+    warm = np.zeros((0, 2, 0)) if found.temperature is None else np.stack([found.temperature] * strokes)
+    heat = heat_of(warm, strokes)
+    return SteadyCycle(system, found.pressures[ends], found.pressures, adds, rate, {}, warm, heat, moves=False)

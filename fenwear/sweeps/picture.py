@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 PICTURE = "sweep.png"
 SHOWN = (
     "largest_pressure",
-    "contact_size",
+    "contact_width",
+    "contact_area",
     "lambda_F",
     "largest_depth",
     "largest_depth_strip",

@@ -17,7 +17,7 @@ from fenwear.assembly.strokes import make_sliding
 from fenwear.case import Case
 from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import writing
-from fenwear.sweeps.evaluate import MEANINGS, Values, meaning
+from fenwear.sweeps.evaluate import Values, meaning
 from fenwear.sweeps.plan import Plan
 
 if TYPE_CHECKING:
@@ -85,9 +85,8 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     dims, shape = tuple(sizes), tuple(sizes.values())
     good = {place: one.values for place, one in outcomes.items() if one.values is not None}
     names = list(dict.fromkeys(name for values in good.values() for name in values))
-    order = [name for name in MEANINGS if name in names] + [name for name in names if name not in MEANINGS]
     data, coordinates = {}, _coordinates(plan)
-    for name in order:
+    for name in names:
         what = meaning(name, plan.of, case)
         scale = degrees_of(case) if what.unit == KELVIN.unit else None
         unit = what.unit if scale is None else scale.unit
@@ -169,7 +168,7 @@ def table(dataset: xarray.Dataset) -> xarray.Dataset:
             columns[f"{name}{behind}"] = values
             continue
         for k in range(values.sizes["half_cycle"]):
-            columns[f"{name} {_way(dataset, k)}{behind}"] = values.isel(half_cycle=k, drop=True)
+            columns[f"{name}_{_way(dataset, k)}{behind}"] = values.isel(half_cycle=k, drop=True)
     return xarray.Dataset({name: values.drop_vars(NODES, errors="ignore") for name, values in columns.items()})
 
 

@@ -20,7 +20,11 @@ from fenwear.cycle import jump
 Assembled = Callable[..., Tribosystem]
 FEW = "geometry.parameters.elements_along_contact=8"
 RINGS = ("geometry.parameters.across=4", "run.half_cycles=20000")
-DEPTH, VOLUME, PRESSURE = Quantity("depth", "punch"), Quantity("volume", "punch"), Quantity("pressure", "0")
+DEPTH, VOLUME, PRESSURE = (
+    Quantity("largest_depth", "punch"),
+    Quantity("worn_volume", "punch"),
+    Quantity("largest_pressure", "0"),
+)
 
 
 def end_of(system: Tribosystem) -> Block:
@@ -45,7 +49,7 @@ def test_true_error_of_a_flat_punch_is_told(assembled: Assembled) -> None:
     system = assembled("example1", *settings, FEW)
     found = uncertainty(system.case, end_of(system))
     exact = values_of(end_of(assembled("example1", *settings, FEW.replace("8", "32"))))
-    for quantity in (DEPTH, PRESSURE, Quantity("pressure", "1")):
+    for quantity in (DEPTH, PRESSURE, Quantity("largest_pressure", "1")):
         error = abs(found.values[quantity].number - exact[quantity].number)
         assert error < found.total[quantity] < 10 * error
     assert found.values[DEPTH].at_edge
@@ -78,7 +82,7 @@ def test_half_cycles_as_steps_are_told(assembled: Assembled) -> None:
     small = ('wear.punch.coefficient="1e-7 1/MPa"', "run.half_cycles=200", *fast[2:])
     exact = values_of(end_of(assembled("example2", *small, 'run.integration="implicit"')))[DEPTH].number
     error = abs(values_of(one)[DEPTH].number - exact)
-    steps = uncertainty(system.case, one).contributions["wear steps"][DEPTH]
+    steps = uncertainty(system.case, one).contributions["wear_steps"][DEPTH]
     assert 0.5 * error < steps < 5 * error
 
 
@@ -87,12 +91,12 @@ def test_linear_elements_have_nothing_below(assembled: Assembled) -> None:
     system = assembled("example2", "run.half_cycles=4", "geometry.degree=1", FEW)
     found = uncertainty(system.case, end_of(system))
     assert "geometry.degree" in found.untold["mesh"]
-    assert "wear steps" in found.contributions
+    assert "wear_steps" in found.contributions
     text, table = shown.text(system, found), shown.table(system, found)
     assert "not known" in text
     assert "geometry.degree = 2" in text
     assert "punch" not in table  # a sum without the mesh's part would say nothing
-    assert table["contributions"]["wear steps"]["punch"]["largest_depth_mm"] > 0
+    assert table["contributions"]["wear_steps"]["punch"]["largest_depth_mm"] > 0
 
 
 JUMPED = {
@@ -155,7 +159,7 @@ def test_steady_state_within_what_is_told(assembled: Assembled) -> None:
         steady(assembled("example1", "geometry.degree=3", FEW.replace("8", elements))) for elements in ("8", "32")
     )
     found, finer = uncertainty_of_steady(one), values_of_steady(other)
-    for quantity in (PRESSURE, Quantity("pressure", "1")):
+    for quantity in (PRESSURE, Quantity("largest_pressure", "1")):
         assert abs(found.values[quantity].number - finer[quantity].number) < found.total[quantity]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -17,7 +16,6 @@ from fenwear.arrays import Array
 from fenwear.bodies import supports
 from fenwear.bodies.condensation import CondensedBody, condense
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.interface import interpolation
 
 SMALL = ("geometry.parameters.elements_along_contact=8",)
 
@@ -112,19 +110,6 @@ def test_weights_integrate_polynomials(assembled: Callable[..., Tribosystem], de
     for power in range(2 * degree):
         exact = 60 / (power + 1) * (power % 2 == 0)
         assert nodes.weights @ xi**power == pytest.approx(exact, rel=1e-12, abs=1e-11)
-
-
-@pytest.mark.parametrize("degree", range(1, 9))
-def test_interpolation_reproduces_polynomials(degree: int) -> None:
-    """Piecewise Lagrange of degree k is exact for x^k on any graded nodes, and is the identity at the nodes."""
-    ends = np.array([-2.0, -1.9, -1.0, 0.5, 3.0])
-    reference = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
-    nodes = np.unique(np.concatenate([a + (b - a) * reference for a, b in itertools.pairwise(ends)]).round(14))
-    x = np.linspace(-2, 3, 101)
-    matrix = interpolation(nodes, degree, x)
-    for power in range(degree + 1):
-        np.testing.assert_allclose(matrix @ nodes**power, x**power, atol=1e-9 * 3**power)
-    np.testing.assert_allclose(interpolation(nodes, degree, nodes), np.eye(len(nodes)), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["example1", "example2"])

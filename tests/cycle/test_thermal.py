@@ -18,10 +18,10 @@ from fenwear.cycle import Block, coupled, growth_rate, stationary_growth
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.stability import repeating_temperatures
 from fenwear.cycle.state import RunState
+from fenwear.cycle.steady_cycle import steady_cycle
 from fenwear.cycle.tangent import phase_tangent
 from fenwear.cycle.totals import none_yet
 from fenwear.heat import exchange
-from fenwear.life.model import steady_snapshot
 from fenwear.sliding.wear import WornDepths
 
 Assemble = Callable[..., Tribosystem]
@@ -395,13 +395,11 @@ def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
     assert growth_rate(system, state) == rate
     assert growth_rate(system, rounding) == pytest.approx(rate, rel=1e-9)
     for pressure, conductances in ((state.phase_pressure, state.conductances), (rounding, None)):
-        found = steady_snapshot(system, pressure, state.velocity, conductances).temperature
-        assert found is not None
+        found = steady_cycle(system, pressure, state.velocity, conductances).temperature
         np.testing.assert_allclose(found[:, 0], state.heat.punch, rtol=1e-9)
         np.testing.assert_allclose(found[:, 1], state.heat.strip, rtol=1e-9)
     # A node without pressure that conducts changes both: what the state says is followed.
     other = np.where(opened, np.nanmax(state.conductances), state.conductances)
     assert growth_rate(system, state.phase_pressure, other) != pytest.approx(rate, rel=1e-6)
-    warmed = steady_snapshot(system, state.phase_pressure, state.velocity, other).temperature
-    assert warmed is not None
+    warmed = steady_cycle(system, state.phase_pressure, state.velocity, other).temperature
     assert np.abs(warmed[:, 0] - state.heat.punch).max() > 1e-6 * state.heat.punch.max()

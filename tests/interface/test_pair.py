@@ -48,12 +48,6 @@ def test_rounding_moves_nothing(name: str) -> None:
     np.testing.assert_allclose(other.weights, one.weights, rtol=1e-12)
 
 
-def test_interpolate(unmatched: Tribosystem) -> None:
-    """A nodal field is a finite-element function between its nodes."""
-    pair, x = unmatched.pair, np.linspace(-30, 30, 77)
-    np.testing.assert_allclose(pair.interpolate(pair.x**3, x), x**3, rtol=1e-10, atol=1e-9)
-
-
 @pytest.mark.mpi
 def test_equilibrium_of_example_1(assembled: Callable[..., Tribosystem]) -> None:
     """H and the moments by hand: the motion by lambda_F and lambda_M about O = (30, 120)."""

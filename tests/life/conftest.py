@@ -30,10 +30,10 @@ def profile(tmp_path: Path) -> Callable[..., Path]:
         change: Any = lambda x, depth: depth,
     ) -> Path:  # fmt: skip
         settings = [line.removeprefix("# set ").replace(" = ", "=", 1) for line in lines if line.startswith("# set")]
-        end = list(Model(case).run({}, cycles, settings=settings))[-1].surfaces["punch"]
-        assert end.depth is not None
-        depth = change(end.x, end.depth) + np.random.default_rng(seed).normal(0, noise, len(end.x))
-        rows = [f"{x!r},{1e3 * d!r}" for x, d in zip(end.x.tolist(), depth.tolist(), strict=True)]
+        end = list(Model(case).run({}, cycles, settings=settings))[-1].end
+        places = end.system.pair.x
+        depth = change(places, end.wear[-1]) + np.random.default_rng(seed).normal(0, noise, len(places))
+        rows = [f"{x!r},{1e3 * d!r}" for x, d in zip(places.tolist(), depth.tolist(), strict=True)]
         path = tmp_path / name
         path.write_text("\n".join([*lines, f"# after = {cycles} cycles", "x (mm),depth (um)", *rows]))
         return path

@@ -35,7 +35,7 @@ RING = measured_folder()
 
 def volumes(after: Sequence[float], values: Sequence[float], sigma: Sequence[float], *settings: str) -> DataSet:
     """Return worn volumes after numbers of cycles."""
-    series = Series("volume", "punch", None, np.array(after), "cycles", np.array(values), np.array(sigma),
+    series = Series("worn_volume", "punch", None, np.array(after), "cycles", np.array(values), np.array(sigma),
                     tuple(range(1, 1 + len(after))))  # fmt: skip
     return DataSet("volumes", settings, (series,))
 
@@ -265,14 +265,13 @@ def test_bounds_that_exclude_the_data_are_told(small: Callable[..., Case]) -> No
 def test_block_on_ring_depths_are_those_published() -> None:
     """Cruzado 2010: 16.155 um after 800 m, 25.709 um after 1,600 m, of a level-set model (row 31)."""
     case = load_case(RING / "block_on_ring.toml")
-    depths = {int(s.cycle): s.surfaces["punch"] for s in Model(case).run({}, 3200, stops=[1600])}
+    ends = {int(s.cycle): s.end for s in Model(case).run({}, 3200, stops=[1600])}
     for cycles, published in ((1600, 16.155e-3), (3200, 25.709e-3)):
-        surface = depths[cycles]
-        assert surface.depth is not None
+        depth, weights = ends[cycles].wear[-1], ends[cycles].system.pair.weights
         area = 2e-9 * (65 / 6) * cycles * 500.0
-        assert surface.weights @ surface.depth == pytest.approx(area, rel=1e-9)
-        assert surface.depth.max() == pytest.approx(published, rel=3e-3)
-        assert surface.depth.max() == pytest.approx((1.5 * 20 * area) ** (2 / 3) / 40, rel=3e-3)  # two rigid bodies
+        assert weights @ depth == pytest.approx(area, rel=1e-9)
+        assert depth.max() == pytest.approx(published, rel=3e-3)
+        assert depth.max() == pytest.approx((1.5 * 20 * area) ** (2 / 3) / 40, rel=3e-3)  # two rigid bodies
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def test_profiles_at_two_times_with_their_condition(case: Case, file: Callable[[
     found = read_data(file(text), case)
     assert found.settings == ('punch.loads.0.force=["0 N", "-5 kN"]',)
     first, second = found.series
-    assert first.quantity == "depth"
+    assert first.quantity == "wear"
     assert first.x is not None
     np.testing.assert_allclose(first.x, [-10, 0, 10])
     np.testing.assert_allclose(first.values, [0.5e-3, 1.5e-3, 2.5e-3])
@@ -45,7 +45,7 @@ def test_profiles_at_two_times_with_their_condition(case: Case, file: Callable[[
 def test_a_lost_mass_becomes_a_volume(case: Case, file: Callable[[str], Path]) -> None:
     text = "# density = 7800 kg/m^3\n# sigma = 0.1 mg\nafter (h), mass (mg)\n1, 7.8\n2, 15.6\n3, 23.4\n"
     series = read_data(file(text), case).series[0]
-    assert (series.quantity, series.counted) == ("volume", "time")
+    assert (series.quantity, series.counted) == ("worn_volume", "time")
     np.testing.assert_allclose(series.values, [1.0, 2.0, 3.0])
     np.testing.assert_allclose(series.after, [3600, 7200, 10800])
     np.testing.assert_allclose(series.sigma, 0.1 / 7.8)
@@ -58,7 +58,7 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
     ("text", "expected"),
     [
         ("", "holds nothing"),
-        ("after (m), wear (mm)\n" + ROWS, r"column 'wear': not known.*some of x, after, depth"),
+        ("after (m), waer (mm)\n" + ROWS, r"column 'waer': not known.*some of x, after, depth"),
         ("after (m), volume\n" + ROWS, "column 'volume': has no unit"),
         ("after (m), volume (kg)\n" + ROWS, "column 'volume': unit: .*another kind"),
         ("after (m), volume (mmm)\n" + ROWS, "column 'volume': unit: .*, got 'mmm', whose unit is not known"),

@@ -15,8 +15,8 @@ from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case
 from fenwear.cycle import Block, follow
 from fenwear.cycle.state import RunState
 from fenwear.life import Model, evaluate, parse_quantity, sensitivity
+from fenwear.life.model import Snapshot, edge_moved
 from fenwear.life.quantities import Path
-from fenwear.life.snapshot import Snapshot, edge_moved
 
 ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
             "motion.amplitude")  # fmt: skip
@@ -214,7 +214,7 @@ def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
     model = Model(case)
     run = list(model.run({}, cycles))
     assert sum(len(one.renewals) for one in run) > 1
-    assert run[-1].surfaces["punch"].depth == pytest.approx(last.end.worn.punch, rel=1e-12)
+    assert run[-1].end.wear[-1] == pytest.approx(last.end.worn.punch, rel=1e-12)
     value, path = evaluate(model, quantity, {})
     slopes = []
     for h in (1e-4, 1e-5):
@@ -255,7 +255,7 @@ def test_an_edge_that_comes_back_has_moved() -> None:
     """A contact that narrows and closes again is as rough as one that grows."""
 
     def run(*closed: list[int]) -> list[Snapshot]:
-        return [cast("Snapshot", SimpleNamespace(x=c, surfaces={}, pressure=np.array([c]))) for c in closed]
+        return [cast("Snapshot", SimpleNamespace(end=None, phase_pressure=np.array([c]))) for c in closed]
 
     assert edge_moved(run([1, 1, 1], [0, 1, 1], [1, 1, 1]))
     assert edge_moved(run([0, 1], [0, 1], [1, 1]))

@@ -83,7 +83,7 @@ def test_numbers_are_the_summary(folder: Path, parsed: Page) -> None:
     values = {a["id"]: float(a["value"]) for a in shown}
     assert len(values) == len(shown)
     expected = numbers_of(_summary(folder))
-    assert expected["mean_pressure_MPa"] == pytest.approx(16.667, abs=1e-3)
+    assert expected["nominal_pressure_MPa"] == pytest.approx(16.667, abs=1e-3)
     assert values == pytest.approx(expected, rel=1e-15, nan_ok=True)
 
 

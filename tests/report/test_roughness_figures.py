@@ -57,7 +57,7 @@ def test_heights_are_less_what_has_worn_and_its_form(history: xarray.Dataset) ->
         np.testing.assert_allclose(form[within], nearest, rtol=0, atol=1e-12)
         heights = here[f"surface{end}"].values[within]
         assert abs(heights.mean()) < 1e-15
-        rms = float(here[f"roughness_rms{end}"])
+        rms = float(here[f"roughness_Sq{end}"])
         assert np.sqrt((heights**2).mean()) == pytest.approx(rms, rel=1e-9)
     assert {"surface_map", "surface_strip_map"} <= quantities(found).keys()
     smooth = history.drop_vars([name for name in map(str, history.variables) if name.startswith("topography")])

@@ -48,8 +48,8 @@ def test_run_tells_how_rough_it_is(tmp_path: Path) -> None:
     case = wavy(load, 321, worn, quiet, half_cycles=20, integration="jump", jump_tolerance=1e-3)
     summary, folder = run_case(case, output=tmp_path / "wave", log=lambda _: None)
     with h5py.File(folder / "history.nc") as file:
-        rms = file["roughness_rms_strip"][:]
-        assert "roughness_rms" not in file
+        rms = file["roughness_Sq_strip"][:]
+        assert "roughness_Sq" not in file
     assert rms[0] < HEIGHT / np.sqrt(2)
     assert (np.diff(rms)[:4] < 0).all()  # then the ends of the punch, which wear most, count
     assert rms[-1] < 0.8 * HEIGHT / np.sqrt(2)

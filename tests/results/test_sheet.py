@@ -15,8 +15,11 @@ from fenwear import Tribosystem, assemble, jump, load_case, march
 from fenwear.case.templates import write_case_of
 from fenwear.cycle import Block, follow
 from fenwear.interface.placement import in_model
+from fenwear.results.quantity import computed
 from fenwear.results.reading import load_history
-from fenwear.results.sheet import sheet, sheet_rows, sheet_text, values, variables
+from fenwear.results.registry import quantities_of
+from fenwear.results.sheet import sheet_rows, sheet_text
+from fenwear.results.summary import sheet_of
 from fenwear.results.zone import without_noise
 from fenwear.run import run_case
 
@@ -30,10 +33,17 @@ FRETTING = (
 )
 
 
+def values(block: Block) -> dict[str, Any]:
+    return computed(block, [one for one in quantities_of(block.system).values() if one.dims])
+
+
 def last(blocks: Any) -> dict[str, Any]:
     """Return the sheet of the last half-cycle, with the block as "block"."""
     block: Block = list(blocks)[-1]
-    return {"block": block, **{name: value[-1] for name, value in values(block).items()}}
+    return {
+        "block": block,
+        **{name: value[-1] for name, value in values(block).items()},
+    }
 
 
 @pytest.mark.parametrize("every", ["explicit", "implicit", "jump"])
@@ -166,7 +176,7 @@ def test_forces_of_a_curved_contact_are_those_of_a_rig(tmp_path: Path) -> None:
     by_rig = 1e3 * np.diff(found["worn_volume"], prepend=0.0) / load / np.diff(found["sliding_distance"], prepend=0.0)
     np.testing.assert_allclose(found["wear_rate"], by_rig, rtol=1e-9)
     np.testing.assert_allclose(found["wear_rate"], 1e3 * law.coefficient * integral / load, rtol=1e-6)
-    sliding = sheet(block)["sliding"]
+    sliding = sheet_of(block)["sliding"]
     assert sliding["friction_coefficient"] == pytest.approx(mu, rel=1e-9)
     assert sliding["friction_over_load"] == pytest.approx(mu * integral.mean() / load, rel=1e-6)
 
@@ -193,8 +203,8 @@ def test_turning_strip(assembled: Assemble) -> None:
     np.testing.assert_allclose(found["friction_force"], mu * np.linalg.norm(force @ arms, axis=1), rtol=1e-9)
     np.testing.assert_allclose(found["friction_torque"], mu * force @ radius, rtol=1e-9)
     assert found["friction_work"][-1] == pytest.approx(mu * path, rel=1e-12)
-    assert "worn_area" not in variables(system)
-    assert {"scar_width", "scar_length_5_percent", "largest_depth_at_y"} <= set(variables(system))
+    assert "worn_area" not in quantities_of(system)
+    assert {"scar_width", "scar_length_5_percent", "largest_depth_at_y"} <= set(quantities_of(system))
 
 
 @pytest.mark.mpi
@@ -244,7 +254,7 @@ def test_half_cycles_that_are_not_kept_and_a_restart(tmp_path: Path) -> None:
 def test_sheet_for_people(assembled: Assemble) -> None:
     """Labels, units, a column for each body; no mass without a density."""
     (block,) = march(assembled("fretting", *SMALL), 4)
-    text = sheet_text(sheet(block))
+    text = sheet_text(sheet_of(block))
     lines = {line.partition("  ")[0]: line.split()[-2:] for line in text.splitlines()}
     assert lines["sliding distance (m)"][1] == "0.0002"
     assert [float(v) for v in lines["specific wear rate, mean (mm³/(N m))"]] == pytest.approx([1.9e-5, 2.9e-5])

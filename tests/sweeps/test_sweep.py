@@ -53,7 +53,7 @@ def test_steady_states_are_those_of_single_cases(tmp_path: Path) -> None:
     np.testing.assert_array_equal(stored["pressure"], found["pressure"])
     assert stored["pressure"].attrs["units"] == "MPa"
     heading, *rows = (tmp_path / "out" / "sweep.csv").read_text().splitlines()
-    assert heading.startswith("contact.friction,geometry.parameters.pin_height_1,largest_pressure rightward (MPa),")
+    assert heading.startswith("contact.friction,geometry.parameters.pin_height_1,largest_pressure_rightward (MPa),")
     assert len(rows) == 6
 
 
@@ -83,7 +83,7 @@ def test_a_program_is_run_and_its_end_is_what_lasts() -> None:
     over = {"wear.punch.coefficient": [1e-7, 2e-7]}
     for of in ("run", "steady", "optimum"):
         found = package.sweep(load_case("example1", [*SMALL, "run.half_cycles=8", steps]), over, of=of).squeeze()
-        np.testing.assert_allclose(found["mean_pressure"], 20e3 / 600, rtol=1e-9)
+        np.testing.assert_allclose(found["nominal_pressure"], 20e3 / 600, rtol=1e-9)
         if of == "run":
             slid = 4 * 1.5 * 2 * (10e3 + 20e3)
             np.testing.assert_allclose(found["worn_volume"], np.array([1e-7, 2e-7]) * slid, rtol=1e-9)
@@ -118,7 +118,7 @@ def test_partial_slip_is_swept_like_sliding() -> None:
     for k, mu in enumerate(friction["contact.friction"]):
         alone = list(evolve(package.assemble(load_case("fretting-partial-slip", [*small, f"contact.friction={mu}"]))))
         assert float(found["worn_volume"][k]) == pytest.approx(float(alone[-1].totals.of("volume_punch")[-1]), rel=1e-9)
-    assert found["stick_size"][0] < found["stick_size"][1]
+    assert found["stick_width"][0] < found["stick_width"][1]
     ends = package.sweep(case, friction, of="steady")
     assert ends["largest_depth"][0] > ends["largest_depth"][1] > 0
     open_law = load_case("fretting-partial-slip", [small[0], *small[3:]])
@@ -132,11 +132,11 @@ def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: 
     def broken(_self: object, case: package.Case, _of: str) -> dict[str, Any]:
         if case.contact.friction > 0.15:
             raise ZeroDivisionError("nothing to divide by")
-        return {"mean_pressure": np.array(1.0)}
+        return {"nominal_pressure": np.array(1.0)}
 
     monkeypatch.setattr(engines.VariantRunner, "values", broken)
     found = package.sweep(CASE, {"contact.friction": [0.1, 0.2]})
-    assert found["mean_pressure"].values.tolist()[0] == 1.0
+    assert found["nominal_pressure"].values.tolist()[0] == 1.0
     assert found["trouble"].values.tolist() == ["", "an error that was not foreseen: nothing to divide by"]
     assert "contact.friction=0.2" in capfd.readouterr().err
 

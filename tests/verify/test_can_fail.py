@@ -13,13 +13,14 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear import Tribosystem
+from fenwear.arrays import Array
 from fenwear.assembly import bodies, placing
 from fenwear.bodies import material
 from fenwear.bodies.material import Isotropic
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import ContactPair, Interface, RigidEquilibrium, interpolation
+from fenwear.interface import ContactPair, Interface, RigidEquilibrium
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.wear import Wear
 from fenwear_verify import flash as flash_cases
@@ -32,6 +33,29 @@ from fenwear_verify.thermal import conductor
 
 Patch = pytest.MonkeyPatch
 CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor)
+
+
+def interpolation(nodes: Array, degree: int, x: Array) -> Array:
+    """Return the matrix of piecewise Lagrange interpolation from `nodes` to `x`.
+
+    Args:
+        nodes: Ascending abscissae; every facet has degree + 1 of them, its ends shared.
+        x: Abscissae inside the nodes' range.
+    """
+    ends = nodes[::degree]
+    facet = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(ends) - 2)
+    columns = facet[:, None] * degree + np.arange(degree + 1)
+    matrix = np.zeros((len(x), len(nodes)))
+    np.put_along_axis(matrix, columns, lagrange(nodes[columns], x), axis=1)
+    return matrix
+
+
+def lagrange(nodes: Array, x: Array) -> Array:
+    """Return the Lagrange polynomials of `nodes` (..., k) at `x` (...), shape (..., k)."""
+    difference = x[..., None, None] - nodes[..., None, :]
+    spacing = nodes[..., :, None] - nodes[..., None, :]
+    same = np.eye(nodes.shape[-1], dtype=bool)
+    return (np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)).prod(axis=-1)
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,107 @@
+"""The half-cycles of a steady state, as quantities see those of a run: pressures, temperatures, and what they add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.cycle.block import BlockHeat
+from fenwear.cycle.coupled import cycle_heat, touching
+from fenwear.cycle.steady import SteadyState
+from fenwear.cycle.totals import Totals, phase_totals, stacked
+from fenwear.heat.exchange import CROSSING, TERMS
+from fenwear.sliding.wear import WornDepths
+
+
+@dataclass(frozen=True)
+class SteadyCycle:
+    """The k half-cycles of a steady state, of n contact nodes; collective where it is made with heat.
+
+    Attributes:
+        system: What it is the state of.
+        pressure: In the middle position of each half-cycle (k, n), MPa.
+        phase_pressure: In every phase (m, n), MPa.
+        adds: What each half-cycle adds to the totals, k of them.
+        rate: Depths worn in the cycle.
+        velocity: Rigid-body wear in the cycle of each mode, mm and rad.
+        temperature: Of the contact surfaces at the end of each phase (m, 2, n), K; empty without heat.
+        heat: Temperatures at the ends of the half-cycles; None without heat.
+        moves: Whether what half-cycles add is known: forces, work and wear.
+    """
+
+    system: Tribosystem
+    pressure: Array
+    phase_pressure: Array
+    adds: Totals
+    rate: WornDepths
+    velocity: Mapping[str, float]
+    temperature: Array
+    heat: BlockHeat | None
+    moves: bool = True
+
+    def __len__(self) -> int:
+        return len(self.pressure)
+
+    @property
+    def half_cycle(self) -> NDArray[np.int64]:
+        """Number of each half-cycle in the cycle (k,), from 1."""
+        return np.arange(1, len(self) + 1)
+
+    @property
+    def contact_width(self) -> Array:
+        """Width of the nodes in contact (k,), mm; in solids and rings their area, mm²."""
+        return np.where(self.pressure > 0, self.system.pair.weights, 0.0).sum(axis=1)
+
+    @property
+    def load(self) -> Array:
+        """Normal force (k,), N; 0 where supports and not the contact carry the loads."""
+        return np.full(len(self), self.system.normal_force)
+
+
+def steady_cycle(
+    system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
+) -> SteadyCycle:
+    """Return the half-cycles of pressures (m, n) that repeat, with heat of these conductances (m, n); collective."""
+    motion, heat = system.motion, cycle_heat(system)
+    strokes, positions = motion.half_cycles, motion.positions
+    temperature: Array = np.zeros((0, 2, phase_pressure.shape[1]))
+    if heat is not None:
+        conducting = heat.conductances(touching(phase_pressure)) if conductances is None else conductances
+        end = heat.jump(heat.initial(), np.inf, conducting)
+        state, rows = heat.exchange.at(end.state(phase_pressure)), []
+        for phase, pressure in enumerate(phase_pressure):
+            state, _ = heat.exchange.half_cycle(state, phase, np.asarray(pressure), conducting[phase])
+            rows.append(np.stack(heat.exchange.contact_temperatures(state, phase)))
+        temperature = np.array(rows)
+    latest = (temperature[-1, 0], temperature[-1, 1]) if len(temperature) else None
+    each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(phase_pressure)]
+    states = [system.conditions(k, p, latest, None, None) for k, p in each]
+    if system.layers.memory is not None:
+        rest = system.rested(states)
+        states = [system.conditions(k, p, latest, rest, None) for k, p in each]
+    adds = phase_totals(system, phase_pressure, states)
+    strokes_add = [reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)]
+    return SteadyCycle(
+        system, phase_pressure[positions // 2 :: positions], phase_pressure, stacked(strokes_add),
+        system.wear.phases(states).worn(phase_pressure), velocity, temperature,
+        heat_of(temperature[positions - 1 :: positions] if len(temperature) else temperature, strokes),
+    )  # fmt: skip
+
+
+def cycle_of_state(state: SteadyState) -> SteadyCycle:
+    """Return the half-cycles of a cyclic steady state; collective."""
+    return steady_cycle(state.system, state.phase_pressure, state.velocity, state.conductances)
+
+
+def heat_of(temperature: Array, strokes: int) -> BlockHeat | None:
+    """Return temperatures at the ends of half-cycles (k, 2, n) as those of a block, without a balance."""
+    if not len(temperature):
+        return None
+    terms, unknown = np.zeros((strokes, len(TERMS) + len(CROSSING))), np.full(strokes, np.nan)
+    return BlockHeat(temperature[:, 0], temperature[:, 1], terms, np.zeros(strokes, dtype=np.int64), unknown)

@@ -1,0 +1,104 @@
+"""A quantity: its name, unit and meaning, and how it is computed of half-cycles, whoever has computed these.
+
+Runs and studies have a block of half-cycles, steady states a `SteadyCycle`; a quantity is computed of both by one
+function. `fenwear.results.registry` lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from fenwear.arrays import Array
+
+Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
+RECORD = ("half_cycle",)
+SUFFIXES = {
+    "1": "",
+    "degree": "deg",
+    "mm3/(N m)": "mm3_per_N_m",
+    "mJ/mm2": "mJ_per_mm2",
+    "N mm": "N_mm",
+    "mm s-1": "mm_per_s",
+    "rad s-1": "rad_per_s",
+}  # fmt: skip  (of keys that end in their unit)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a contact.
+
+    Attributes:
+        name: In histories, studies, sweeps and figures; with its unit behind it in summaries.
+        dims: Dimensions of its values: the half-cycles, and nodes or time steps; none of one number of a cycle.
+        unit: Of its values.
+        long_name: What it is.
+        compute: Values (k, ...) of k half-cycles, from a block of them or from a `SteadyCycle`.
+        cycle: Which number is that of a cycle: the last half-cycle's, the largest, the mean, or the sum.
+        steady: Whether a steady state has it, too.
+        nodal: Whether values at contact nodes tell it, so that each of several contacts has its own.
+        of: The table of summary.json that has it: sliding, punch, strip, or end for the top; "" for none.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    unit: str
+    long_name: str
+    compute: Callable[[Any], Any]
+    cycle: Literal["last", "largest", "mean", "sum"] = "last"
+    steady: bool = False
+    nodal: bool = False
+    of: str = ""
+
+    @property
+    def key(self) -> str:
+        """Its key in a summary: the name with the unit behind it; of the strip below the strip's name."""
+        name, suffix = self.name.removesuffix("_strip"), SUFFIXES.get(self.unit, self.unit)
+        return f"{name}_{suffix}" if suffix else name
+
+    def of_cycle(self, records: Any) -> Array:
+        """Return its value in the last cycle of the records of half-cycles (...)."""
+        if not self.dims:
+            return np.asarray(self.compute(records), dtype=np.float64)
+        values: Array = np.asarray(self.compute(records), dtype=np.float64)[-records.system.motion.half_cycles :]
+        if self.cycle == "last":
+            return values[-1]
+        reduced: dict[str, Callable[..., Any]] = {"largest": np.max, "mean": np.mean, "sum": np.sum}
+        return np.asarray(reduced[self.cycle](values, axis=0))
+
+
+@dataclass(frozen=True)
+class InTable:
+    """How a quantity is computed together with others, as a table by their names."""
+
+    table: Callable[[Any], Mapping[str, Any]]
+    name: str
+
+    def __call__(self, records: Any) -> Any:
+        """Return its values."""
+        return self.table(records)[self.name]
+
+
+def numbers(records: Any, of: str, known: Iterable[Quantity]) -> dict[str, float]:
+    """Return what a table of summary.json has of the last half-cycle or cycle, by its keys."""
+    own = [one for one in known if one.of == of]
+    values = computed(records, own)
+    return {one.key: float(np.asarray(values[one.name])[-1] if one.dims else values[one.name]) for one in own}
+
+
+def computed(records: Any, quantities: Iterable[Quantity]) -> dict[str, Any]:
+    """Return the values of quantities by their names; each table is computed once."""
+    tables: dict[int, Mapping[str, Any]] = {}
+    found = {}
+    for one in quantities:
+        how = one.compute
+        if isinstance(how, InTable):
+            if id(how.table) not in tables:
+                tables[id(how.table)] = how.table(records)
+            found[one.name] = tables[id(how.table)][how.name]
+        else:
+            found[one.name] = how(records)
+    return found

@@ -1,0 +1,246 @@
+"""The registry of quantities: all that histories, summaries, sweeps, studies and figures know of a contact.
+
+A quantity has one name, unit and meaning, and one function that computes it. `quantities_of` lists those of a system,
+`known` those of any, by their names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache, partial
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.cycle import Block
+from fenwear.cycle.state import known_pressures
+from fenwear.cycle.steady_cycle import SteadyCycle
+from fenwear.heat.exchange import CROSSING, TERMS
+from fenwear.interface import is_translation
+from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
+from fenwear.results.quantity import RECORD, InTable, Quantity
+
+if TYPE_CHECKING:
+    from fenwear.assembly import Tribosystem
+
+ALONG = ("half_cycle", "x")
+TURNS = {"moved": "mm", "turned": "rad"}  # units of the rigid motions of bodies, by how their names begin
+
+
+def _weights(records: Any, body: str) -> Array:
+    """Return the areas that the nodes of a surface stand for (k, n): meshes that follow the wear change them."""
+    pair = records.system.pair
+    weights = pair.weights if body == "punch" else pair.strip.weights
+    return np.broadcast_to(weights, (len(records), len(weights)))
+
+
+def _of_records(name: str, dims: tuple[str, ...], unit: str, long_name: str, **more: Any) -> Quantity:
+    """Return a quantity that records of half-cycles have under its name."""
+    return Quantity(name, dims, unit, long_name, attrgetter(name), **more)
+
+
+IN_RUN = (
+    _of_records("half_cycle", RECORD, "1", "number of the half-cycle"),
+    _of_records("time", RECORD, "s", "time at the end of the half-cycle"),
+    _of_records("direction", RECORD, "1",
+                "sliding direction of the strip: 1 rightward or counterclockwise, -1 leftward or clockwise"),
+    _of_records("pressure", ALONG, "MPa", "contact pressure during the half-cycle", cycle="largest", steady=True,
+                nodal=True),
+    _of_records("gap", ALONG, "mm", "gap between punch and strip during the half-cycle"),
+    _of_records("wear", ALONG, "mm", "worn depth of the punch at the end of the half-cycle", nodal=True),
+    *sheet.CONTACT[:1],
+    _of_records("contact_width", RECORD, "mm", "width in contact", cycle="largest", steady=True, nodal=True),
+    *sheet.CONTACT[1:],
+    _of_records("optimum_distance", RECORD, "1", "share of the load that is carried elsewhere than in the optimum: "
+                "half the integral of their difference"),
+    _of_records("periodicity", RECORD, "1",
+                "largest change of pressure against one cycle ago over the pressure scale"),
+    _of_records("equilibrium_error", RECORD, "1", "error of the force and moment balance relative to the load"),
+    _of_records("complementarity_error", RECORD, "1",
+                "largest error of p >= 0, gap >= 0, p gap = 0 over their scales"),
+    _of_records("retries", RECORD, "1", "solves that took a second attempt, in another way or in smaller steps"),
+    Quantity("weight", ALONG, "mm", "length that each contact node stands for, on the mesh of the half-cycle",
+             partial(_weights, body="punch")),
+)  # fmt: skip
+OF_STRIP = (
+    _of_records("wear_strip", ("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle",
+                nodal=True),
+    Quantity("weight_strip", ("half_cycle", "x_strip"), "mm", "length swept by the punch that each node stands for, on "
+             "the mesh of the half-cycle; of a closed track that of its meshed part", partial(_weights, body="strip")),
+)  # fmt: skip
+OF_PROGRAM = (
+    _of_records("load", RECORD, "N", "normal force on the contact, the mean of the cycle"),
+    _of_records("load_factor", RECORD, "1", "all loads over those of the case"),
+    _of_records("speed", RECORD, "mm s-1", "mean sliding speed"),
+    _of_records("ambient", RECORD, "K", "temperature of the surroundings"),
+)
+ANGULAR = "mean angular speed of the strip"
+TERM_TEXTS = {
+    "friction": "heat made by friction in the half-cycle",
+    "debris": "heat carried off by debris",
+    "stored": "heat gained by both bodies",
+    "convected": "heat lost to the surroundings",
+    "held": "heat lost through boundaries of held temperature",
+    "carried": "heat that the strip's material carries out of the model",
+    "into_punch": "heat that enters the punch across the contact in the half-cycle",
+    "into_strip": "heat that enters the strip across the contact in the half-cycle",
+}
+
+
+def _term(records: Any, number: int) -> Array:
+    return np.asarray(records.heat.terms[:, number])
+
+
+def _of_heat(name: str, dims: tuple[str, ...], unit: str, text: str, attribute: str = "", **more: Any) -> Quantity:
+    return Quantity(name, dims, unit, text, attrgetter(f"heat.{attribute or name}"), **more)
+
+
+OF_HEAT = (
+    _of_heat("temperature_punch", ALONG, "K", "temperature of the punch's contact surface at the end", cycle="largest",
+             steady=True, nodal=True),
+    _of_heat("temperature_strip", ALONG, "K", "temperature of the strip's contact surface at the end", cycle="largest",
+             steady=True, nodal=True),
+    _of_heat("largest_temperature", RECORD, "K", "largest temperature of the contact surfaces at the end",
+             cycle="largest", steady=True, nodal=True),
+    _of_heat("coupling_iterations", RECORD, "1", "iterations of heat and contact"),
+    _of_heat("heat_balance_error", RECORD, "1", "missing heat over the largest term of the balance", "balance_error"),
+    *(
+        Quantity(f"heat_{name}", RECORD, "mJ", TERM_TEXTS[name], partial(_term, number=k))
+        for k, name in enumerate((*TERMS, *CROSSING))
+    ),
+)  # fmt: skip
+OF_TRACK = (
+    _of_heat("temperature_bulk", RECORD, "K", "temperature of the bulk of the strip's closed track at the end"),
+)
+# What solids and rings have in place of the plane's.
+ON_SURFACES = {
+    "weight": ("mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
+    "weight_strip": ("mm2", "swept area that each node stands for, on the mesh of the half-cycle"),
+    "direction": ("1", "sliding direction of the strip: 1 forward or counterclockwise, -1 backward or clockwise"),
+}
+NODES = {"x": "node", "x_strip": "node_strip"}
+
+
+def on_surfaces(found: Iterable[Quantity]) -> list[Quantity]:
+    """Return quantities of plane models as those of solids and rings."""
+    rows = [(one, *in_model(one, on_surface=True)) for one in found if one.name != "contact_width"]
+    return [
+        replace(one, dims=tuple(NODES.get(d, d) for d in one.dims), unit=unit, long_name=text)
+        for one, unit, text in rows
+    ]
+
+
+def in_model(one: Quantity, *, on_surface: bool) -> tuple[str, str]:
+    """Return the unit and the meaning of a quantity in the plane, or in solids and rings."""
+    return ON_SURFACES.get(one.name, (one.unit, one.long_name)) if on_surface else (one.unit, one.long_name)
+
+
+def _of_room(room: Any, system: Tribosystem) -> list[Quantity]:
+    """Return the quantities of a module that computes its values together."""
+    return [_in_table(room.values, name, *variable) for name, variable in room.variables(system).items()]
+
+
+def _in_table(values: Any, name: str, dims: tuple[str, ...], unit: str, text: str) -> Quantity:
+    stem, strip = name.removesuffix("_strip"), name.endswith("_strip")
+    of = "end" if name in AT_END else ("strip" if strip else "punch") if stem in OF_BODIES else ""
+    return Quantity(name, dims, unit, text, InTable(values, name), CYCLES.get(name, "last"), of=of)
+
+
+def _in_cycle(records: Block | SteadyCycle) -> float:
+    """Return the largest pressure of a cycle in any phase or time step, MPa."""
+    if isinstance(records, SteadyCycle):
+        return float(records.phase_pressure.max())
+    strokes, contacts = records.system.motion.half_cycles, known_pressures(records.end.contacts)
+    steps_taken = [one.pressure for one in records.steps[-strokes:]]
+    return float(np.max([one.max() for one in steps_taken or [records.pressure if contacts is None else contacts]]))
+
+
+IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pressure at any time of the cycle",
+                    _in_cycle, steady=True, of="end")  # fmt: skip
+CYCLES: dict[str, Literal["mean", "sum"]] = {"energy_ratio": "mean", "friction_work_increment": "sum"}
+
+
+def _of_steps(name: str) -> Quantity:
+    return Quantity(name, (), *steps.OF_CYCLE[name], InTable(steps.of_cycle, name), of="end")
+
+
+# What summary.json has of the tables of these modules: at its top, and of a body.
+AT_END = (
+    *("plastic_volume", "largest_plastic_depth", "debris_volume", "ejected_volume", "largest_debris_thickness"),
+    *("debris_balance_error", "creep_volume_layer", "largest_creep_depth_layer", "eccentricity", "attitude_angle"),
+    *("energy_ratio", "stick_width", "stick_width_within", "stick_area", "stick_area_within"),
+)
+OF_BODIES = (
+    *("creep_volume", "largest_creep_depth", "worn_through_of_scar", "worn_through_of_surface", "least_coating"),
+    *("roughness_Sa", "roughness_Sq"),
+)
+ROOMS = (between, coating, creep, place, roughness, steps, table_cycle)
+
+
+def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
+    """Return the quantities of a system by their names."""
+    case = system.case
+    found = [
+        *IN_RUN,
+        *(() if case.wear.strip is None else OF_STRIP),
+        *(one for one in OF_PROGRAM if case.program is not None and (one.name != "ambient" or case.heat is not None)),
+        *(() if case.heat is None else OF_HEAT),
+        *(() if case.heat is None or case.heat.track is None else OF_TRACK),
+        *sheet.quantities(system),
+        *(one for room in ROOMS for one in _of_room(room, system)),
+        IN_CYCLE,
+        *(_of_steps(name) for name in steps.names_of_cycle(system)),
+    ]
+    if case.model.kind != "plane":
+        found = on_surfaces(found)
+    if case.turns:
+        found = [replace(one, unit="rad s-1", long_name=ANGULAR) if one.name == "speed" else one for one in found]
+    return {one.name: replace(one, long_name=case.names.told(one.long_name)) for one in found}
+
+
+@cache
+def _prototypes() -> dict[str, Quantity]:
+    rooms = {**place.ECCENTRICITY, **steps.VARIABLES, **steps.of_solids(), **between.OF_DEBRIS, **between.OF_FLOW}
+    rooms |= {name: one for body in sheet.BODIES for name, one in {**creep.of_member(body), **coating.of_body(body),
+              **roughness.of_body(body)}.items()}  # fmt: skip
+    listed = [*IN_RUN, *OF_STRIP, *OF_PROGRAM, *OF_HEAT, *OF_TRACK, *sheet.SLIDING, *sheet.TURNING]
+    for body in sheet.BODIES:
+        listed += [*sheet.of_a_body(body), *sheet.of_a_plane_body(body)]
+        listed += sheet.of_the_scar(body, sheet.PLACES, ("length", "width"))
+    listed += [_in_table(steps.values, name, *one) for name, one in rooms.items()]
+    listed += [IN_CYCLE, *map(_of_steps, steps.OF_CYCLE)]
+    return {one.name: one for one in listed}
+
+
+def known(name: str) -> Quantity | None:
+    """Return the quantity of a name that some system has; None where none does."""
+    motion, mode = re.fullmatch(r"(moved|turned)_([xyz])(_\w+)?", name), re.fullmatch(r"lambda_[FM]\w*", name)
+    if motion is not None:
+        text = f"how far a body has {motion[1]} along or about {motion[2]}, from where it was meshed"
+        return Quantity(name, RECORD, TURNS[motion[1]], text, attrgetter(name))
+    if mode is not None:
+        unit = "mm" if is_translation(name) else "rad"
+        text = "rigid-body wear of the punch in a cycle: its approach, or its rotation"
+        return Quantity(name, (), unit, text, attrgetter(name), steady=True)
+    return _prototypes().get(name)
+
+
+def names_known() -> list[str]:
+    """Return the names of all quantities that are one number of a half-cycle or cycle, without those of the strip."""
+    single = [one.name for one in _prototypes().values() if one.dims in (RECORD, ())]
+    listed = [name for name in single if not name.endswith("_strip")]
+    return [*listed, *(f"{motion}_{axis}" for motion in TURNS for axis in "xyz")]
+
+
+LARGEST = {
+    "wear": "largest_depth",
+    "wear_strip": "largest_depth_strip",
+    "pressure": "largest_pressure",
+    "temperature": "largest_temperature",
+    "creep_depth": "largest_creep_depth",
+    "creep_depth_strip": "largest_creep_depth_strip",
+}  # fmt: skip  (what the largest value of nodal ones is called)

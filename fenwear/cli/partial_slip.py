@@ -9,14 +9,12 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case
-from fenwear.errors import CaseError, InputError
 from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
-from fenwear.stick.final import FinalShape, final_shape
+from fenwear.stick.final import FinalShape
 from fenwear.stick.interface import meshed
 from fenwear.stick.records import TimeStepRecords
-from fenwear.stick.setup import partial_slip_problem, touches
 
 
 def check_text(case: Case, system: Tribosystem | None = None) -> str:
@@ -66,11 +64,10 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    problem = partial_slip_problem(case) if system is None else system.law_state.problem
-    if not touches(problem):
-        raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
-    found = final_shape(problem) if system is None else system.contact_law.end(system)
-    problem = problem if found.system is None else found.system.law_state.problem
+    system = system or assemble(case)
+    system.check_touching()
+    found = system.contact_law.end(system)
+    problem = found.system.law_state.problem
     solid = case.model.kind == "solid"
     pair, weights = problem.interface.middle.pair, problem.weights
     x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x

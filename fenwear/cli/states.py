@@ -143,8 +143,12 @@ def _uncertain(state: SteadyState) -> dict[str, Any]:
 def _print_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
     """Print the shape to which partial slip wears."""
     from fenwear.cli.partial_slip import final_of, final_text
+    from fenwear.plausibility import final_warnings
 
-    _, numbers = final_of(system.case, system)
+    found, numbers = final_of(system.case, system)
+    numbers["warnings"] = final_warnings(found)
+    for warning in numbers["warnings"]:
+        log(f"warning: {warning}")
     if as_json:
         print_json(numbers)
     else:

@@ -11,6 +11,7 @@ large     displacements beyond small strain
 from fenwear.plausibility.monitor import (
     HeatMonitor,
     StateMonitor,
+    final_warnings,
     fineness_text,
     fineness_warnings,
     initial_warnings,
@@ -35,6 +36,7 @@ __all__ = [
     "StateMonitor",
     "elastic_share",
     "elastic_way",
+    "final_warnings",
     "fineness_text",
     "fineness_warnings",
     "initial_warnings",

@@ -15,6 +15,7 @@ from fenwear.plausibility.rules import RULES, Made, Seen, fineness_of, remarks
 from fenwear.stick.program import passes
 
 if TYPE_CHECKING:
+    from fenwear.stick.final import FinalShape
     from fenwear.stick.records import TimeStepRecords
 
 STEPS, CHANGE, DIFFERENCE = "heat_steps", "heat_change_by_halving_steps", "heat_difference_from_whole_mesh"
@@ -30,6 +31,11 @@ def initial_warnings(system: Tribosystem) -> list[str]:
 def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
     """Return the warnings about a cyclic steady state; collective."""
     return list(remarks(Seen.of_steady(system, state)).values())
+
+
+def final_warnings(found: FinalShape) -> list[str]:
+    """Return the warnings about the shape to which partial slip wears; collective."""
+    return list(remarks(Seen.of_final(found)).values())
 
 
 def system_warnings(system: Tribosystem) -> list[str]:

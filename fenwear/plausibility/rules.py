@@ -30,6 +30,7 @@ from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:
     from fenwear.heat.halving import Fineness
+    from fenwear.stick.final import FinalShape
 
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
 WIDER = 0.02  # of the surface's width: what a chamfer adds
@@ -85,7 +86,7 @@ class Seen:
         end: Depths at the end.
         temperature: Largest one of each row, K (k,); none without heat.
         touching: Nodes that carry pressure or wear, of each row (k, n).
-        kind: "start", "run" or "steady".
+        kind: "start", "run", "steady" or "final".
     """
 
     made: Made
@@ -144,6 +145,13 @@ class Seen:
             np.array([state.complementarity_error]), {}, system.unworn(),
             np.zeros(0) if heat is None else np.array([heat.punch.max(), heat.strip.max()]), touching, "steady",
         )  # fmt: skip
+
+    @classmethod
+    def of_final(cls, found: FinalShape) -> Seen:
+        """Look at the shape to which partial slip wears; collective."""
+        seen = cls.of_pressure(found.system, found.pressures, "in the end of the wear")
+        touching = (found.pressures > 0) | (found.depth > 0)
+        return replace(seen, worn={"punch": found.worn.punch[None]}, end=found.worn, touching=touching, kind="final")
 
     @cached_property
     def limits(self) -> Limits:
@@ -452,6 +460,7 @@ RULES: dict[str, Rule] = {
         "contact is clipped {when}: it reaches the end of the {end} {where}, where the bodies go on. Pressures "
         "and depths "
         "are those of a narrower surface: {then}",
+        ("start", "run", "steady", "final"),
         latest=True,
     ),
     "chamfer": Rule(

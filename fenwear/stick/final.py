@@ -8,6 +8,15 @@ the stick zone only,
 
     p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
 
+Under a prescribed approach wear takes load off the contact. A prescribed motion of the strip then loses force with it,
+and the zone stays, too. A tangential force Q stays: the zone shrinks. By the theorem of Ciavarella and Jaeger tractions
+are mu times the difference of two normal problems, so that contact in a zone alone under the load P' holds
+
+    Q = mu (P' - P_c),    P_c = P - Q_1 / mu,
+
+P the load of the unworn bodies, and Q_1 the force whose zone this is on them: Q_1 = Q + mu (P - P'). Where no force
+below mu P fulfils this the contact slides as a whole before.
+
 A percent of the zone's width is ten of the depth, so that a zone of whole nodes would not do. In the plane its edges
 are located within their elements (`edge`). A zone of nodes has an edge, too, which is that of a flat punch by the
 surface beside it: the shape of the located zone lies between those of the two zones of nodes whose edges are on either
@@ -43,6 +52,7 @@ from fenwear.stick.heat import HeatHistory
 from fenwear.stick.records import TimeStepRecords
 
 FAR = 1e3  # times the largest gap: never closes
+KEPT = 1e-3  # rise of the force over itself whose stick zone is the same
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
 INSIDE = 0.12  # of a side of squares: by which a flat punch of them is as stiff as a smaller round one, F = 2 E* a d
 LEFT, NEAR, BEYOND, FITTED = 0.25, 1.0, 4.0, 12  # nodes: what is left of an edge, and where slip is read; of them many
@@ -195,11 +205,39 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | Non
     """Return the shape of bodies whose temperatures stay."""
     if isinstance(stick, np.ndarray):
         return _of_nodes(problem, stick)
-    if stick is None and problem.interface.middle.pair.punch.dim == 3:
-        if problem.interface.middle.compliance.on_grid is not None:
-            return _of_grid(problem, _second_cycle(problem))
-        return _of_surface(problem, stick_zone(problem))
-    edges = stick_zone_edges(problem) if stick is None else stick
+    if stick is not None:
+        return _of_ends(problem, stick)
+    forces = [step.force or 0.0 for step in problem.program.steps]
+    force = max(map(abs, forces))
+    found, factor = _of_cycle(problem, problem), 1.0
+    friction = float(problem.weights @ problem.friction / problem.weights.sum())
+    load = problem.weights @ problem.beginning().contact.pressure if force else 0.0
+    for _ in range(MOST_TIMES if force else 0):
+        before, factor = factor, 1 + friction * float(load - (found.pressures @ problem.weights).mean()) / force
+        if factor - before <= KEPT:
+            return found
+        try:
+            found = _of_cycle(problem, problem.driven(problem.program.with_force(factor)))
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                "no final shape exists: wear takes load off the contact, whose approach is prescribed, until friction "
+                "no longer holds the tangential force, and it slides as a whole. Follow it by `run`, or reduce "
+                "stick.force"
+            ) from error
+    return found
+
+
+def _of_cycle(problem: PartialSlipProblem, driven: PartialSlipProblem) -> FinalShape:
+    """Return the shape whose stick zone is that of the second cycle of a problem, the same or under another force."""
+    if problem.interface.middle.pair.punch.dim == 2:
+        return _of_ends(problem, stick_zone_edges(driven))
+    if problem.interface.middle.compliance.on_grid is not None:
+        return _of_grid(problem, _second_cycle(driven))
+    return _of_surface(problem, stick_zone(driven))
+
+
+def _of_ends(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape:
+    """Return the shape with stick zones between located ends."""
     found = _of_edges(problem, edges) if len(edges) == 2 else None
     if found is not None:
         return found
@@ -330,11 +368,15 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     system, load = np.zeros((k + r, k + r)), np.zeros(k + r)
     system[:k, :k] = position.compliance.entries(zone, zone) / scale
     system[:k, k:], system[k:, :k] = position.modes[zone], position.balance[:, zone]
-    load[k:] = -problem.interface.loaded(None).resultant
+    load[k:], approach = -problem.interface.loaded(None).resultant, np.zeros(n)
+    if not load.any():  # the punch is moved: as a flat one by as much as it comes nearer
+        approach = position.interface.load_gap
+        load[:k] = -approach[zone]
     if not load.any():
         return None
     found = np.linalg.solve(system, load)
     beside = position.compliance.entries(places, zone) / scale @ found[:k] + position.modes[places] @ found[k:]
+    beside += approach[places]
     near, far = -beside
     middle = (x[first] + x[last]) / 2
     distance, away = np.abs(x[places] - middle)

@@ -71,6 +71,14 @@ class Program:
         """Return whether another cycle begins in the same place, with the same way to it."""
         return self._way == other._way
 
+    def with_force(self, factor: float) -> Program:
+        """Return the same with imposed tangential forces times a factor."""
+        way, steps = (
+            tuple(step if step.force is None else replace(step, force=factor * step.force) for step in part)
+            for part in (self.lead_in, self.steps)
+        )
+        return replace(self, lead_in=way, steps=steps)
+
     @property
     def _way(self) -> tuple[object, ...]:
         return self.pressing, self.lead_in, self.steps[-1].fraction is None, self.steps[0].force is None

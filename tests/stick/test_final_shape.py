@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from cylinders import equal_cylinders, line_load
 
-from fenwear import assemble, jump, load_case
+from fenwear import ConvergenceError, assemble, jump, load_case, make_case
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.case import Case
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import INSIDE, final_shape, stick_zone
+from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 
 LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
@@ -77,6 +78,50 @@ def test_the_end_is_as_exact_as_it_says() -> None:
         assert found.depth.max() == pytest.approx(depth, rel=0.02)
         assert worn.weights @ found.depth == pytest.approx(area, rel=0.04)
         assert worn.weights @ found.pressure == pytest.approx(load, rel=1e-3)
+
+
+def approached(elements: int, amplitude: float, **stick: float) -> PartialSlipProblem:
+    """Return mirror images that are moved towards each other, mm, in place of loads."""
+    tables = equal_cylinders(0.17, elements, 1.0).resolved()
+    near = {"punch": ("punch", -7.9e-3), "strip": ("strip", 7.9e-3)}
+    for body, (name, by) in near.items():
+        tables[body]["loads"] = []
+        tables[body]["supports"] = [
+            {"on": f"{name}_sides", "fix": ["x"]},
+            {"on": f"{name}_far", "fix": ["z"], "by": [by]},
+        ]
+    tables["stick"] = {"steps": 6, **stick}
+    tables["motion"]["amplitude"] = amplitude
+    return partial_slip_problem(make_case(tables))
+
+
+@pytest.mark.parametrize("elements", [36, 48])
+def test_the_end_under_a_prescribed_approach(elements: int) -> None:
+    """Wear takes load off; with a prescribed motion the stick zone is kept, and located within its elements."""
+    worn = approached(elements, 1.35e-3)
+    first = TimeStepRecords.joined(worn.cycle(worn.beginning())[1])
+    load, force = float(worn.weights @ first.pressure[-1]), float(np.abs(first.force).max())
+    c = np.sqrt(1 - force / (0.2 * load)) * 0.17 * np.sqrt(load / line_load(0.17))
+    found = final_shape(worn)
+    area, depth = exact_end(c, float(worn.weights @ found.pressure), 4.0)
+    assert found.deepest is not None
+    assert found.deepest[0] < depth < found.deepest[1] < 1.25 * found.deepest[0]
+    assert found.size == pytest.approx(2 * c, rel=2e-3)
+    assert found.depth.max() == pytest.approx(depth, rel=0.045)
+    assert worn.weights @ found.depth == pytest.approx(area, rel=0.08)
+
+
+def test_a_force_shrinks_the_zone_under_a_prescribed_approach() -> None:
+    """What is left of the load holds the force, Q = mu (P' - P_c); where none does there is no end."""
+    worn = approached(36, 1e-3, force=90.0)
+    found = final_shape(worn)
+    c, left = found.size / 2, float(worn.weights @ found.pressure)
+    assert 0.2 * (left - line_load(c)) == pytest.approx(90.0, rel=0.02)
+    area, depth = exact_end(c, left, 4.0)
+    assert found.depth.max() == pytest.approx(depth, rel=0.02)
+    assert worn.weights @ found.depth == pytest.approx(area, rel=0.05)
+    with pytest.raises(ConvergenceError, match="no final shape"):
+        final_shape(approached(36, 1e-3, force=100.0))
 
 
 def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from fenwear import ConvergenceError, load_case
 from fenwear.cli.partial_slip import check_text, final_of, final_text
+from fenwear.plausibility import final_warnings
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "stick.steps=6")
 
@@ -20,6 +21,19 @@ def test_check_names_the_regime(amplitude: str, regime: str) -> None:
     """Of the first cycle."""
     settings = [*COARSE, f"motion.amplitude='{amplitude}'", "motion.positions=1"]
     assert f"first cycle: {regime}," in check_text(load_case("fretting-partial-slip", settings))
+
+
+@pytest.mark.parametrize("grid", [(), ("grid.nodes=39", "grid.size=['0.19 mm']")])
+def test_a_scar_that_reaches_the_end_is_told(grid: tuple[str, ...]) -> None:
+    """Of the meshed surface or of a grid: how wide it should be; nothing where it is as wide."""
+    coarse = ["geometry.degree=1", "geometry.parameters.elements_along_contact=40", "stick.steps=6"]
+    width = [] if grid else ["geometry.parameters.contact_width='0.19 mm'"]
+    found, _ = final_of(load_case("fretting-partial-slip", [*coarse, *width, *grid]))
+    assert found.depth[[0, -1]].all()
+    (warning,) = final_warnings(found)
+    needed = float(re.findall(r"a width of about ([0-9.]+) mm", warning)[0])
+    assert 0.19 < needed < 0.3
+    assert final_warnings(final_of(load_case("fretting-partial-slip", coarse))[0]) == []
 
 
 def test_the_end_carries_the_load_where_it_sticks() -> None:

@@ -276,11 +276,21 @@ class ContactSetup:
         initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
         contact = self.friction.contact
         carries = self.strip_carries and self.passes  # else it lies where it is on either body
-        found = layers_of(contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries)
+        found = layers_of(
+            contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries, alike=self._alike
+        )
         if found.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
             raise CaseError(InputError("contact.hardness", message))
         return found
+
+    @property
+    def _alike(self) -> dict[str, Array]:
+        """Variables of laws (n,) that are the same in all phases: the speed, and without heat the temperature."""
+        speeds = np.array([np.broadcast_to(self._speeds[k], self._none.shape) for k in range(len(self.motion.phases))])
+        found = {} if self.heat is not None else {"T": self._initial}
+        same = np.abs(speeds - speeds[0]).max() <= ROUNDING * np.abs(speeds).max()
+        return {**found, "v": speeds[0]} if same else found
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
         """Return h_c by the pressures (n,), where what lies between gives it; see `fenwear.layers.conductance`."""

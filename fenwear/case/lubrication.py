@@ -72,6 +72,16 @@ class Lubrication(Part):
         return "asperity_share", self.asperity_share or 0.0
 
     @property
+    def uniform_share(self) -> float | None:
+        """The share where it is one number; None where it depends on anything."""
+        name, value = self.given
+        if isinstance(value, Dependence):
+            return None
+        if name == "film" and self.share_over_lambda is not None:
+            return float(np.interp(value / (self.roughness or 1.0), *np.array(self.share_over_lambda).T))
+        return value
+
+    @property
     def varies(self) -> bool:
         """Whether the share changes with more than the place."""
         value = self.given[1]

@@ -31,13 +31,23 @@ from fenwear.case.layers import (
     RoughLayer,
     place_values,
 )
+from fenwear.case.lubrication import Lubrication
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
-from fenwear.layers.closure import Closure, CoatedClosure, ExponentialClosure, Law, PowerClosure, RoughClosure
+from fenwear.layers.closure import (
+    Closure,
+    CoatedClosure,
+    ExponentialClosure,
+    Law,
+    PowerClosure,
+    RoughClosure,
+    SharedClosure,
+)
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
+from fenwear.sliding.lubrication import asperity_share
 from fenwear.sliding.wear import NOTHING, WornDepths
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
@@ -347,6 +357,7 @@ def layers_of(
     temperature: float = 0.0,
     *,
     strip_carries: bool = False,
+    alike: Mapping[str, Array] | None = None,
 ) -> Layers:
     """Return what the table of the contact puts between the surfaces of a pair, and what laws remember there.
 
@@ -357,6 +368,7 @@ def layers_of(
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
         strip_carries: Whether debris lies on the strip's material.
+        alike: Variables of laws (n,) that are the same in all phases: of the speed v and the temperature T.
 
     Raises:
         CaseError: a value is not positive somewhere, or E* is missing.
@@ -375,6 +387,8 @@ def layers_of(
             closure = ExponentialClosure(*_at_nodes(law, place, n))
         case RoughLayer() as law:
             closure = _rough(law, modulus, _at_nodes(law, place, n))
+    if closure is not None and contact.lubrication is not None:
+        closure = SharedClosure(closure, _share_by_pressure(contact.lubrication, {**place, **(alike or {})}))
     third = contact.third_body
     if third is not None:
         of_state = isinstance(third.life, Dependence) and third.life.varies
@@ -413,6 +427,24 @@ def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[st
     return [
         place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units().items()
     ]
+
+
+def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> Callable[[Array], Array]:
+    """Return the share of the pressure that asperities carry (..., n) by the pressure (..., n).
+
+    Raises:
+        CaseError: it depends on a speed or temperature that changes, which a layer does not follow.
+    """
+    name, value = lubrication.given
+    asked = [one for one in ("v", "T") if isinstance(value, Dependence) and value.depends_on(one)]
+    changing = [one for one in asked if one not in known]
+    if changing:
+        message = (
+            f"contact.lubrication.{name} depends on {changing[0]}, which changes during the cycle. A layer of "
+            "asperities does not follow it. Remove the layer, or let the share depend on p and the place alone"
+        )
+        raise CaseError(InputError("contact.layer", message))
+    return lambda pressure: asperity_share(lubrication, {**known, "p": pressure}, pressure.shape, checked=False)
 
 
 def _rough(law: RoughLayer, modulus: float | Array | None, values: list[Array]) -> Law:

@@ -15,6 +15,7 @@ sigma apart, beyond which less than 1e-9 of the asperities touch.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
@@ -27,6 +28,7 @@ from fenwear.arrays import Array
 LEAST = 1e-12  # of the largest pressure: where a power below 1 has a slope that is not infinite
 FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F is inverted; how often it is tabulated
 NONE = np.zeros(())
+NUDGE, ROUNDS = 1e-6, 20  # of the largest pressure, for differences; iterations of a pressure by that of asperities
 STEPS = 4  # of Newton's method that find the distances at even places
 
 
@@ -104,6 +106,45 @@ class ExponentialClosure:
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
         return np.asarray(self.pressure * np.expm1(np.maximum(nearness, NONE)))
+
+
+@dataclass(frozen=True)
+class SharedClosure:
+    """The closure of asperities that carry a share X of the pressure, the fluid between them the rest.
+
+    Attributes:
+        law: Of the asperities.
+        share: X by the pressure (..., n).
+    """
+
+    law: Law
+    share: Callable[[Array], Array]
+
+    def carried(self, pressure: Array) -> Array:
+        """Return the pressure of the asperities (...), MPa."""
+        return np.asarray(self.share(pressure) * pressure)
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm."""
+        return self.law.closure(self.carried(pressure))
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa."""
+        nudge = NUDGE * max(float(pressure.max(initial=0.0)), 1e-300)
+        carried = self.carried(pressure)
+        return np.asarray(self.law.slope(carried) * (self.carried(pressure + nudge) - carried) / nudge)
+
+    def nearness(self, pressure: Array, gap: Array) -> Array:
+        """Return that of the asperities (n,)."""
+        return self.law.nearness(self.carried(pressure), gap)
+
+    def pressure_of(self, nearness: Array) -> Array:
+        """Return the pressure by it (n,), MPa, nearly where the share depends on the pressure."""
+        carried = self.law.pressure_of(nearness)
+        found = carried
+        for _ in range(ROUNDS):
+            found = carried / np.maximum(self.share(found), LEAST)
+        return found
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from fenwear.case import Case
 from fenwear.case.layers import RoughLayer
 from fenwear.interface import ContactPair
 from fenwear.layers.between import Layers, Regions, common_modulus, over_materials
+from fenwear.layers.closure import SharedClosure
 
 Conductance = Callable[[Array], Array]
 
@@ -43,8 +44,10 @@ def conductance_of(layers: Layers, case: Case | None, regions: Regions, pair: Co
 
     def conductance(pressure: Array) -> Array:
         given_way = np.zeros_like(pressure) if layers.winkler is None else layers.winkler
-        closure = layers.closure
-        slope = given_way if closure is None else given_way + closure.slope(np.maximum(pressure, 0.0))
+        closure, carried = layers.closure, np.maximum(pressure, 0.0)
+        if isinstance(closure, SharedClosure):  # the spots conduct that asperities make
+            closure, carried = closure.law, closure.carried(carried)
+        slope = given_way if closure is None else given_way + closure.slope(carried)
         return np.asarray(share / slope)
 
     return conductance

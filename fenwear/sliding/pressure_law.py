@@ -1,4 +1,8 @@
-"""What of a pressure wears: q^b of equation (1), with q = min(p, cap) - threshold >= 0."""
+"""What of a pressure wears: q^b of equation (1), with q = min(X p, cap) - threshold >= 0.
+
+X is the share of the pressure that asperities carry. A number divides threshold and cap, and the coefficient has X^b.
+Of a share that depends on anything the coefficient has all that it changes.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +31,12 @@ class PressureLaw:
     beyond: float = 0.0
 
     @classmethod
-    def of(cls, law: WearLaw) -> PressureLaw:
-        """Return that of a wear law of the case."""
-        return cls(law.pressure_exponent, law.pressure_threshold, law.cap)
+    def of(cls, law: WearLaw, share: float | None = 1.0) -> PressureLaw:
+        """Return that of a wear law of the case, under a share of the pressure; None for one that is no number."""
+        if share is None:
+            return cls(law.pressure_exponent, law.pressure_threshold)
+        bounds = law.pressure_threshold, law.cap
+        return cls(law.pressure_exponent, *(bound / share if bound > 0 and share > 0 else bound for bound in bounds))
 
     @property
     def power(self) -> bool:

@@ -397,7 +397,8 @@ class Wear:
     def _of_pressure(self) -> dict[str, PressureLaw]:
         """What of a pressure wears each body, by its key."""
         laws = {"wear.punch": self.punch, "wear.strip": self.strip}
-        return {key: PressureLaw.of(law) for key, law in laws.items() if law is not None}
+        share = self.friction.contact.uniform_share
+        return {key: PressureLaw.of(law, share) for key, law in laws.items() if law is not None}
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
@@ -426,7 +427,7 @@ class Wear:
             coating = (
                 None
                 if above is None or thickness is None
-                else _CoatingWear(rates(above), PressureLaw.of(above), thickness)
+                else _CoatingWear(rates(above), PressureLaw.of(above, self.friction.contact.uniform_share), thickness)
             )
             bodies.append(_BodyWear(rates(law), self._of_pressure[key], coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
@@ -437,6 +438,7 @@ def stays(wear: tuple[WearLaw | None, WearLaw | None], friction: Friction) -> bo
     laws = [one for law in wear if law is not None for one in (law, law.of_coating) if one is not None]
     of_friction = any(law.beta is not None or law.energy is not None for law in laws)
     dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
+    dependent = dependent or any(map(friction.contact.splits_pressure, laws))
     return not dependent and not friction.mixed and (friction.constant or not of_friction)
 
 
@@ -444,7 +446,8 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
     """Return beta~ at the nodes (n,), in the internal unit of its exponents.
 
     beta~ = beta mu^b, K / H (Archard), the energy wear coefficient times mu, or k_A over the pressure from which on
-    surfaces touch, beyond which wear grows no more; times X^b of the share X of the pressure that asperities carry.
+    surfaces touch, beyond which wear grows no more. Under a share X of the pressure that asperities carry the wear is
+    that of X p: beta~ has X^b, or the ratio of what of X p wears to what of p does by `PressureLaw.of`.
 
     Raises:
         CaseError: it is negative or not finite; `key` is the law's key.
@@ -452,7 +455,12 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
     found = _of_asperities(law, friction, conditions, key)
     if friction.contact.lubrication is not None:
         share = friction.share(conditions)
-        found = found * (share if law.pressure_exponent == 1 else share**law.pressure_exponent)
+        if friction.contact.splits_pressure(law):
+            part = PressureLaw.of(law).value(share * conditions.pressure)
+            whole = PressureLaw.of(law, None).value(conditions.pressure)
+            found = found * np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0)
+        else:
+            found = found * (share if law.pressure_exponent == 1 else share**law.pressure_exponent)
     return found if isinstance(found, np.ndarray) else np.full(conditions.shape, found)
 
 
@@ -462,7 +470,13 @@ def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditio
     scale = law.scale if law.per_area is None else 1 / law.touching_from
     if isinstance(given, Dependence):
         body = conditions.of("punch" if key.endswith("punch") else "strip")
-        return given.values(body, n, scale, f"{key}.{law.coefficient_key}", effect=PressureLaw.of(law).value)
+        return given.values(
+            body,
+            n,
+            scale,
+            f"{key}.{law.coefficient_key}",
+            effect=PressureLaw.of(law, friction.contact.uniform_share).value,
+        )
     if given is not None:
         return scale * given
     if law.archard is not None and law.hardness is not None:

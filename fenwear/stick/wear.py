@@ -179,7 +179,8 @@ class LocalLaws:
         def rate(law: WearLaw | None, key: str) -> BodyRate | None:
             if law is None:
                 return None
-            return BodyRate(coefficient(law, self.friction, conditions, key), PressureLaw.of(law), law.speed_exponent)
+            of_pressure = PressureLaw.of(law, self.friction.contact.uniform_share)
+            return BodyRate(coefficient(law, self.friction, conditions, key), of_pressure, law.speed_exponent)
 
         punch, strip = self.wear
         bases = LocalWear(rate(punch, "wear.punch"), rate(strip, "wear.strip"))

@@ -67,6 +67,62 @@ def test_with_stick_jumps_fall_to_the_march() -> None:
     assert errors[1] < 5e-3
 
 
+SHARES = {"0.4": 0.4, "{expression='min(1, 0.2 + p / 100)'}": None}
+LAWS = {
+    "{coefficient=1e-8, pressure_threshold='3 MPa'}": lambda q: 1e-8 * np.maximum(q - 3, 0),
+    "{coefficient=1e-8, pressure_cap='5 MPa'}": lambda q: 1e-8 * np.minimum(q, 5),
+    "{per_area=2e-7, touching_from='8 MPa'}": lambda q: 2e-7 * np.minimum(q / 8, 1),
+    "{coefficient=1e-9, pressure_exponent=2, pressure_threshold='2 MPa'}": lambda q: 1e-9 * np.maximum(q - 2, 0) ** 2,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("how", ["explicit", "implicit"])
+def test_wear_is_that_of_the_asperities_pressure(how: str, law: str, share: str, assembled: Assemble) -> None:
+    """Node by node, whatever the law makes of a pressure: threshold and cap are of what asperities carry."""
+    given = (f"contact.lubrication={{asperity_share={share}, fluid_friction=0.02}}", f"wear={{punch={law}}}")
+    (block,) = march(assembled("example1", *SMALL, MOTION % 100, *given), 1, implicit=how == "implicit")
+    pressure = block.pressure[0]
+    carried = pressure * (SHARES[share] or np.minimum(1, 0.2 + pressure / 100))
+    depth = 100 * LAWS[law](carried)
+    np.testing.assert_allclose(block.wear[0], depth, rtol=0, atol=1e-8 * depth.max())
+
+
+@pytest.mark.parametrize("kind", ["power", "exponential", "rough"])
+def test_a_layer_of_asperities_feels_their_pressure(kind: str, assembled: Assemble) -> None:
+    """It closes, and conducts, as a dry one does at the pressure of the asperities."""
+    layer = {
+        "power": "{kind='power', reference='1 um', pressure='5 MPa'}",
+        "exponential": "{kind='exponential', length='1 um', pressure='5 MPa'}",
+        "rough": "{kind='rough', roughness='4 um', asperity_radius='50 um', asperity_density='100 1/mm^2'}",
+    }[kind]
+    given = (*SMALL, f"contact.layer={layer}", "heat={conductance='layer', partition=0.9}")
+    dry, wet = (
+        assembled("example2-heat", *given, *more)
+        for more in ((), ("contact.lubrication.asperity_share={expression='min(1, 0.2 + p / 100)'}",))
+    )
+    pressure, step = np.linspace(1, 60, len(dry.pair.weights)), 1e-3
+    carried = pressure * (0.2 + pressure / 100)
+    np.testing.assert_allclose(wet.layers.given(pressure), dry.layers.given(carried), rtol=1e-12)
+    of_dry, of_wet = dry.layer_conductance(), wet.layer_conductance()
+    assert of_dry is not None
+    assert of_wet is not None
+    np.testing.assert_allclose(of_wet(pressure), of_dry(carried), rtol=1e-9)
+    change = wet.layers.given(pressure + step) - wet.layers.given(pressure - step)
+    np.testing.assert_allclose(wet.layers.slope(pressure), change / (2 * step), rtol=1e-4)
+
+
+def test_a_layer_of_asperities_under_a_film(assembled: Assemble) -> None:
+    """The share may follow a speed that stays; one that changes within a cycle is rejected."""
+    layer = "contact.layer={kind='power', reference='1 um', pressure='5 MPa'}"
+    dry, wet = (assembled("example2", *SMALL, MOTION % 100, layer, *more) for more in ((), (FILM,)))
+    pressure = np.full(len(dry.pair.weights), MEAN)
+    np.testing.assert_allclose(wet.layers.given(pressure), dry.layers.given(0.4 * pressure), rtol=1e-12)
+    with pytest.raises(CaseError, match=r"contact\.layer: .* depends on v"):
+        assembled("example2", *SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM)
+
+
 def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> None:
     """The share is of the pressure: at b = 2 it counts twice; energy wears by what asperities rub."""
     laws = {"{coefficient=1e-9, pressure_exponent=2}": 1e-9 * 0.25, "{energy=1e-7}": 1e-7 * 0.2 * 0.5}

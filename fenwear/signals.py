@@ -4,11 +4,40 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 
 from mpi4py import MPI
 
 BOTH = (signal.SIGINT, signal.SIGTERM)
+
+
+class TimeUpError(Exception):
+    """What was to be done within a time limit took longer."""
+
+
+@contextmanager
+def time_limit(seconds: float, comm: MPI.Comm) -> Iterator[None]:
+    """Raise where what is done within takes longer; several ranks, which would not end together, have no limit.
+
+    Raises:
+        TimeUpError: it does.
+    """
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        raise TimeUpError
+
+    if comm.size > 1:
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 class Signals:

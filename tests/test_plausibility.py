@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +18,7 @@ from dolfinx.mesh import CellType, create_rectangle
 from markupsafe import escape
 from mpi4py import MPI
 
-from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
+from fenwear import Case, Tribosystem, assemble, critical_speed, load_case, make_case, march, steady
 from fenwear.assembly import place_case, regridded, with_case
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import Isotropic, lame
@@ -32,6 +33,7 @@ from fenwear.plausibility import (
     StateMonitor,
     elastic_way,
     initial_warnings,
+    speed_warnings,
     steady_warnings,
     system_warnings,
 )
@@ -41,6 +43,7 @@ from fenwear.plausibility.meshes import few, heated_layer, turned
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
+from fenwear.signals import TimeUpError, time_limit
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 from fenwear_verify.solid import STEEL, describe
@@ -693,3 +696,32 @@ def test_displacements_beyond_small_strain(assembled: Assembled, young: str, tol
     assert bool(texts) is told
     if told:
         assert 14 < float(re.findall(r"off by some (\d+) %", texts[0])[0]) < 22
+
+
+def test_an_unstable_speed_is_foreseen(assembled: Assembled) -> None:
+    """A dry seal, twice as fast as full contact is stable, and half as fast."""
+    critical = critical_speed(assembled("ring-on-ring-heat"), 1)
+    for factor in (0.5, 2.0):
+        fast = assembled("ring-on-ring-heat", f"motion.angular_speed={factor * critical!r}")
+        texts = speed_warnings(fast)
+        assert bool(texts) is (factor > 1)
+    assert f"{critical:.4g} rad/s" in texts[0]
+    assert "is 2 times the critical speed" in texts[0]
+    assert not speed_warnings(assembled("example1-heat", *FLAT))  # to and fro
+
+
+def test_what_takes_longer_than_its_limit_ends() -> None:
+    """At once, and nothing comes later."""
+    with pytest.raises(TimeUpError), time_limit(0.01, MPI.COMM_SELF):
+        time.sleep(10)
+    with time_limit(0.01, MPI.COMM_SELF):
+        pass
+    time.sleep(0.02)
+
+
+def test_check_has_a_limit_for_heat(fenwear: Callable[..., Any]) -> None:
+    """It says what it does, and what it has not looked at."""
+    said = fenwear("check", "example1-heat", *[arg for one in FLAT for arg in ("--set", one)], "--heat-seconds", "1e-4")
+    assert "for at most 0.0001 s" in said.stdout + said.stderr
+    assert "heat: not looked at" in said.stdout + said.stderr
+    assert "the case is valid" in said.stdout + said.stderr

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
     from fenwear.progress import How
 
+HEAT_SECONDS = 60.0  # that `check` looks at the heat
+
 
 @app.callback(invoke_without_command=True)
 def main(
@@ -87,14 +89,17 @@ def check_command(
         bool, typer.Option("--accuracy", help="Estimate how uncertain the numbers of the run will be.")
     ] = False,
     full: Annotated[bool, typer.Option("--full", help="Print the case with all defaults, as a case file.")] = False,
+    heat_seconds: Annotated[
+        float, typer.Option("--heat-seconds", help="How long it may take to look at the heat.")
+    ] = HEAT_SECONDS,
 ) -> None:
     """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
-    from fenwear.assembly import elastic, law_named, place_case, resources_of, with_reduced_heat
-    from fenwear.cycle import heat_gain, heat_warnings, stability_number
+    from fenwear.assembly import elastic, law_named, place_case, resources_of
+    from fenwear.cycle import stability_number
     from fenwear.heat.periodic import cycle_memory
     from fenwear.law_choice import choose_law, with_law
     from fenwear.memory import memory_size
-    from fenwear.plausibility import fineness_text, fineness_warnings, initial_warnings
+    from fenwear.plausibility import fineness_text, initial_warnings
     from fenwear.run import position_warnings
 
     loaded = load(case, settings)
@@ -124,8 +129,8 @@ def check_command(
         *plausibility_warnings(loaded),
         *initial_warnings(system),
     ]
-    warm = with_reduced_heat(system, keep=True)
-    warnings += [*heat_warnings(heat_gain(warm), jumps=loaded.run.integration == "jump"), *fineness_warnings(warm)]
+    warm, of_heat = _with_heat(system, heat_seconds)
+    warnings += of_heat
     for warning in warnings:
         log(f"warning: {warning}")
     if full:
@@ -143,6 +148,36 @@ def check_command(
             log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact has to balance it")
     if accuracy:
         _foresee(warm)
+
+
+def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[str]]:
+    """Return the system with its heat prepared, as `run` does and keeps it, and what is to be said of it.
+
+    Args:
+        system: The problem.
+        seconds: How long it may take; the system is returned as it is where that is not enough.
+    """
+    from fenwear.assembly import with_reduced_heat
+    from fenwear.cycle import heat_gain, heat_warnings
+    from fenwear.plausibility import fineness_warnings, speed_warnings
+    from fenwear.signals import TimeUpError, time_limit
+
+    if system.heat is None or system.bodies.heat is None:
+        return system, []
+    nodes = sum(body.space.dofmap.index_map.size_global for body in system.bodies.heat)
+    log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does, for at most {seconds:g} s")
+    try:
+        with time_limit(seconds, system.comm):
+            warm = with_reduced_heat(system, keep=True)
+            jumps = system.case.run.integration == "jump"
+            warnings = [*heat_warnings(heat_gain(warm), jumps=jumps), *fineness_warnings(warm), *speed_warnings(warm)]
+    except TimeUpError:
+        text = (
+            f"heat: not looked at, as it takes more than {seconds:g} s; `run` and `steady` begin as slowly. Use fewer "
+            "elements or a lower `geometry.degree`, or wait longer with `--heat-seconds`"
+        )
+        return system, [text]
+    return warm, warnings
 
 
 def _foresee(system: Tribosystem) -> None:

@@ -48,6 +48,11 @@ def fineness_warnings(system: ContactSetup) -> list[str]:
     return list(remarks(Seen.of_system(system), "heat").values())
 
 
+def speed_warnings(system: Tribosystem) -> list[str]:
+    """Return the warning about a speed that is thermo-elastically unstable; takes some steady heats; collective."""
+    return list(remarks(Seen.of_system(system), "speed").values())
+
+
 def fineness_text(system: Tribosystem) -> str:
     """Return how fine the steps and bases of the heat are, "" without heat."""
     found = fineness_of(system)

@@ -18,7 +18,8 @@ from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.case.plausible import HOT
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import BROKEN, complementarity_error
-from fenwear.cycle import Block, SteadyState
+from fenwear.cycle import Block, SteadyState, critical_speed
+from fenwear.errors import CaseError, ConvergenceError
 from fenwear.plausibility import meshes
 from fenwear.plausibility.boundary import Chamfers, Limits, contact_chamfers, contact_limits, opened, thickness
 from fenwear.plausibility.large import large
@@ -357,6 +358,21 @@ def fineness_of(system: Tribosystem) -> Fineness | None:
     return None if system.exchange is None else system.exchange.fineness
 
 
+def unstable_speed(seen: Seen) -> Fields:
+    """Return by how much sliding one way is faster than full contact is thermo-elastically stable."""
+    system, motion = seen.system, seen.system.motion
+    if system.heat is None or not isinstance(system, Tribosystem) or not motion.one_way:
+        return {}
+    try:
+        critical = critical_speed(system, motion.directions[0])
+    except (CaseError, ConvergenceError):  # nothing takes the heat away, or coefficients are of no uniform contact
+        return {}
+    if motion.mean_speed <= critical:
+        return {}
+    unit = "rad/s" if system.case.turns else "mm/s"
+    return {"speed": motion.mean_speed, "critical": critical, "ratio": motion.mean_speed / critical, "unit": unit}
+
+
 @dataclass(frozen=True)
 class Rule:
     """What is to be said of a state.
@@ -511,6 +527,15 @@ RULES: dict[str, Rule] = {
         "its material "
         "passes is {thickness:.3g} mm thick, so the contact stays too cold. Make them at most {needed:.3g} mm high",
         ("steady", "heat"),
+    ),
+    "speed": Rule(
+        unstable_speed,
+        "motion",
+        "the speed, {speed:.4g} {unit}, is {ratio:.3g} times the critical speed of thermoelastic instability, "
+        "{critical:.4g} {unit}. Full contact breaks up into hot bands that grow and move. A run does not become "
+        "stationary, takes very many short half-cycles, and may not converge. Reduce speed or friction, or let more "
+        "heat flow off",
+        ("speed",),
     ),
     "steps": Rule(
         coarse_heat_steps,

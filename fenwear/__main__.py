@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TextIO
 
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, StackError
 from fenwear.stack import check_numbers, importing
@@ -28,6 +28,36 @@ def main() -> int:
         return 1
 
 
+class _Patient:
+    """A stream whose reader may go away (head, less): what is written from then on is lost, and nothing ends by it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        try:
+            return self._stream.write(text)
+        except BrokenPipeError:
+            self._lose()
+            return len(text)
+
+    def flush(self) -> None:
+        """Write what is held back."""
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            self._lose()
+
+    def _lose(self) -> None:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
 def _start(arguments: list[str], petsc_options: list[str]) -> int:
     with importing():
         import petsc4py
@@ -38,6 +68,8 @@ def _start(arguments: list[str], petsc_options: list[str]) -> int:
     comm = MPI.COMM_WORLD
     if comm.rank != 0:  # what all ranks say, rank 0 says
         sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    else:
+        sys.stdout, sys.stderr = _Patient(sys.stdout), _Patient(sys.stderr)  # type: ignore[assignment]
     from fenwear.compiled import ensure_folder
 
     told = ensure_folder(comm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -12,7 +13,8 @@ import typer
 from mpi4py import MPI
 
 from fenwear import __main__, cli
-from fenwear.errors import OutputError
+from fenwear.errors import CaseError, OutputError
+from fenwear.results.history import clear_directory, make_directory
 from fenwear.versions import versions
 
 
@@ -75,3 +77,31 @@ def test_version_of_a_module_without_metadata(monkeypatch: pytest.MonkeyPatch) -
     found = versions()
     assert list(found) == list(known)
     assert (found["gmsh"], found["fenics-ufl"]) == (gmsh.__version__, str(getattr(ufl, "__version__", "present")))
+
+
+def test_a_reader_that_goes_away_ends_nothing() -> None:
+    """What is written to `head`, or `less` that was left, is lost, and the run goes on."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    stream = __main__._Patient(os.fdopen(writer, "w"))
+    for _ in range(3):
+        stream.write("x" * 100_000)
+        stream.flush()
+    assert stream.fileno() == writer
+    stream.close()
+
+
+def test_a_folder_of_results_is_overwritten_or_left(tmp_path: Path) -> None:
+    """Results alone are removed; of two runs that begin at once in a folder one finds the other."""
+    folder = tmp_path / "run"
+    make_directory(folder)
+    with pytest.raises(CaseError, match="exists already"):
+        make_directory(folder)
+    (folder / "history.nc").touch()
+    clear_directory(folder)
+    assert not folder.exists()
+    clear_directory(folder)
+    folder.mkdir()
+    (folder / "notes.txt").touch()
+    with pytest.raises(CaseError, match=r"--overwrite.*notes\.txt"):
+        clear_directory(folder)

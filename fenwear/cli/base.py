@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 from typing import Annotated, Any, TextIO
 
 import typer
@@ -12,6 +13,7 @@ from mpi4py import MPI
 from fenwear.case import Case, load_case
 from fenwear.case.names import BY_ROLE
 from fenwear.cli import suggestions
+from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
 app = typer.Typer(
@@ -44,6 +46,7 @@ SetOption = Annotated[
     ),
 ]
 FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Remove the results in the folder of -o first.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -79,6 +82,19 @@ def load(case: str, settings: list[str]) -> Case:
     loaded = on_root(MPI.COMM_WORLD, lambda: (c := load_case(case, settings), c.folder))
     _Spoken.names = loaded[0].names
     return loaded[0].at(loaded[1])
+
+
+def clear(output: Path | None, *, resume: bool) -> None:
+    """Remove the results in a folder; collective.
+
+    Raises:
+        CaseError: no folder is named, it is to be gone on with, or it holds other files.
+    """
+    from fenwear.results.history import clear_directory
+
+    if output is None or resume:
+        raise CaseError(InputError("--overwrite", "expected the folder to overwrite, as -o DIR, and no --resume"))
+    on_root(MPI.COMM_WORLD, lambda: clear_directory(output))
 
 
 def show_results(found: str | dict[str, Any], where: str) -> None:

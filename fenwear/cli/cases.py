@@ -17,8 +17,10 @@ from fenwear.cli.base import (
     CaseArgument,
     FreshOption,
     JsonOption,
+    OverwriteOption,
     SetOption,
     app,
+    clear,
     load,
     log,
     print_case,
@@ -56,6 +58,7 @@ def run(
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    overwrite: OverwriteOption = False,
     fresh: FreshOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -69,6 +72,8 @@ def run(
         raise CaseError(InputError("--resume", "expected the folder of the run to go on with, as -o DIR"))
     if quiet and verbose:
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
+    if overwrite:
+        clear(output, resume=resume)
     say = (lambda _message: None) if quiet else log
     progress: How = "none" if quiet else "lines" if verbose else "bar"
     summary, directory = run_case(

@@ -9,7 +9,18 @@ from typing import Annotated, Any
 
 import typer
 
-from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, show, show_results
+from fenwear.cli.base import (
+    CaseArgument,
+    JsonOption,
+    OverwriteOption,
+    SetOption,
+    app,
+    clear,
+    load,
+    log,
+    show,
+    show_results,
+)
 from fenwear.errors import StackError
 
 QuantitiesOption = Annotated[
@@ -199,6 +210,7 @@ def sweep_command(
     processes: Annotated[int | None, typer.Option(help="Local processes; by default cores, where that pays.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Compute what the folder lacks.")] = False,
+    overwrite: OverwriteOption = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
@@ -206,8 +218,11 @@ def sweep_command(
     """Compute many variants of a case side by side: keys over their values, in one dataset."""
     from fenwear.sweeps import command
 
+    loaded = load(case, settings)
+    if overwrite:
+        clear(output, resume=resume)
     dataset, folder = command.run_sweep(
-        load(case, settings), Path(case).stem, over, table, of, output, log,
+        loaded, Path(case).stem, over, table, of, output, log,
         zipped=zipped, resume=resume, processes=processes, quiet=quiet,
     )  # fmt: skip
     show_results(command.as_json(dataset) if as_json else command.text(dataset), f"results in {folder}")

@@ -34,6 +34,9 @@ from fenwear.results.surfaces import Column, on_mesh, part_columns, surface_colu
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
+# What runs and sweeps leave in their folders.
+OF_RESULTS = (HISTORY, "history.part", SUMMARY, CASE, "checkpoint", "fields", "figures", "report.html", "flash", "export",
+              "variants", "sweep.nc", "sweep.csv", "sweep.png")  # fmt: skip
 UNKNOWN = ("gap", "creep_depth", "creep_depth_strip")  # beyond the grid that there was; a layer has crept by 0 there
 GRID = "contact_grid"  # corner, spacing and counts, where it grows
 SECONDS_BETWEEN_WRITES = 2.0
@@ -173,10 +176,30 @@ def make_directory(path: Path) -> None:
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
             raise CaseError(InputError("-o", f"{path} exists already; expected a new or an empty folder"))
         path.mkdir(parents=True, exist_ok=True)
-        probe = path / CASE
-        probe.touch()
+        (path / CASE).touch(exist_ok=False)  # of two runs that begin at once one finds it there
+    except FileExistsError:
+        raise CaseError(
+            InputError("-o", f"{path} is another run's that has just begun. Name another folder.")
+        ) from None
     except OSError as error:
         raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None
+
+
+def clear_directory(path: Path) -> None:
+    """Remove the results of a run or sweep in a folder; for one rank.
+
+    Raises:
+        CaseError: it holds other files too, or cannot be removed.
+    """
+    try:
+        others = [one.name for one in path.iterdir() if one.name not in OF_RESULTS] if path.is_dir() else []
+        if others:
+            message = f"{path} holds {', '.join(sorted(others)[:5])}, which fenwear did not write. Remove the folder."
+            raise CaseError(InputError("--overwrite", message))
+        if path.is_dir():
+            shutil.rmtree(path)
+    except OSError as error:
+        raise CaseError(InputError("--overwrite", f"{path} cannot be removed: {error.strerror}")) from None
 
 
 def free_directory(stem: Path) -> Path:

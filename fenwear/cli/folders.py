@@ -21,7 +21,7 @@ def plot_command(
     width: Annotated[str, typer.Option(help='Of the figures, such as "85 mm" for a column of a paper.')] = "178 mm",
     axis: Annotated[str, typer.Option(help="What a run is drawn over: cycles, distance or time.")] = "cycles",
 ) -> None:
-    """Draw a run: figures with captions, pictures of the bodies, animation and report.html, into its folder."""
+    """Draw a run: figures with captions, pictures of the bodies and report.html, into its folder."""
     from fenwear.report.chosen import chosen_formats, chosen_look
     from fenwear.report.page import write_report
 

@@ -49,7 +49,7 @@ def write_report(
     Args:
         directory: The folder of the run.
         log: Called with a message where pictures of the bodies cannot be drawn.
-        complete: Draw the animation and the pictures of the bodies, too, which takes longer.
+        complete: Draw the pictures of the bodies, too, which takes longer.
         look: Width and axis of the figures.
         formats: Of the files, "png", "pdf" and "svg".
 
@@ -67,9 +67,6 @@ def _write_report(
     history, wanted = read_history(directory), read_case(directory).get("output", {}).get("figures_at", ())
     paths = draw_figures(directory, wanted, look, formats, history)
     if complete:
-        from fenwear.report.animation import draw_animation
-
-        paths.append(draw_animation(directory))
         try:
             paths += draw_pictures(directory, formats)
         except DrawingError as error:
@@ -142,7 +139,6 @@ def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None
         places=_places(summary),
         figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS if name in images],
         bodies=_bodies(images),
-        animations=_animations(images),
         change=_change(summary),
         scale="the pressure scale",
         retries=summary.get("retries", {}),
@@ -251,8 +247,8 @@ def _stability(summary: dict[str, Any], history: xarray.Dataset) -> str:
 def _images(directory: Path) -> dict[str, Path]:
     """Return the images of a run by their names, without those older than its results."""
     since = (directory / HISTORY).stat().st_mtime
-    found = sorted((directory / FOLDER).glob("*.png")) + sorted((directory / FOLDER).glob("*.gif"))
-    return {path.name.removesuffix(".png"): path for path in found if path.stat().st_mtime >= since}
+    found = sorted((directory / FOLDER).glob("*.png"))
+    return {path.stem: path for path in found if path.stat().st_mtime >= since}
 
 
 def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Picture | None:
@@ -262,31 +258,13 @@ def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Pic
     return picture(path.read_bytes(), path.suffix[1:], text, alt or text)
 
 
-KINDS = {
-    "solid": "Deformed punch and strip, cut through the middle of the contact",
-    "turned": "Deformed rings, turned about their axis with a quarter left open",
-    "bodies": "Deformed punch and strip near the contact",
-}
-
-
 def _bodies(images: dict[str, Path]) -> list[Picture | None]:
     """Return pictures of the bodies at the last half-cycle that has them."""
     pictures = []
     for field, text in FIELDS.items():
-        for kind, what in KINDS.items():
-            names = [n for n in images if n.startswith(f"{kind}_{field}_")]
-            if names:
-                number = int(names[-1].rpartition("_")[2])
-                alt = f"{what}, coloured by {text}, at half-cycle {number:,}."
-                pictures.append(
-                    _figure(images, names[-1], f"{text[0].upper()}{text[1:]} at half-cycle {number:,}", alt)
-                )
+        names = [n for n in images if n.startswith(f"bodies_{field}_")]
+        if names:
+            title = f"{text[0].upper()}{text[1:]} at half-cycle {int(names[-1].rpartition('_')[2]):,}"
+            alt = f"Deformed bodies near the contact, coloured by {text}."
+            pictures.append(_figure(images, names[-1], title, alt))
     return pictures
-
-
-def _animations(images: dict[str, Path]) -> list[Picture]:
-    named = {
-        "history.gif": "pressure and worn shape over the run",
-        **{f"bodies_{field}.gif": f"the bodies over the run: {text}" for field, text in FIELDS.items()},
-    }
-    return [p for n, text in named.items() if (p := _figure(images, n, text, f"Animation: {text}."))]

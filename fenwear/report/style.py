@@ -306,9 +306,3 @@ def further(figure: Figure, png: Path, formats: Sequence[str]) -> list[Path]:
     for path in found:
         save(figure, path, dpi=300)
     return found
-
-
-def save_gif(images: Sequence[Any], path: Path, milliseconds: int = 150) -> None:
-    """Write pictures as an endless GIF that rests on the last one."""
-    durations = [milliseconds] * (len(images) - 1) + [2000]
-    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=False)

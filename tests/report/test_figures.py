@@ -12,7 +12,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fenwear import CaseError, load_case
-from fenwear.report.animation import draw_animation, frames_of
 from fenwear.report.chosen import chosen_formats, chosen_look
 from fenwear.report.course import convergence_figure, heat_balance_figure, peak_figure, scar_figure, volume_figure
 from fenwear.report.draw import draw_figures
@@ -219,21 +218,6 @@ def test_edges_of_elements() -> None:
     assert len(edges) == 14
     assert (2, 7) in edges
     assert (1, 6) not in edges
-
-
-def test_animation(folder: Path, history: xarray.Dataset) -> None:
-    """Whole cycles from early to the last, endless; the last frame stays longest."""
-    with Image.open(draw_animation(folder)) as gif:
-        count = gif.n_frames
-        durations = []
-        for k in range(count):
-            gif.seek(k)
-            durations.append(gif.info["duration"])
-        assert gif.info["loop"] == 0
-    shown = frames_of(history)
-    assert shown[-1] == 20
-    assert 5 <= count <= len(shown)  # equal frames become one
-    assert max(durations) == durations[-1]
 
 
 def test_chosen_half_cycles(history: xarray.Dataset) -> None:

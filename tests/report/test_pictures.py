@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray
-from PIL import Image
+from matplotlib.image import imread
 
 from fenwear.report.magnification import magnification
 from fenwear.report.pictures import (
@@ -58,27 +57,19 @@ def _write(directory: Path, half_cycle: int, *, heat: bool = True) -> xarray.Dat
     return dataset
 
 
-def test_pictures_and_animation(tmp_path: Path) -> None:
-    """A picture of each field at each half-cycle, coloured where the bell is, and an animation of each field."""
-    pytest.importorskip("pyvista")
+def test_pictures(tmp_path: Path) -> None:
+    """A picture of each field at each half-cycle, coloured where the bell is."""
     (tmp_path / "case.toml").touch()
     _write(tmp_path, 1)
     _write(tmp_path, 2)
-    try:
-        paths = draw_pictures(tmp_path)
-    except DrawingError as error:
-        pytest.skip(str(error))
+    paths = draw_pictures(tmp_path)
     names = {f"bodies_{field}{end}" for field in ("von_mises", "temperature") for end in ("_000001.png", "_000002.png")}
-    assert {path.name for path in paths} == names | {"bodies_von_mises.gif", "bodies_temperature.gif"}
+    assert {path.name for path in paths} == names
     for path in paths:
-        with Image.open(path) as picture:
-            if path.suffix == ".gif":
-                assert picture.n_frames == 2
-                continue
-            pixels = np.asarray(picture.convert("RGB"), dtype=int)
-            # Both bodies fill the picture's middle with colour: neither white nor grey.
-            middle = pixels[len(pixels) // 5 : len(pixels) // 2, pixels.shape[1] // 3 : 2 * pixels.shape[1] // 3]
-            assert (np.ptp(middle, axis=-1) > 10).mean() > 0.5
+        pixels = np.asarray(imread(path))[..., :3]
+        # Both bodies fill the picture's middle with colour: neither white nor grey.
+        middle = pixels[len(pixels) // 5 : len(pixels) // 2, pixels.shape[1] // 3 : 2 * pixels.shape[1] // 3]
+        assert (np.ptp(middle, axis=-1) > 0.04).mean() > 0.5
 
 
 def test_without_heat_and_without_fields(tmp_path: Path) -> None:
@@ -92,7 +83,7 @@ def test_nodes_are_moved_by_the_magnified_displacement(tmp_path: Path) -> None:
     """Every node by factor times its displacement; the surfaces by the wear, too, not what lies away from them."""
     data = _write(tmp_path, 2)
     view = common_view([data])
-    assert view.contact == 10
+    assert view.centre[2] == 10
     assert view.factor == magnification(0.02, 20) == 100
     punch, strip = (deformed(data, body, view) for body in ("punch", "strip"))
     np.testing.assert_allclose(strip[data.strip_z.values == 10, 2], 10 - 100 * 0.02 - 100 * 0.005)
@@ -127,21 +118,6 @@ def test_colours_leave_out_single_points_of_stress(tmp_path: Path) -> None:
 )
 def test_factor_is_round(largest: float, factor: float) -> None:
     assert magnification(largest, 60) == pytest.approx(factor)
-
-
-def test_no_display_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without display and xvfb-run the process that draws may die; this one goes on and says what helps."""
-    pytest.importorskip("pyvista")
-    _write(tmp_path, 1)
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    message = ""
-    try:
-        assert draw_pictures(tmp_path)  # a VTK that needs no display
-    except DrawingError as error:
-        message = str(error)
-    assert not message or ("xvfb" in message and "DISPLAY" in message)
 
 
 def test_broken_fields_are_told(tmp_path: Path) -> None:

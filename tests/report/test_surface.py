@@ -16,14 +16,12 @@ from matplotlib.tri import TriContourSet
 from numpy.typing import NDArray
 
 from fenwear import load_case
-from fenwear.report.animation import draw_animation
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.course import is_conforming
 from fenwear.report.figures import all_figures, read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
-from fenwear.report.pictures import SHOWN, draw_pictures
-from fenwear.report.solid_pictures import deformed, displacement, filling_view, points, solid_view
+from fenwear.report.pictures import common_view, deformed, displacement, draw_pictures, points
 from fenwear.report.style import by_powers
 from fenwear.report.surface import Surface, along_contact, centre_of_wear, model_of, surface_of
 from fenwear.run import run_case
@@ -201,21 +199,13 @@ def test_rings_over_the_radius(folders: dict[str, Path]) -> None:
     assert label == "radius r (mm)"
 
 
-def test_animation(folder: Path) -> None:
-    """It has a frame for each chosen half-cycle."""
-    from PIL import Image
-
-    with Image.open(draw_animation(folder)) as gif:
-        assert gif.n_frames > 1
-
-
 def test_deformed_bodies_touch(folders: dict[str, Path]) -> None:
     """Magnified displacement and wear together: the pin's worn face lies on the disc's, as the gap is closed."""
     folder = folders["pin-on-disc"]
     (path,) = (folder / "fields").glob("*.nc")
     with xarray.open_dataset(path, engine="h5netcdf") as opened:
         data = opened.load()
-    view = solid_view([data], SHOWN)
+    view = common_view([data])
     assert view.factor > 1
     np.testing.assert_allclose(view.along, [0, 1, 0], atol=1e-9)
     heights = {}
@@ -232,13 +222,12 @@ def test_deformed_bodies_touch(folders: dict[str, Path]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.process
-@pytest.mark.parametrize(("name", "kinds"), [("pin-on-disc", {"solid"}), ("ring-on-ring", {"turned", "bodies"})])
-def test_pictures(folders: dict[str, Path], name: str, kinds: set[str]) -> None:
-    """The bodies in space, and of rings their section as well."""
+@pytest.mark.parametrize("name", ["pin-on-disc", "ring-on-ring"])
+def test_pictures(folders: dict[str, Path], name: str) -> None:
+    """Solids in a section along the sliding, rings in their own."""
     pytest.importorskip("pyvista")
     drawn = draw_pictures(folders[name])
-    assert {path.name.partition("_")[0] for path in drawn} == kinds
+    assert {path.name.partition("_")[0] for path in drawn} == {"bodies"}
     assert all(path.stat().st_size > 10_000 for path in drawn)
 
 
@@ -305,18 +294,3 @@ def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], li
     assert all(len(ax.get_lines()) == 2 for ax in figure.axes if "strip" not in ax.get_title("left"))
     assert draw_comparison(found, tmp_path / "both.png").stat().st_size > 10_000
     assert "counterclockwise.largest_pressure_MPa" in found.numbers
-
-
-@pytest.mark.parametrize("sides", [(100.0, 40.0, 12.0), (4.0, 4.0, 1.6), (1.0, 1.0, 9.0)])
-def test_bodies_fill_their_picture(sides: tuple[float, float, float]) -> None:
-    """All corners are in it, seen from anywhere, with little left free the one way or the other."""
-    corners = np.array(sides) * (np.stack(np.meshgrid(*[[0, 1]] * 3), axis=-1).reshape(-1, 3) - [0.2, 0.5, 3.0])
-    way, up = np.array([0.45, -1.0, 0.45]), np.array([0.0, 0.0, 1.0])
-    centre, aspect, scale = filling_view(corners, way, up)
-    right = np.cross(up, way)
-    above = np.cross(way, right)
-    seen = (corners - centre) @ np.transpose([right / np.linalg.norm(right), above / np.linalg.norm(above)])
-    share = np.abs(seen).max(axis=0) / (scale / aspect, scale)
-    assert share.max() == pytest.approx(1 / 1.04, rel=1e-9)
-    assert 0.2 <= aspect <= 0.62
-    np.testing.assert_allclose(seen.min(axis=0), -seen.max(axis=0), atol=1e-9 * max(sides))

@@ -267,7 +267,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
         "of a grid that stays, {}",
         "expected no column {} {}",
         "at least one whole cycle",
-        "carried_by: expected {}",
+        "contact.{}: expected {}",
         "load is the sum",
         "a table contact.layer",
         "whose forces are columns",

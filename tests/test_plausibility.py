@@ -725,3 +725,29 @@ def test_check_has_a_limit_for_heat(fenwear: Callable[..., Any]) -> None:
     assert "for at most 0.0001 s" in said.stdout + said.stderr
     assert "heat: not looked at" in said.stdout + said.stderr
     assert "the case is valid" in said.stdout + said.stderr
+
+
+def test_balances_are_looked_at(assembled: Assembled) -> None:
+    """A thousandth of a term missing in the balance of force, heat, volume or energy is a warning; rounding is none."""
+    heated = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "geometry.follow_wear=never")
+    system = assembled("example1-heat", *heated)
+    (block,) = march(system, 4, block=4)
+    fretting = assembled("fretting-partial-slip", "geometry.parameters.elements_along_contact=8", "stick.steps=4")
+    (slipping,) = march(fretting, 2, block=2)
+    assert block.heat is not None
+    terms = block.heat.terms.copy()
+    terms[2, 3] += 2e-3 * terms[2].max()
+    record = slipping.steps[1].records
+    wrong = {
+        "punch.supports": (system, replace(block, equilibrium_error=np.array([0.0, 2e-3, 0.0, 0.0]))),
+        "heat.operator": (system, replace(block, heat=replace(block.heat, terms=terms))),
+        "geometry": (system, replace(block, wear=1.002 * block.wear)),
+        "stick.steps": (fretting, replace(slipping, steps=(*slipping.steps[:1], replace(
+            slipping.steps[1], records=replace(record, work=1.004 * record.work))))),
+    }  # fmt: skip
+    for key, (own, block) in wrong.items():
+        (text,) = (one for one in StateMonitor(own).see(block) if "balance" in one)
+        assert text.startswith(f"{key}: ")
+        assert "is off by 0.2" in text
+    for own, block in ((system, next(march(system, 4, block=4))), (fretting, slipping)):
+        assert not [text for text in StateMonitor(own).see(block) if "balance" in text]

@@ -80,7 +80,7 @@ class StateMonitor:
 
     def move(self, system: Tribosystem) -> None:
         """Look at another contact grid from now on."""
-        self.system, self._made = system, Made(system, self._made.first)
+        self.system, self._made = system, Made(system, self._made.first, self._made.largest)
 
     def see(self, block: Block) -> list[str]:
         """Take the next block and return the warnings about it that no earlier one had; collective."""

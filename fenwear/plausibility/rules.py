@@ -20,11 +20,13 @@ from fenwear.contact import ContactState
 from fenwear.contact.complementarity import BROKEN, complementarity_error
 from fenwear.cycle import Block, SteadyState, critical_speed
 from fenwear.errors import CaseError, ConvergenceError
+from fenwear.heat.exchange import TERMS
 from fenwear.plausibility import meshes
 from fenwear.plausibility.boundary import Chamfers, Limits, contact_chamfers, contact_limits, opened, thickness
 from fenwear.plausibility.large import large
 from fenwear.plausibility.meshes import Fields
 from fenwear.plausibility.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_amplitude
+from fenwear.results import between
 from fenwear.results.shakedown import factor, shakedown_limit
 from fenwear.results.summary import net_of
 from fenwear.sliding.wear import WornDepths
@@ -37,6 +39,7 @@ STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which 
 WIDER = 0.02  # of the surface's width: what a chamfer adds
 DEEP = 0.05  # of the radius: turns of normals, rad
 SHALLOW = 1e-3  # of the contact surface's extent: depths that no body is thin enough for
+UNBALANCED = 1e-3  # of a balance's largest term
 GONE = 0.05  # of a contact surface, that is worn through: less may be the thin end of a wedge
 
 
@@ -47,10 +50,17 @@ class Made:
     Attributes:
         system: On these meshes.
         first: In words when a contact was clipped first.
+        largest: Terms of the balances of all half-cycles so far, by name.
     """
 
     system: Tribosystem
     first: dict[str, str] = field(default_factory=dict)
+    largest: dict[str, float] = field(default_factory=dict)
+
+    def error(self, name: str, missing: Array, terms: Array) -> Array:
+        """Return what is missing in a balance (k,) over its largest term (k, ...) of all half-cycles so far."""
+        self.largest[name] = max(self.largest.get(name, 1e-300), float(np.abs(terms).max()))
+        return np.abs(missing) / self.largest[name]
 
     @cached_property
     def contact(self) -> ContactState:
@@ -88,6 +98,7 @@ class Seen:
         temperature: Largest one of each row, K (k,); none without heat.
         touching: Nodes that carry pressure or wear, of each row (k, n).
         kind: "start", "run", "steady" or "final".
+        balances: Errors of the balances of each row (k,), relative, by name.
     """
 
     made: Made
@@ -100,6 +111,7 @@ class Seen:
     temperature: Array
     touching: Mask
     kind: str
+    balances: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of_pressure(cls, system: Tribosystem, pressure: Array, when: str, error: float = 0.0) -> Seen:
@@ -134,6 +146,7 @@ class Seen:
             made, block.system, [f"in half-cycle {int(n):,}" for n in block.half_cycle], block.pressure,
             block.complementarity_error, {"punch": block.wear, "strip": block.wear_strip}, block.end.worn,
             np.zeros(0) if block.heat is None else block.heat.largest_temperature, touching, "run",
+            _balances(made, block),
         )  # fmt: skip
 
     @classmethod
@@ -158,6 +171,35 @@ class Seen:
     def limits(self) -> Limits:
         """Where the contact is clipped; collective at the first call."""
         return self.made.limits
+
+
+def _balances(made: Made, block: Block) -> dict[str, Array]:
+    """Return the errors of the balances of each half-cycle (k,), relative, by name."""
+    system, found = block.system, {"force and moment": block.equilibrium_error}
+    if block.heat is not None:
+        terms = block.heat.terms[:, : len(TERMS)]
+        found["heat"] = made.error("heat", terms[:, 0] - terms[:, 1:].sum(axis=1), terms)
+    steps: tuple[Any, ...] = block.steps
+    if steps:
+        weights = system.law_state.problem.weights
+        found["energy"] = np.array([one.records.balance_error(weights) for one in steps])
+    if system.bodies.followed is None:  # else on other meshes
+        lost, worn = block.totals.of("volume_punch"), block.wear @ system.pair.weights
+        found["worn volume"] = made.error("worn volume", lost - system.bodies.punch.thickness * worn, lost)
+    debris = between.values(block).get("debris_balance_error")
+    return found if debris is None else {**found, "debris": debris}
+
+
+def unbalanced(seen: Seen) -> Fields:
+    """Return the balance that is farthest from being fulfilled."""
+    if not seen.balances:
+        return {}
+    name, errors = max(seen.balances.items(), key=lambda item: float(item[1].max(initial=0.0)))
+    row = int(errors.argmax())
+    if not errors[row] > UNBALANCED:
+        return {}
+    key, remedy = BALANCES[name]
+    return {"name": name, "percent": 100 * float(errors[row]), "when": seen.when[row], "key": key, "remedy": remedy}
 
 
 def above_hardness(seen: Seen) -> Fields:
@@ -397,7 +439,23 @@ class Rule:
         return f"{self.key}: {self.message}".format(**fields) if fields else ""
 
 
+# The key that each balance depends on, and what to do where it is not fulfilled.
+BALANCES = {
+    "force and moment": ("punch.supports", "Check the supports, or take smaller steps"),
+    "heat": ("heat.operator", 'Set `heat.operator = "full"`, or reduce `heat.reduction_tolerance`'),
+    "energy": ("stick.steps", "Increase `stick.steps`"),
+    "worn volume": ("geometry", "Make the elements at the contact smaller"),
+    "debris": ("contact.third_body", "Take smaller steps"),
+}
+
 RULES: dict[str, Rule] = {
+    "balance": Rule(
+        unbalanced,
+        "{key}",
+        "the balance of {name} is off by {percent:.2g} % of its largest term {when}. Do not use these results. "
+        "{remedy}",
+        ("run",),
+    ),
     "unit": Rule(
         other_unit,
         "geometry.file",

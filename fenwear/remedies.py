@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-LINE_SEARCH = "contact solved with a line search"
 FULL_START = "contact solved from full contact on"
-FULL_START_SEARCH = "contact solved from full contact on, with a line search"
-RIGID_START = "contact solved from where rigid bodies would touch"
-RIGID_START_SEARCH = "contact solved from where rigid bodies would touch, with a line search"
-SOFTER_START = "contact solved by way of softer bodies"
 PIVOTS = "contact solved by pivots"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"

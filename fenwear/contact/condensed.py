@@ -13,14 +13,13 @@ open, such as the wear of the step they belong to, and to those of each phase wh
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
@@ -31,16 +30,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.interface.convolution import Convolution
 from fenwear.parallel import Team
-from fenwear.remedies import (
-    FULL_START,
-    FULL_START_SEARCH,
-    LINE_SEARCH,
-    PIVOTS,
-    RIGID_START,
-    RIGID_START_SEARCH,
-    SOFTER_START,
-    Remedies,
-)
+from fenwear.remedies import FULL_START, PIVOTS, Remedies
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
@@ -49,10 +39,8 @@ WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: wha
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
+PIVOTED = 3000  # unknowns up to which pivots are tried: their cost is the number's third power
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
-STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
-PIVOTED = 1000  # unknowns up to which pivots may be tried: their cost is the number's third power
-EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
 
 
 @dataclass(frozen=True)
@@ -141,8 +129,6 @@ class CondensedContact:
     Attributes:
         blocks: Of the phases, where nodes are many.
         most: The largest pressure, MPa.
-        follows: Whether what wears changes a little from solve to solve, as with coefficients that are found with the
-            pressures: then the factor of an earlier one serves as long as it brings the residual down.
     """
 
     def __init__(
@@ -188,7 +174,6 @@ class CondensedContact:
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
-        self.follows = False
         self._mu: Callable[[Array], Array] | None = None  # of friction that follows the pressure
         self._by_mu: Array = np.zeros((0, 0))  # what unit pressures add by the traction of a unit of it (size, n)
         self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
@@ -215,8 +200,7 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
-        for derived in ("_grid", "_own_diagonal"):
-            self.__dict__.pop(derived, None)
+        self.__dict__.pop("_grid", None)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
@@ -379,31 +363,6 @@ class CondensedContact:
             last = self._operator = GriddedPhases(self._grid, slopes)
         return last
 
-    def _diagonal(self, x: Array) -> tuple[Array, Array] | None:
-        """Return the derivative's diagonal (size,) in two: of bodies and wear, one for rigid modes; of what bends.
-
-        None where what wears is not that of its own node.
-        """
-        assert self._wearing is not None
-        (m, n), scale = self.shape, self._pressure_scale / self._gap_scale
-        pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
-        worn, bends = self._wearing.local(pressure), self._wearing.layer(pressure)
-        if worn is None:
-            return None
-        own, found = self._own_diagonal.copy(), np.zeros_like(self._offset)
-        own[:, :n] += scale * worn
-        if bends is not None:
-            found[:, :n] = scale * bends
-        return own.ravel(), found.ravel()
-
-    @cached_property
-    def _own_diagonal(self) -> Array:
-        """The diagonal of the bodies (m, size), one for rigid modes."""
-        found, n = np.ones_like(self._offset), self.shape[1]
-        for k, row in enumerate(found):
-            row[:n] = self.blocks[k].diagonal[:n] if self._many else self._dense[k].diagonal()[:n]
-        return found
-
     def _known(self, slope: Array, layer: Array | None) -> bool:
         """Return whether the last derivative is that of these slopes."""
         if self._slopes is None or (self._slopes[1] is None) != (layer is None):
@@ -446,17 +405,14 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing
-        self.inequality.curved = self._mu is not None or (
-            wearing is not None and (wearing.curved or (self.follows and not self.gridded))
-        )
-        bends = wearing is not None and wearing.curved and n > SOME  # of fewer a factor costs less than to ask for it
-        self.inequality.diagonal = self._diagonal if bends else None
         x, f, iterations = self._solve(start)
         if self.gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)
         x, f = x.reshape(m, -1), f.reshape(m, -1)
         pressure, open_ = x[:, :n] * self._pressure_scale, x[:, :n] <= ZERO
-        if self.inequality.curved:  # where layers are soft without pressure next to none closes some of a gap
+        if self._mu is not None or (
+            wearing is not None and wearing.curved
+        ):  # where layers are soft without pressure next to none closes some of a gap
             open_ &= f[:, :n] > TOLERANCE
         pressure[open_] = 0.0
         if self.most < np.inf:
@@ -480,121 +436,32 @@ class CondensedContact:
         return self._team.lead(lambda: use(self._linear.factor(kept)))
 
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
-        """Return the solution by the first way that finds it: unknowns, residual and iterations."""
-        failure: ConvergenceError | None = None
-        for name, found in self._ways(start):
-            try:
-                x = found()
-            except ConvergenceError as error:
-                failure = failure or error  # the usual way's says most
-                continue
-            if failure is not None:
-                self._remedies.note(name)
-            return x, self.inequality.residual, self.inequality.iterations
-        raise failure or ConvergenceError(self.inequality.name)
+        """Return the solution: unknowns, residual and iterations.
 
-    def _ways(self, start: ContactState | None) -> Iterator[tuple[str, Callable[[], Array]]]:
-        """Yield the names of ways to the solution, and what goes them; the first one, the usual way, is no remedy."""
-        n, solve = self.shape[1], self.inequality.solve
+        SNES starts from a contact that is given, else from full contact. Where both fail Lemke's method finds the
+        solution, but for many unknowns, for a largest pressure, and where heat bulges the surfaces: there may be
+        solutions that time does not lead to.
+        """
+        n, inequality = self.shape[1], self.inequality
+        begin = np.ones_like(self._offset)
+        begin[:, n:] = 0.0
         if start is not None:
-            near = np.zeros_like(self._offset)
-            near[:, :n] = start.pressure / self._pressure_scale
-            yield "", partial(solve, near.ravel(), near=True)
-            yield LINE_SEARCH, partial(solve, near.ravel(), line_search=True)
-        even = self._carried_evenly
-        if not even:
-            touching = self._rigid_touch().ravel()
-            yield RIGID_START, partial(solve, touching)
-            yield SOFTER_START, self._from_softer_bodies
-            yield RIGID_START_SEARCH, partial(solve, touching, line_search=True)
-        full = np.zeros_like(self._offset)
-        full[:, :n] = 1.0
-        yield FULL_START, partial(solve, full.ravel())
-        yield FULL_START_SEARCH, partial(solve, full.ravel(), line_search=True)
-        if even:
-            yield SOFTER_START, self._from_softer_bodies
-        # Not where heat bulges the surfaces: there may be solutions that time does not lead to.
-        if self.size <= PIVOTED and not self._many and self._coupling is None and self.most == np.inf:
-            yield PIVOTS, partial(self.inequality.solve_by_pivots, (full if even else touching).ravel())
-
-    def _from_softer_bodies(self) -> Array:
-        """Return the solution by way of bodies that touch all over, and then give way less and less.
-
-        Bodies that are softer by a factor press alike on gaps that are as much smaller. So a contact shrinks to its
-        size, where sets of nodes that start from the few which touch first go round.
-
-        Raises:
-            ConvergenceError: one of them has no solution that is found.
-        """
-        n, gaps = self.shape[1], self._offset[:, : self.shape[1]].copy()
-        softer, stiffer = max(float(np.ptp(gaps, axis=1).max()), 1.0), STIFFER
-        known, x = np.inf, np.zeros_like(self._offset)  # how soft the last ones were, and what was found of them
-        x[:, :n] = 1.0
+            warm = begin.copy()
+            warm[:, :n] = start.pressure / self._pressure_scale
+            try:
+                return inequality.solve(warm.ravel(), near=True), inequality.residual, inequality.iterations
+            except ConvergenceError:
+                pass
         try:
-            while True:
-                self._offset[:, :n] = gaps / softer
-                begin = x.copy()
-                begin[:, n:] *= known / softer if known < np.inf else 1.0
-                try:
-                    found = self._searched(begin.ravel())
-                except ConvergenceError:
-                    stiffer = np.sqrt(stiffer)
-                    if known == np.inf or stiffer < LEAST:
-                        raise
-                    softer = max(known / stiffer, 1.0)
-                    continue
-                if softer == 1.0:
-                    return found
-                x, known = found.reshape(x.shape).copy(), softer
-                softer = max(softer / stiffer, 1.0)
-        finally:
-            self._offset[:, :n] = gaps
-
-    def _searched(self, start: Array) -> Array:
-        """Return the solution from a start, with a line search where full steps do not find it.
-
-        Raises:
-            ConvergenceError: nor does that.
-        """
-        try:
-            return self.inequality.solve(start)
-        except ConvergenceError:
-            return self.inequality.solve(start, line_search=True)
-
-    def _balance(self, phase: int) -> Array:
-        """Return E of a phase (r, n), scaled."""
-        n = self.shape[1]
-        return np.asarray(self.blocks[phase].balance if self._many else self._dense[phase, n:, :n])
-
-    @property
-    def _carried_evenly(self) -> bool:
-        """Whether an even pressure carries the loads, more or less: not in a bore, where it adds up to nothing."""
-        n = self.shape[1]
-        for k, load in enumerate(self._offset[:, n:]):
-            balance = self._balance(k)
-            against = np.abs(balance).sum(axis=1) @ np.abs(load)
-            if -(balance.sum(axis=1) @ load) < EVEN * against:
-                return False
-        return True
-
-    def _rigid_touch(self) -> Array:
-        """Return where rigid bodies would rest on each other under the loads (m, n + r).
-
-        Of all forces that balance the loads those of rigid bodies do the least work on the gaps; their multipliers are
-        the motion that goes as far along the loads as the gaps allow. What then is nearer than elastic bodies give
-        way by touches. Gaps are those that the loads open; where the bodies, held at a few points, bend so far by them
-        that they would press on each other from two sides, those without.
-        """
-        found, n = np.zeros_like(self._offset), self.shape[1]
-        for k, offset in enumerate(self._offset):
-            gap, load = offset[:n], offset[n:]
-            if not len(load):
-                found[k, :n] = gap < 0
-                continue
-            found[k, :n] = 1.0
-            for one in (gap, gap - self._loads[k] / self._gap_scale):
-                rest = linprog(one, A_eq=self._balance(k), b_eq=-load)
-                if rest.status == 0:
-                    found[k, :n] = rest.lower.marginals < 1
-                    break
-        return found
+            x = inequality.solve(begin.ravel())
+            if start is not None:
+                self._remedies.note(FULL_START)
+        except ConvergenceError as error:
+            if self.size > PIVOTED or self._coupling is not None or self.most < np.inf:
+                raise
+            try:
+                x = inequality.solve_by_pivots(begin.ravel())
+            except ConvergenceError:
+                raise error from None  # which says most
+            self._remedies.note(PIVOTS)
+        return x, inequality.residual, inequality.iterations

@@ -4,30 +4,28 @@ Find x within its bounds with F_i(x) = 0 where x_i is free, F_i >= 0 where x_i i
 F_i <= 0 where it is at its upper bound: reduced-space active-set Newton (vinewtonrsls). These
 systems are piecewise linear or nearly so, hence full steps, without line search unless asked for.
 
-SNES decides which unknowns are at their bounds. Solves that follow one another mostly end with the
-same ones: a start that is near is first taken on by Newton's method with its own set, whose factor is
-kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts. Where unknowns are
-many the sets themselves are gone through first: that of the next step holds what has come out below its bound, and lets
-go what is held with a residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). It
-takes fewer of them than steps that are cut off at the bounds, but need not end. Where the derivative changes with the
-solution they are gone through in the same way, a step of each, by the factor of an earlier solve: see
-`fenwear.contact.chords`. An operator whose solutions cost by their digits goes through sets itself, to some
-of them, and what it finds is taken on as it is.
+SNES decides which unknowns are at their bounds. Solves that follow one another mostly end with the same ones: a start
+that is near is first taken on by a primal-dual active-set method, a step of Newton's for each set, that begins with its
+own set, whose factor is kept. The next set holds what has come out beyond a bound, and lets go what is held with a
+residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). Where sets come again and
+again, SNES starts. An operator whose solutions cost by their digits goes through sets itself, to some of them.
+
+Where SNES does not converge Lemke's method does, which ends at a solution wherever there is one, for matrices as those
+of contact without friction (see `fenwear.contact.pivoting`).
 """
 
 from __future__ import annotations
 
-import math
 import weakref
+from collections import Counter
 from collections.abc import Callable
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
-from fenwear.contact.chords import Chord, Diagonal, Factor
-from fenwear.contact.operators import LARGE, Approximate, Indices, Operator, Shifted, Solve
+from fenwear.contact.operators import Approximate, Indices, Operator, Solve
 from fenwear.contact.pivoting import complementary
 from fenwear.errors import ConvergenceError
 
@@ -35,27 +33,39 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
 AT_BOUND = 1e-12  # of unknowns, which are scaled to 1: how near to their bound they count as at it
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
-SETS = 30  # that are gone through before SNES starts
-AGAIN = 3  # times that a set may come again, where its derivative is another one
-CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor serves anyway
-SLOWEST = 0.8  # fall by which it may, where few steps are left: beyond it Newton's own are surer
-STAYS = 1e-6  # residual below which the next step changes no derivative by itself
-SERVES = 3  # such steps at least that a factor costs
-STEP_COSTS = 50  # unknowns by which it costs a step more
-STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
+SETS = 40  # steps, each on a set of its own, before SNES starts
+AGAIN = 2  # times that a set may come again: where the derivative changes it is another one
+FALLS = 0.3  # of the residual in a step: by less rounding may be at its end
 PIVOTS_COST = 10  # iterations of SNES, as which pivots are counted that look for the set
 ROUNDS = 40  # of some digits each, where the derivative changes
 CLOSE = 1e-9  # of residuals, where solutions cost by their digits
 
 
-def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
+@dataclass(frozen=True)
+class Factor:
+    """The factor of the free rows and columns of an operator.
+
+    Attributes:
+        operator: What is factored.
+        key: Which of all are free, as bytes.
+        free: Their numbers; a slice where all are free.
+        solve: The solution operator.
+    """
+
+    operator: Operator
+    key: bytes
+    free: Indices | slice
+    solve: Solve
+
+
+def configure(snes: PETSc.SNES, prefix: str) -> None:
     """Set what all of fenwear's inequalities share; options with `prefix` override it."""
     snes.setOptionsPrefix(prefix)
     snes.setType("vinewtonrsls")
     # Residuals are scaled to 1 and need few steps; a step that changes nothing ends the iteration.
     snes.setTolerances(rtol=0.0, atol=TOLERANCE, stol=0.0, max_it=100)
     options = PETSc.Options()
-    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", AT_BOUND)):
+    for name, value in (("snes_linesearch_type", "basic"), ("snes_vi_zero_tolerance", AT_BOUND)):
         if not options.hasName(f"{prefix}{name}"):
             options[f"{prefix}{name}"] = value
     snes.ksp.setType("preonly")
@@ -111,25 +121,13 @@ class Inequality:
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: Factor | None = None
         self._operator: Operator | None = None
-        self._chord: Chord | None = None  # the last factor's, where the derivative changes with the solution
-        self.curved = False  # whether the derivative changes with the solution
-        self.diagonal: Diagonal | None = None  # of the derivative, of what unknowns share and what is their own
         self.by_digits = False  # whether solutions may cost by their digits
-        self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
+        self.sets_first = False  # whether sets are gone through before SNES starts, from afar, too
         self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
-        self._cost = max(SERVES, len(lower) // STEP_COSTS)  # of a factor, in steps
-        self._stepped: Array | None = None  # where the first step from the last start led to, on its own set
+        self._snes: PETSc.SNES | None = None
 
-    @cached_property
-    def _full_steps(self) -> PETSc.SNES:
-        return self._make(self._prefix, "basic")
-
-    @cached_property
-    def _searching(self) -> PETSc.SNES:
-        return self._make(f"{self._prefix}search_", "l2")
-
-    def _make(self, prefix: str, line_search: str) -> PETSc.SNES:
+    def _make(self) -> PETSc.SNES:
         comm, size = PETSc.COMM_SELF, len(self._lower)
         snes = PETSc.SNES().create(comm)
         own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
@@ -143,7 +141,7 @@ class Inequality:
 
         snes.setFunction(residual, PETSc.Vec().createSeq(size, comm=comm))
         snes.setJacobian(update, _shell(size, _Matrix(own)))
-        configure(snes, prefix, line_search)
+        configure(snes, self._prefix)
         bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (self._lower, self._upper)]
         snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in bounds))
         snes.ksp.pc.setType("python")
@@ -174,153 +172,74 @@ class Inequality:
         last = self._kept
         if last is None or last.operator is not operator or last.key != key:
             self._kept = None
-            free = np.frombuffer(key, dtype=bool)
-            kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
-            rows = kept if len(bounded) else slice(None)
-            last = self._kept = Factor(operator, key, rows, bounded, operator.factor(kept))
+            kept = np.flatnonzero(np.frombuffer(key, dtype=bool)).astype(np.int32)
+            rows = kept if len(kept) < len(key) else slice(None)
+            last = self._kept = Factor(operator, key, rows, operator.factor(kept))
         return last
 
-    def solve(self, start: Array, *, near: bool = False, line_search: bool = False, most: int | None = None) -> Array:
+    def solve(self, start: Array, *, near: bool = False, most: int | None = None) -> Array:
         """Return the solution (size,).
 
         Args:
             start: Where Newton starts (size,).
-            near: Whether the solution may well have the unknowns of the start at their bounds, and no others.
-            line_search: Whether steps are cut to where the residual is least: slower, but it ends where
-                full steps go to and fro between two sets of unknowns at their bounds.
+            near: Whether the solution may well have nearly the unknowns of the start at their bounds.
             most: Iterations of SNES, where they are fewer than its own options allow.
 
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        if self.by_digits and not line_search and isinstance(self._jacobian(start), Approximate):
+        x: Array | None = None
+        if self.by_digits and isinstance(self._jacobian(start), Approximate):
             x = self._improved(start)
-            return self._by_snes(start, line_search) if x is None else x
-        self._stepped = None
-        stepwise = self.curved or self._bounded_above  # sets change more often, or there is more than one factor's step
-        x = (self._by_chords(start) if stepwise else self._on_set(start)) if near else None
-        if x is None and self.sets_first and not line_search:
-            x = self._through_sets(start)
-        return self._by_snes(start, line_search, most) if x is None else x
+        elif near or self.sets_first:
+            x = self._by_sets(start)
+        return self._by_snes(start, most) if x is None else x
 
     def solve_by_pivots(self, start: Array) -> Array:
         """Return the solution (size,) by Lemke's method, of the derivative at the start, at its solution, and so on.
 
-        Where there are lower bounds alone, and they are zero. It is as often as a tenth of the iterations that SNES may
-        take where it tries again: options that limit those limit this.
+        There have to be lower bounds alone, and they have to be zero.
 
         Raises:
             ConvergenceError: pivots find none, or their solutions do not settle.
         """
         x, free = start, np.isneginf(self._lower)
-        for _ in range(self._searching.getTolerances()[3] // PIVOTS_COST):
+        snes = self._snes = self._snes or self._make()
+        for _ in range(snes.getTolerances()[3] // PIVOTS_COST):  # options that limit SNES limit this
             operator = self._jacobian(x)
             matrix = np.array([operator.multiply(unit) for unit in np.eye(len(x))]).T
             x = complementary(matrix, self._function(x) - operator.multiply(x), free)
-            found = self._by_chords(x) if self.curved else self._on_set(x)
+            found = self._by_sets(x)
             if found is not None:
                 return found
         raise ConvergenceError(f"{self.name} did not converge by pivots")
 
-    def _on_set(self, start: Array) -> Array | None:
-        """Return the solution where it has the same free unknowns as the start, else None."""
-        key, x = self._free(start), start.copy()
+    def _by_sets(self, start: Array) -> Array | None:
+        """Return the solution by a step of Newton's on each of a sequence of sets; None where they come again."""
+        x, key, before, seen = start.copy(), self._free(start), np.inf, Counter[bytes]()
+        free = _mask(key)
         try:
-            # Whatever is kept: what a solution is found with does not depend on what was solved before.
-            kept = self._factor(self._jacobian(x), key)
-            for iteration in range(STEPS + 1):
+            for self.iterations in range(SETS):
                 f = self._function(x)
-                rest = f[kept.free]
-                if rest @ rest < (self._tolerance if iteration > 1 else TOLERANCE) ** 2:
-                    break
-                if iteration == STEPS or (iteration and self._free(x) != key):
-                    return None
-                if iteration:
-                    kept = self._factor(self._jacobian(x), key)
-                x[kept.free] -= kept.solve(rest)
-                if not iteration:
-                    self._stepped = x.copy()
-        except np.linalg.LinAlgError:
-            return None
-        if self._free(x) != key:
-            return None
-        if not self._holds(x, f, kept.bounded):
-            return None
-        self.iterations, self.residual = iteration, f
-        return x
-
-    def _by_chords(self, start: Array) -> Array | None:
-        """Return the solution from a start that is near, where the derivative changes with it; None if it is not."""
-        x, key, seen = start.copy(), self._free(start), set[bytes]()
-        before, free = np.inf, _mask(key)
-        try:
-            chord = self._chord_at(x, key)
-            for self.iterations in range(CHORDS):
-                f = self._function(x)
-                wanted = self._wanted(x, f, free) if self.iterations else key
-                same = wanted == key
-                if not same:
-                    if wanted in seen:
+                if self.iterations and (wanted := self._wanted(x, f, free)) != key:
+                    seen[wanted] += 1
+                    if seen[wanted] > AGAIN:
                         return None
-                    seen.add(key)
-                    key, before, free = wanted, np.inf, _mask(wanted)
+                    key, free, before = wanted, _mask(wanted), np.inf
                     self._onto_bounds(x, key)
-                    chord = self._chord_at(x, key)
                     f = self._function(x)
-                rest = f if free is None else np.where(free, f, 0.0)
-                size = math.sqrt(rest @ rest)
+                rest = f if free is None else f[free]
+                size = float(rest @ rest) ** 0.5
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
-                if small and same and (wanted if self.iterations else self._wanted(x, f, free)) == key:
+                if small and self._wanted(x, f, free) == key:
                     self.residual = f
-                    chord.solved(self.iterations)
                     return x
-                if not self._falls(size, before):
-                    chord = self._new_chord(x, key)
-                elif before < np.inf and size > STAYS:
-                    chord.bend(self._bent(x))
                 before = size
-                x += chord.step(rest, key)
+                kept = self._factor(self._jacobian(x), key)
+                x[kept.free] -= kept.solve(rest)
         except np.linalg.LinAlgError:
             pass
         return None
-
-    def _chord_at(self, x: Array, key: bytes) -> Chord:
-        """Return steps that begin at a place with these free unknowns, by the last factor where that serves."""
-        chord = self._chord
-        if chord is None or chord.factor is not self._kept or chord.worn_out:
-            return self._new_chord(x, key)
-        if not self._serves(chord, x, key):
-            if len(key) <= LARGE or isinstance(chord.factor.operator, Shifted):
-                return self._new_chord(x, key)
-            # Of a large set that differs by a few the factor of the same derivative costs little.
-            chord = self._chord = chord.of(self._factor(chord.factor.operator, key))
-        chord.begin(self._bent(x))
-        return chord
-
-    def _new_chord(self, x: Array, key: bytes) -> Chord:
-        """Return steps by the derivative at a place."""
-        bent = self._bent(x)
-        self._chord = Chord(self._factor(self._jacobian(x), key), self._cost, bent)
-        self._chord.begin(bent)
-        return self._chord
-
-    def _bent(self, x: Array) -> Array | None:
-        """Return the diagonal of the derivative at a place (size,); None where it is not known."""
-        parts = None if self.diagonal is None else self.diagonal(x)
-        return None if parts is None else np.add(*parts)
-
-    def _serves(self, chord: Chord, x: Array, key: bytes) -> bool:
-        """Return whether a factor serves for these free unknowns."""
-        if key == chord.factor.key:
-            return True
-        parts = None if self.diagonal is None or chord.bent is None else self.diagonal(x)
-        return parts is not None and chord.serves(np.frombuffer(key, dtype=bool), *parts)
-
-    def _falls(self, size: float, before: float) -> bool:
-        """Return whether the residual falls so fast that what is left of it costs less than a new factor."""
-        if size <= FALLS * before:
-            return True
-        return size < SLOWEST * before and math.log(size / TOLERANCE) < self._cost * math.log(before / size)
 
     def _wanted(self, x: Array, f: Array, free: Mask | None) -> bytes:
         """Return which unknowns are free next: those within their bounds, and those that their residual lets go.
@@ -350,37 +269,6 @@ class Inequality:
         """Of the residual, where rounding leaves more than `TOLERANCE`."""
         return max(TOLERANCE, EPSILON * self._rounding())
 
-    def _through_sets(self, start: Array) -> Array | None:
-        """Return the solution by a sequence of sets, each solved for as it is; None where they come again and again.
-
-        Where pressures are beyond a cap, or below a threshold, the derivative is another one, and a set may come twice.
-        """
-        x, key, stepped = start.copy(), self._free(start), self._stepped
-        seen: dict[bytes, list[Operator]] = {}
-        for _ in range(SETS):
-            free = np.frombuffer(key, dtype=bool)
-            if stepped is not None:
-                x, stepped = stepped, None
-            else:
-                x[~free] = self._lower[~free]
-                operator = self._jacobian(x)
-                before = seen.setdefault(key, [])
-                if len(before) == AGAIN or any(one is operator for one in before):
-                    return None
-                before.append(operator)
-                try:
-                    kept = self._factor(operator, key)
-                    x[kept.free] -= kept.solve(self._function(x)[kept.free])
-                except np.linalg.LinAlgError:
-                    return None
-            wanted = np.where(free, x > self._lower, self._function(x) < -TOLERANCE)
-            if np.array_equal(wanted, free):
-                found = self._on_set(x)
-                if found is not None:
-                    return found
-            key = wanted.tobytes()
-        return None
-
     def _improved(self, start: Array) -> Array | None:
         """Return the solution by some digits after each other; None where they do not come."""
         x, least = start.copy(), max(CLOSE, self._tolerance)
@@ -407,17 +295,8 @@ class Inequality:
         within = x > self._lower
         return (within & (x < self._upper) if self._bounded_above else within).tobytes()
 
-    def _holds(self, x: Array, f: Array, bounded: Indices) -> bool:
-        """Return whether the residuals of unknowns at their bounds have the right signs."""
-        if not len(bounded):
-            return True
-        signed = f[bounded]
-        if self._bounded_above:
-            signed = np.where(x[bounded] == self._lower[bounded], signed, -signed)
-        return bool(signed.min() >= 0)
-
-    def _by_snes(self, start: Array, line_search: bool, most: int | None = None) -> Array:
-        snes = self._searching if line_search else self._full_steps
+    def _by_snes(self, start: Array, most: int | None = None) -> Array:
+        snes = self._snes = self._snes or self._make()
         x: Array = start.copy()
         self.singular = False
         limit = snes.getTolerances()[3]

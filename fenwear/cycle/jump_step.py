@@ -151,8 +151,6 @@ class Stepper:
         check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
         self.contact = system.phase_contact(range(len(system.motion.phases)))
-        if isinstance(self.contact, CondensedContact):
-            self.contact.follows = not system.constant_coefficients
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
         self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]

@@ -75,7 +75,7 @@ print((DATA / "block_on_ring_1.csv").read_text()[:620])
 # %%
 model = Model(case)
 for distance, published in ((800, 16.155), (1600, 25.709)):
-    depth = 1e3 * evaluate(model, parse_quantity(f"depth after {distance} m"), {})[0]
+    depth = 1e3 * evaluate(model, parse_quantity(f"largest_depth after {distance} m"), {})[0]
     area = 2e-9 * 65 / 6 * 1e3 * distance
     rigid = 1e3 * (1.5 * 20 * area) ** (2 / 3) / 40
     print(f"{distance:5} m: fenwear {depth:.3f} µm, published {published} µm, rigid {rigid:.3f} µm")
@@ -134,7 +134,7 @@ print(*LeastSquares(case, [tests[2]], both, baseline=["offset"]).cannot_tell())
 generator = np.random.default_rng(1)
 drawn = float(np.exp(np.log(2e-9) + 0.12 * generator.standard_normal()))
 check = ["punch.loads.0.force.1=-130"]
-depth = parse_quantity("depth after 1600 m")
+depth = parse_quantity("largest_depth after 1600 m")
 measured = evaluate(model, depth, {"wear.punch.coefficient": drawn}, check)[0] + 1e-3 * generator.standard_normal()
 low, middle, high = scatter.marginals[0].ppf([0.025, 0.5, 0.975])
 expected = [1e3 * evaluate(model, depth, {"wear.punch.coefficient": k}, check)[0] for k in (low, middle, high)]
@@ -149,7 +149,7 @@ print(f"made-up measurement {1e3 * measured:.1f} µm; expected {expected[1]:.1f}
 
 # %%
 keys = ["wear.punch.coefficient", "punch.loads.0.force.1", "geometry.parameters.radius", "materials.steel.young"]
-depths = sensitivity(case, ["depth after 3600 m"], keys)
+depths = sensitivity(case, ["largest_depth after 3600 m"], keys)
 print(depths[0].text())
 tornado(depths)
 
@@ -164,7 +164,7 @@ tornado(depths)
 
 # %%
 inputs = scatter.and_also(parse_scatter(case, "punch.loads.0.force.1=normal(-65 N, 10 %)"))
-life = lifetime(case, "distance until depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6)
+life = lifetime(case, "distance until largest_depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6)
 print(life.text())
 life_figure(life)
 
@@ -189,6 +189,6 @@ print(f"{held.sum()} of {len(held)} intervals hold the truth; the coefficient is
 #
 #     fenwear calibrate block_on_ring.toml block_on_ring_*.csv --unknown wear.punch.coefficient --baseline offset \
 #         --each -o rings
-#     fenwear sensitivity block_on_ring.toml --of "depth after 3600 m" --to wear.punch.coefficient --to contact.friction
-#     fenwear life block_on_ring.toml --until "distance until depth 0.03 mm" --from rings \
+#     fenwear sensitivity block_on_ring.toml --of "largest_depth after 3600 m" --to wear.punch.coefficient --to contact.friction
+#     fenwear life block_on_ring.toml --until "distance until largest_depth 0.03 mm" --from rings \
 #         --scatter "punch.loads.0.force.1=normal(-65 N, 10 %)" -o lives

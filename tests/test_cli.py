@@ -54,6 +54,9 @@ def test_steady_json(fenwear: Run, assembled: Callable[..., Tribosystem]) -> Non
     state = steady(assembled("example1"))
     np.testing.assert_allclose(found["pressure_plus"], state.pressure[0], atol=1e-9 * MEAN)
     np.testing.assert_allclose(found["shape"], state.shape, atol=1e-9 * np.ptp(state.shape))
+    np.testing.assert_allclose(found["normal_force"], 1e4, rtol=1e-9)
+    np.testing.assert_allclose(found["friction_force"], 0.25 * 1e4, rtol=1e-9)
+    assert found["nominal_pressure"] == pytest.approx(MEAN, rel=1e-9)
 
 
 def test_texts(fenwear: Run) -> None:

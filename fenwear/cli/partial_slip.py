@@ -9,6 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case
+from fenwear.cycle.totals import approach
 from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
@@ -71,7 +72,7 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
     solid = case.model.kind == "solid"
     pair, weights = problem.interface.middle.pair, problem.weights
     x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
-    scar = x[found.depth > 0]
+    scar, seen = x[found.depth > 0], np.einsum("id,id->i", pair.normal, approach(problem.interface.middle.rigid))
     names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
     places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}
     numbers = {
@@ -84,6 +85,7 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
         names[1]: float(weights @ found.depth),
         names[1].replace("_mm", "_between_mm"): found.volume,
         "largest_pressure_MPa": float(found.pressure.max()),
+        "normal_force_N": case.model.thickness * float((weights * found.pressure) @ seen),
         **places,
         "pressure": found.pressure.tolist(),
         "depth": found.depth.tolist(),
@@ -110,7 +112,7 @@ def final_text(numbers: dict[str, Any]) -> str:
     depth = _between(1e3 * numbers["largest_depth_mm"], 1e3 * np.array(numbers["largest_depth_between_mm"]))
     worn = _between(numbers[f"{what}_{unit}"], np.array(numbers[f"{what}_between_{unit}"]))
     return (
-        f"  the stick zone, {stick}, carries all of the load in the end\n"
+        f"  the stick zone, {stick}, carries all of the load in the end, {numbers['normal_force_N']:.5g} N\n"
         f"  {scar}, {depth} µm deep in both bodies together, {worn} {'mm³' if solid else 'mm²'}:\n"
         "  as far as the nodes tell where the stick zone ends\n"
         f"  largest pressure {numbers['largest_pressure_MPa']:.4g} MPa, at the edges of the stick zone: "

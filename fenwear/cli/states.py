@@ -30,6 +30,8 @@ StepOption = Annotated[
     ),
 ]
 
+CARRIED = {"normal_force": "load", "friction_force": "friction force", "friction_torque": "torque of friction"}
+SIZES = ("contact_width", "contact_area", "mean_pressure")
 FOLLOWED = 16  # phases a cycle, up to which the way to the steady state is sought: with many it takes minutes
 
 
@@ -67,7 +69,7 @@ def steady_command(
         system = with_reduced_heat(system, keep=True, fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    found = state.system
+    found, forces = state.system, _forces(state)
     gain = heat_gain(with_reduced_heat(found), state.phase_pressure, None if state.heat is None else state.heat.end)
     warnings = [
         *system.bodies.remarks,
@@ -79,7 +81,7 @@ def steady_command(
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
-        _print_steady(case, found, state, of_step[1] if of_step else "")
+        _print_steady(case, state, forces, of_step[1] if of_step else "")
     uncertain: dict[str, Any] = {}
     if accuracy:
         uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), uncertain)
@@ -109,7 +111,7 @@ def steady_command(
             "growth_rate_per_s": None if math.isnan(rate) else rate,
             "complementarity_error": state.complementarity_error,
             "heat_gain": gain,
-            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
+            **{name: values for name, (_, values) in forces.items()},
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
@@ -164,6 +166,20 @@ def _held_json(of_step: tuple[Case, str] | None) -> dict[str, str]:
     return {} if of_step is None else {"of": of_step[1]}
 
 
+def _forces(state: SteadyState) -> dict[str, tuple[str, Any]]:
+    """Return what the contact carries in each half-cycle of a state, by names: the unit, and values; collective."""
+    from fenwear.cycle.steady_cycle import cycle_of_state
+    from fenwear.results.registry import quantities_of
+    from fenwear.results.summary import nominal_pressure
+
+    known, records = quantities_of(state.system), cycle_of_state(state)
+    found = {
+        name: (known[name].unit, known[name].compute(records).tolist()) for name in (*SIZES, *CARRIED) if name in known
+    }
+    nominal = nominal_pressure(state.system, state.system.normal_force)
+    return found if nominal is None else {**found, "nominal_pressure": ("MPa", nominal)}
+
+
 def coordinates(system: Tribosystem) -> dict[str, Any]:
     """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
     if system.case.model.kind == "plane":
@@ -173,25 +189,24 @@ def coordinates(system: Tribosystem) -> dict[str, Any]:
     return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
-def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str) -> None:
-    """Print the state as soon as it is there: the way to it may take longer.
-
-    The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.
-    """
+def _print_steady(case: str, state: SteadyState, forces: dict[str, tuple[str, Any]], step: str) -> None:
+    """Print the state as soon as it is there: the way to it may take longer."""
     from fenwear.cycle.state import pressure_scale
     from fenwear.results.degrees import degrees_of
-    from fenwear.results.scar import conforming
 
     show(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     if step:
         show(f"  of {step}")
+    system = state.system
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
     words, moves = system.direction_words, "turns" if any(system.sliding.field.turn) else "moves"
-    for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
+    for k, (d, p, width) in enumerate(zip(state.directions, state.pressure, state.contact_width, strict=True)):
         show(f"  strip {moves} {words[d]:9} largest pressure {p.max():8.3f} MPa, "
-              f"contact {part.format(width)}")  # fmt: skip
-    if conforming(system.pair):
-        show(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
+              f"mean {forces['mean_pressure'][1][k]:.3f} MPa, contact {part.format(width)}")  # fmt: skip
+        own = [f"{what} {forces[name][1][k]:.5g} {forces[name][0]}" for name, what in CARRIED.items() if name in forces]
+        show(f"    {', '.join(own)}")
+    if "nominal_pressure" in forces:
+        show(f"  nominal pressure {forces['nominal_pressure'][1]:.4f} MPa: load over the projected area")
     scale = pressure_scale(system, state.phase_pressure)
     show(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
     wear, surface = 1e3 * state.wear_per_cycle, system.pair.weights * (state.wear_per_cycle > 0)

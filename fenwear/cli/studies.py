@@ -24,7 +24,8 @@ from fenwear.cli.base import (
 from fenwear.errors import StackError
 
 QuantitiesOption = Annotated[
-    list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
+    list[str],
+    typer.Option("--of", metavar="QUANTITY", help='Such as largest_depth, "steady largest_pressure"; may be repeated.'),
 ]
 OutputOption = Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")]
 OnlyOption = Annotated[list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")]
@@ -162,8 +163,8 @@ def life_command(
     until: Annotated[
         list[str],
         typer.Option(
-            help='A level: "depth 0.2 mm", "distance until volume 3 mm^3", "depth in left 5 um" of the contact left; '
-            "repeatable: until the first."
+            help='A level: "largest_depth 0.2 mm", "distance until worn_volume 3 mm^3", "largest_depth in left 5 um" of '
+            "the contact left; repeatable: until the first."
         ),
     ],
     scatters: Annotated[

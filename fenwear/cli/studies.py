@@ -163,8 +163,8 @@ def life_command(
     until: Annotated[
         list[str],
         typer.Option(
-            help='A level: "largest_depth 0.2 mm", "distance until worn_volume 3 mm^3", "largest_depth in left 5 um" of '
-            "the contact left; repeatable: until the first."
+            help='A level: "largest_depth 0.2 mm", "distance until worn_volume 3 mm^3", "largest_depth in left 5 um" '
+            "of the contact left; repeatable: until the first."
         ),
     ],
     scatters: Annotated[

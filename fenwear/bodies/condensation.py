@@ -134,16 +134,16 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
     if any(one.thermal_coupling is not None and one.directions is None for one in requests):
         raise ValueError("the response to temperature needs one direction for each pattern")
     comm = requests[0].elastic.body.mesh.comm
-    if not keep or comm.bcast(kept.limit()) == 0:
+    if not keep:
         return _condensed(requests)
-    keys = [kept.common_key(comm, [kept.surroundings(), *one.identity()]) for one in requests]
-    stored = [None if fresh else kept.load(comm, key) for key in keys]
-    computed = iter(_condensed([one for one, found in zip(requests, stored, strict=True) if found is None]))
+    places = [kept.known(comm, one.identity, fresh=fresh) for one in requests]
+    both = list(zip(requests, places, strict=True))
+    computed = iter(_condensed([one for one, place in both if place.arrays is None]))
     condensed = []
-    for one, key, found in zip(requests, keys, stored, strict=True):
-        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found)
-        if found is None:
-            kept.save(comm, key, body.arrays())
+    for one, place in both:
+        body = next(computed) if place.arrays is None else CondensedBody(one.patterns, one.along, **place.arrays)
+        if place.arrays is None:
+            place.save(body.arrays())
         condensed.append(body)
     return condensed
 

@@ -1,23 +1,18 @@
 """What takes long to compute, kept on disk under a key of all that it follows from, for the next start.
 
-Files are written under another name and then renamed, so that no other process sees a part of one; each
-is read as a whole and checked by its checksums. What cannot be read is computed again, and what cannot be
-written is told once: a kept file saves time and decides nothing.
+Files are written under another name and then renamed, so that no other process sees a part of one. A file that cannot be
+read is computed again, and one that cannot be written is mentioned once: a kept file saves time and decides nothing.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
-import mmap
 import os
-import struct
 import sys
-import time
 import zipfile
-import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -31,7 +26,7 @@ from fenwear.errors import CaseError, InputError
 
 LIMIT = "FENWEAR_KEPT_GIB"  # environment variable: GiB of all files together; 0 keeps nothing
 DEFAULT = 4.0
-ABANDONED = 3600.0  # s, after which a file that was never renamed belongs to a process that is gone
+Arrays = Mapping[str, Array]
 
 _told: list[str] = []
 
@@ -57,18 +52,13 @@ def limit() -> int:
     return int(size * 2**30)
 
 
-def files() -> list[Path]:
-    """Return what is kept, the longest unused first."""
+def files() -> list[tuple[Path, int]]:
+    """Return what is kept and its sizes (bytes), the longest unused first."""
     dated = []
-    for path in folder().glob("*.npz"):
+    for path in folder().glob("*.*"):
         with suppress(OSError):  # removed meanwhile
-            dated.append((path.stat().st_mtime, path))
-    return [path for _, path in sorted(dated)]
-
-
-def size() -> int:
-    """Return the number of bytes of all that is kept."""
-    return sum(_bytes(path) for path in folder().glob("*.npz"))
+            dated.append((path.stat().st_mtime, path, path.stat().st_size))
+    return [(path, size) for _, path, size in sorted(dated)]
 
 
 def summary() -> dict[str, Any]:
@@ -77,35 +67,13 @@ def summary() -> dict[str, Any]:
     Raises:
         CaseError: the limit is no number.
     """
-    found = files()
-    occupied = sum(_bytes(path) for path in found)
-    return {
-        "folder": str(folder()),
-        "files": len(found),
-        "MiB": round(occupied / 2**20, 1),
-        "limit_MiB": limit() / 2**20,
-    }
-
-
-def common_key(comm: MPI.Comm, parts: Iterable[object]) -> str:
-    """Return the key of what follows from these parts on these ranks, the same on all of them; collective.
-
-    Args:
-        comm: The ranks.
-        parts: Of this rank: arrays, or what has a text that tells all of it.
-    """
-    digest = hashlib.blake2b(digest_size=20)
-    for part in parts:
-        if isinstance(part, np.ndarray):
-            digest.update(f"{part.dtype.str}{part.shape}".encode())
-            digest.update(np.ascontiguousarray(part).tobytes())
-        else:
-            digest.update(f"|{part}|".encode())
-    return hashlib.blake2b("".join(comm.allgather(digest.hexdigest())).encode(), digest_size=20).hexdigest()
+    sizes = [size for _, size in files()]
+    found = {"folder": str(folder()), "files": len(sizes), "MiB": round(sum(sizes) / 2**20, 1)}
+    return {**found, "limit_MiB": limit() / 2**20}
 
 
 @cache
-def surroundings() -> str:
+def _surroundings() -> str:
     """Return what else decides the last bits of results: the versions of all parts, and the number of threads."""
     from fenwear.versions import versions
 
@@ -117,97 +85,69 @@ def surroundings() -> str:
     return f"{sorted(versions().items())} {sources.hexdigest()} {threads}"
 
 
-def load(comm: MPI.Comm, key: str) -> dict[str, Array] | None:
-    """Return this rank's arrays under a key; None unless every rank has its own; collective."""
-    path = _path(comm, key)
-    found: dict[str, Array] | None = None
-    try:
-        found = _mapped(path)
-        os.utime(path)
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, EOFError, struct.error, zipfile.BadZipFile):  # broken, or not to be read
-        with suppress(OSError):
-            path.unlink()
-    return found if comm.allreduce(found is not None, op=MPI.LAND) else None
+def known(comm: MPI.Comm, parts: Callable[[], Iterable[object]], *, fresh: bool = False) -> Kept:
+    """Return what is kept of these parts on these ranks; collective.
 
-
-def save(comm: MPI.Comm, key: str, arrays: Mapping[str, Array]) -> None:
-    """Keep this rank's arrays under a key, and let go what was unused longest; collective."""
-    needed = comm.allreduce(sum(array.nbytes for array in arrays.values()))
-    if needed > limit():
-        return
-    failed = comm.gather(_write(_path(comm, key), arrays))
-    if failed is None:  # not rank 0
-        return
-    error = next((text for text in failed if text), None)
-    if error and not _told:
-        _told.append(error)
-        print(f"fenwear: set-ups are not kept in {folder()}: {error}; {LIMIT}=0 keeps none", file=sys.stderr)
-    _prune()
-
-
-def _path(comm: MPI.Comm, key: str) -> Path:
-    return folder() / f"{key}-{comm.rank}of{comm.size}.npz"
-
-
-def _mapped(path: Path) -> dict[str, Array]:
-    """Return the arrays of a file as it lies on the disk, which is not copied into memory before they are changed.
+    Args:
+        comm: The ranks.
+        parts: Returns all of this rank that it follows from: arrays, or what has a text that tells all of it.
+        fresh: Whether to take nothing that is kept.
 
     Raises:
-        OSError, ValueError, BadZipFile: the file is broken or cannot be read.
+        CaseError: the limit is no number.
     """
-    found = {}
-    with zipfile.ZipFile(path) as archive, path.open("rb") as file:
-        whole = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
-        for member in archive.infolist():
-            file.seek(member.header_offset + 26)  # lengths of its name and of what follows that, then both
-            begin = file.tell() + 4 + sum(struct.unpack("<HH", file.read(4)))
-            stored = whole[begin : begin + member.file_size]
-            if member.compress_type != zipfile.ZIP_STORED or zlib.crc32(stored) != member.CRC:
-                raise zipfile.BadZipFile(member.filename)
-            file.seek(begin)
-            if np.lib.format.read_magic(file) != (1, 0):  # type: ignore[no-untyped-call]
-                raise ValueError(member.filename)
-            shape, in_columns, kind = np.lib.format.read_array_header_1_0(file)  # type: ignore[no-untyped-call]
-            values = np.frombuffer(stored, kind, math.prod(shape), file.tell() - begin)
-            found[member.filename.removesuffix(".npy")] = values.reshape(shape, order="F" if in_columns else "C")
-    return found
+    if comm.bcast(limit()) == 0:
+        return Kept(comm)
+    digest = hashlib.blake2b(_surroundings().encode(), digest_size=20)
+    for part in parts():
+        array = isinstance(part, np.ndarray)
+        digest.update(f"{part.dtype.str}{part.shape}".encode() if array else f"|{part}|".encode())
+        digest.update(np.ascontiguousarray(part).tobytes() if array else b"")
+    key = hashlib.blake2b("".join(comm.allgather(digest.hexdigest())).encode(), digest_size=20).hexdigest()
+    path, arrays = folder() / f"{key}-{comm.rank}of{comm.size}.npz", None
+    if not fresh:
+        with suppress(OSError, ValueError, EOFError, zipfile.BadZipFile), np.load(path) as stored:  # absent, or broken
+            arrays = dict(stored.items())
+            os.utime(path)
+    return Kept(comm, path, arrays if comm.allreduce(arrays is not None, op=MPI.LAND) else None)
 
 
-def _write(path: Path, arrays: Mapping[str, Array]) -> str | None:
-    """Write a file; return what went wrong, in words."""
-    temporary: Path | None = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-            temporary = Path(file.name)
-            np.savez(file, **{name: np.asarray(array) for name, array in arrays.items()})  # type: ignore[arg-type]
-        temporary.replace(path)
-    except OSError as error:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
-        return error.strerror or "cannot be written"
-    return None
+@dataclass(frozen=True)
+class Kept:
+    """A place for this rank's arrays.
+
+    Attributes:
+        comm: The ranks.
+        path: Of the file; None where nothing is kept.
+        arrays: What is kept there; None unless every rank has its own.
+    """
+
+    comm: MPI.Comm
+    path: Path | None = None
+    arrays: Arrays | None = None
+
+    def save(self, arrays: Arrays) -> None:
+        """Keep this rank's arrays, and let go what was unused longest; collective."""
+        if self.path is None or self.comm.allreduce(sum(array.nbytes for array in arrays.values())) > limit():
+            return
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with NamedTemporaryFile(dir=self.path.parent, suffix=".tmp") as file:
+                np.savez(file, **{name: np.asarray(array) for name, array in arrays.items()})  # type: ignore[arg-type]
+                file.flush()
+                os.link(file.name, part := self.path.with_suffix(f".{os.getpid()}"))
+                part.replace(self.path)
+        except OSError as error:
+            if not _told:
+                _told.append(str(error))
+                text = f"set-ups are not kept in {folder()}: {error.strerror}; {LIMIT}=0 keeps none"
+                print(f"fenwear: {text}", file=sys.stderr)
+        found = files()
+        rest = sum(size for _, size in found) - limit()
+        for path, size in found:
+            if rest > 0:
+                rest -= size
+                path.unlink(missing_ok=True)
 
 
-def _prune() -> None:
-    """Remove the longest unused files above the limit, and what killed processes have left."""
-    now, rest = time.time(), size() - limit()
-    for path in files() if rest > 0 else ():  # which looks at each once more, to sort them
-        if rest <= 0:
-            break
-        rest -= _bytes(path)
-        with suppress(OSError):
-            path.unlink()
-    for path in folder().glob("*.tmp"):
-        with suppress(OSError):
-            if now - path.stat().st_mtime > ABANDONED:
-                path.unlink()
-
-
-def _bytes(path: Path) -> int:
-    with suppress(OSError):
-        return path.stat().st_size
-    return 0
+NOWHERE = Kept(MPI.COMM_SELF)

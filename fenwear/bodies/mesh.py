@@ -204,32 +204,21 @@ def _meshed(
     """Return the meshes of the punch and the strip: those kept on disk, or gmsh's, which are kept; on one rank."""
     parameters = _parameters(geometry, path, known)
     content = path.read_bytes()
-    keep = kept.limit() > 0 and path.suffix in (".geo", ".msh", *CAD)
-    keep = keep and not (path.suffix == ".geo" and REACHES_OUT.search(content))
+    keep = path.suffix in (".geo", ".msh", *CAD) and not (path.suffix == ".geo" and REACHES_OUT.search(content))
     sizes = (geometry.size, sorted(geometry.sizes.items()), geometry.unit, sorted(geometry.groups.items()))
     shape = (geometry.order, geometry.degree, kind, names, path.suffix, sorted(parameters.items()), sizes)
-    key = kept.common_key(MPI.COMM_SELF, [kept.surroundings(), *shape, content]) if keep else ""
-    stored = kept.load(MPI.COMM_SELF, key) if keep and not fresh else None
-    if stored is not None:
-        _check_size(float(stored.pop("contact_nodes")))
-        punch, strip = (
-            RawMesh.of_arrays(
-                {name.removeprefix(body): array for name, array in stored.items() if name.startswith(body)}
-            )
-            for body in BODIES
-        )
-        return punch, strip
+    place = kept.known(MPI.COMM_SELF, lambda: [*shape, content], fresh=fresh) if keep else kept.NOWHERE
+    if (stored := place.arrays) is not None:
+        _check_size(float(stored["contact_nodes"]))
+        own = [{name.removeprefix(body): a for name, a in stored.items() if name.startswith(body)} for body in BODIES]
+        return RawMesh.of_arrays(own[0]), RawMesh.of_arrays(own[1])
     foreign = foreign_mesh(geometry, path, kind, names)
     with gmsh_model() as gmsh:
         contact_nodes = _load(gmsh, geometry, path, kind, parameters, names, foreign)
         punch, strip = (raw_mesh(gmsh, body, _dim(kind)) for body in BODIES)
-    if keep:
-        arrays = {
-            f"{body}{name}": a
-            for body, raw in zip(BODIES, (punch, strip), strict=True)
-            for name, a in raw.arrays().items()
-        }
-        kept.save(MPI.COMM_SELF, key, {**arrays, "contact_nodes": np.array(contact_nodes)})
+    both = zip(BODIES, (punch, strip), strict=True)
+    arrays = {f"{body}{name}": a for body, raw in both for name, a in raw.arrays().items()}
+    place.save({**arrays, "contact_nodes": np.array(contact_nodes)})
     return punch, strip
 
 

@@ -34,19 +34,20 @@ def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> Reduced
     """
     body: HeatBody = steps[0].body
     comm = body.body.mesh.comm
-    if comm.bcast(kept.limit()) == 0:
-        return make()
-    parts = ["reduced temperatures", kept.surroundings(), body.body.mesh.geometry.x]
-    for argument in (*make.args[1:], *make.keywords.values()):
-        parts += _parts(argument)
-    for step in steps:
-        parts += [*step.a.getValuesCSR(), *step.b.getValuesCSR(), step.source, step.carried, step.entering]
-    key = kept.common_key(comm, [*parts, body.initial(), body.held, body.storage, body.convected])
-    found = None if fresh else kept.load(comm, key)
-    if found is not None:
-        return ReducedBasis(body, found["lift"], found["columns"])
+
+    def parts() -> Iterator[object]:
+        yield from ("reduced temperatures", body.body.mesh.geometry.x)
+        for argument in (*make.args[1:], *make.keywords.values()):
+            yield from _parts(argument)
+        for step in steps:
+            yield from (*step.a.getValuesCSR(), *step.b.getValuesCSR(), step.source, step.carried, step.entering)
+        yield from (body.initial(), body.held, body.storage, body.convected)
+
+    place = kept.known(comm, parts, fresh=fresh)
+    if place.arrays is not None:
+        return ReducedBasis(body, place.arrays["lift"], place.arrays["columns"])
     basis = make()
-    kept.save(comm, key, {"lift": basis.lift, "columns": basis.columns})
+    place.save({"lift": basis.lift, "columns": basis.columns})
     return basis
 
 

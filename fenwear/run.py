@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -71,6 +71,9 @@ from fenwear.sliding.motion import DEFAULT_POSITIONS
 ACROSS = 0.3  # over what it goes along the sliding: a side of a facet that leads along it
 EVEN = 1e-2  # of the range of a profile: a change from node to node that is none
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
+if TYPE_CHECKING:
+    from fenwear.run_until import RunLevel
+
 BLOCK_SECONDS = 2.0  # after which a block ends
 
 
@@ -216,6 +219,7 @@ class _Run:
         self.start = start
         self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
+        self._level = _level_of(self.case)
         self.extremes = {} if start is None else checkpoint.extremes(directory, self.comm)  # of all half-cycles so far
         self.numbers: dict[str, float] = {}
         self.warnings: list[str] = []
@@ -293,10 +297,21 @@ class _Run:
         return lookout.block_over
 
     def _blocks(self) -> Iterator[Block]:
-        for block in follow_program(self.system, self._integrate, self._last, self.start):
-            yield block
-            if block.end.half_cycle >= self._last:  # meshes that nothing more is computed on need not follow
-                return
+        start, last = self.start, self._last
+        while last:
+            last, end = 0, last
+            for block in follow_program(self.system, self._integrate, end, start):
+                at = 0 if self._level is None else self.comm.bcast(self._level.see(block))
+                reached = int(block.end.half_cycle)
+                if 0 < at < reached:  # a jump went beyond the level: made again, up to it
+                    start, last = self.state if self.state.half_cycle else self.start, at
+                    break
+                yield block
+                if at or reached >= self._last:  # meshes that nothing more is computed on need not follow
+                    return
+                if reached >= end:  # not quite at the level yet
+                    start, last = block.end, min(reached + self.system.motion.half_cycles, self._last)
+                    break
 
     @property
     def _last(self) -> int:
@@ -309,6 +324,8 @@ class _Run:
     ) -> Iterator[Block]:
         run = self.case.run
         course: dict[str, Any] = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
+        if self._level is not None:
+            course["block"] = system.motion.half_cycles
         course["periodic_within"] = span.periodic_within(run.periodic_within)
         return integrate(system, run.integration, span, run.jump_tolerance, **course)
 
@@ -393,6 +410,12 @@ class _Run:
             return []
         texts = unique_text(np.concatenate(self.unique)), sliding_text(self.last), passing_text(self.last)
         found = [text for text in texts if text]
+        level = self._level
+        if level is not None and not level.reached:
+            found.append(
+                f"run.until: {self.case.run.until} is not reached by half-cycle {self.state.half_cycle:,}: it is "
+                f"{level.value:.4g} {level.quantity.level_unit}. Increase `run.half_cycles`"
+            )
         for warning in found:
             self.log(f"warning: {warning}")
         return found
@@ -401,6 +424,8 @@ class _Run:
         """Return how the half-cycles ended."""
         if failure is not None:
             return str(failure)
+        if self._level is not None and self._level.reached:
+            return f"{self.case.run.until} is reached"
         return "all half-cycles done" if self.state.half_cycle >= self._last else "periodic"
 
     def results_so_far(self, failure: Exception) -> str:
@@ -421,12 +446,30 @@ class _Run:
         self._save()
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
             self._write_fields(self.last)
+        if self._level is not None:
+            how = {**how, "until": self._until(self._level)}
         reason = self._note_growth(self.last)
         if reason:
             how = {**how, "no_growth_rate": reason}
         summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         return summary
+
+    def _until(self, level: RunLevel) -> dict[str, Any]:
+        """Return when the level that ends the run is reached, and log it."""
+        half_cycle = self.state.half_cycle
+        found = {
+            "level": self.case.run.until,
+            "reached": level.reached,
+            "value": level.value,
+            "cycles": half_cycle / self.system.motion.half_cycles,
+            "distance_mm": float(self.state.totals.of("distance")),
+            "time_s": float(self.system.time(np.array(half_cycle))),
+        }
+        if level.reached:
+            way = f"{found['distance_mm'] / 1e3:.5g} m, {found['time_s']:.5g} s"
+            self.log(f"{self.case.run.until} is reached after {found['cycles']:,.6g} cycles, {way}")
+        return found
 
     def tell_more(self, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
         """Tell the uncertainty of what is written, draw it, and return the summary with it; collective."""
@@ -470,6 +513,15 @@ class _Run:
         else:
             self.log(f"no growth rate of disturbances: {reason}")
         return reason
+
+
+def _level_of(case: Case) -> RunLevel | None:
+    """Return what ends a run at a level of a quantity; None where nothing does."""
+    if not case.run.until:
+        return None
+    from fenwear.run_until import RunLevel  # with all that studies need
+
+    return RunLevel(case)
 
 
 def position_warnings(system: Tribosystem) -> list[str]:

@@ -26,6 +26,11 @@ class Run(Part):
         default=None,
         description="stop when pressure repeats within this fraction of its scale; of a program within its last step",
     )
+    until: str = Field(
+        default="",
+        description='stop at a level: "depth 0.1 mm", "depth of both 5 um", "volume of strip 2 mm^3", "depth in left '
+        '10 um" of a named contact, "approach 0.05 mm" of the bodies',
+    )
 
 
 @dataclass(frozen=True)

@@ -187,7 +187,7 @@ def life_command(
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Print the distribution of the life of parts whose keys scatter."""
+    """Print how long until a level: one life, or with --scatter the distribution of the lives of many parts."""
     from fenwear.life import commands
 
     loaded = load(case, settings)

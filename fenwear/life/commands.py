@@ -17,10 +17,11 @@ from fenwear.life.between_tests import between, between_as_json
 from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import read_data
 from fenwear.life.keys import with_values
-from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
+from fenwear.life.lifetime import SAMPLES, Lifetime, Lives, lifetime
 from fenwear.life.model import Model
 from fenwear.life.pictures import life_figure, residuals, save, tornado
-from fenwear.life.quantities import cycles_of, parse_amount, parse_quantity, unit_of
+from fenwear.life.quantities import Quantity, cycles_of, lives, of_case, parse_amount, parse_quantity, unit_of
+from fenwear.life.ranks import everywhere
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
 from fenwear.life.unknowns import parse_unknown
@@ -201,17 +202,22 @@ def run_life(
     *,
     resume: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
-) -> tuple[Lifetime, Path]:
-    """Compute lives; write samples.csv, life.json and life.png; collective."""
+) -> tuple[Lifetime | Lives, Path]:
+    """Compute lives; write samples.csv, life.json and life.png; collective.
+
+    Without any scatter it is one life, in life.json.
+    """
     quantities = [parse_quantity(one, "--until", case.names) for one in until]
     scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         one = parse_scatter(case, text)
         scatter = one if scatter is None else scatter.and_also(one)
     if scatter is None:
-        raise CaseError(
-            InputError("--scatter", "expected the distribution of at least one key, or --from a calibration")
-        )
+        if resume or wanted is not None:
+            option = "--resume" if resume else "--wanted"
+            message = f"expected {option} with --scatter KEY=KIND(A, B), or --from a calibration, only"
+            raise CaseError(InputError(option, message))
+        return _one_life(case, name, quantities, output, log, comm)
     scatter.check(case)
     _tell_of_stick(case, log, comm)
     if resume and output is None:
@@ -233,6 +239,20 @@ def run_life(
         save(life_figure(found), folder / "life.png")
 
     on_root(comm, write)
+    return found, folder
+
+
+def _one_life(
+    case: Case, name: str, quantities: Sequence[Quantity], output: Path | None, log: Log, comm: MPI.Comm
+) -> tuple[Lives, Path]:
+    """Return the lives until each level of a case whose keys do not scatter, and write them; collective."""
+    _tell_of_stick(case, log, comm)
+    asked = [of_case(one, case, "--until") for one in quantities]
+    folder = _folder(output, "life", name, comm)
+    on_root(comm, lambda: write_case(folder, case))
+    values = everywhere(comm, lambda: lives(Model(case), asked, {}).tolist())
+    found = Lives(tuple(one.text for one in asked), tuple(one.unit for one in asked), tuple(values))
+    on_root(comm, lambda: write_text(folder / "life.json", json.dumps(found.as_json(), indent=1)))
     return found, folder
 
 

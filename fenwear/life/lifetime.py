@@ -51,6 +51,39 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Lives:
+    """Lives of one part, whose keys do not scatter.
+
+    Attributes:
+        quantities: What was counted.
+        units: Of the lives; "" for cycles.
+        values: The lives; infinite where a level is never reached.
+    """
+
+    quantities: tuple[str, ...]
+    units: tuple[str, ...]
+    values: tuple[float, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what --json prints and life.json holds."""
+        rows = zip(self.quantities, self.units, self.values, strict=True)
+        return {
+            "lives": [
+                {"quantity": text, "unit": unit or "cycles", "value": value if np.isfinite(value) else None}
+                for text, unit, value in rows
+            ]
+        }
+
+    def text(self) -> str:
+        """Return a line for each."""
+        rows = zip(self.quantities, self.units, self.values, strict=True)
+        return "\n".join(
+            f"{text}: {value:.6g} {unit or 'cycles'}" if np.isfinite(value) else f"{text}: never"
+            for text, unit, value in rows
+        )
+
+
+@dataclass(frozen=True)
 class Lifetime:
     """Lives of a sample.
 

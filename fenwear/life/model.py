@@ -213,7 +213,7 @@ class Model:
             told=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),
         )
         for block in blocks:
-            snapshot = replace(_of_block(block), renewals=tuple(renewals))
+            snapshot = replace(snapshot_of(block), renewals=tuple(renewals))
             renewals.clear()
             yield snapshot
             if until(snapshot):
@@ -375,7 +375,7 @@ def cycle_of(end: Block | SteadyCycle) -> Totals:
     return Totals(*(rows[-strokes:].sum(axis=0) for rows in (adds.sums, adds.energy, adds.pressure)))
 
 
-def _of_block(block: Block) -> Snapshot:
+def snapshot_of(block: Block) -> Snapshot:
     """Return the end of the last cycle of a block."""
     system, contacts, end = block.system, joined(block.end.contacts), block.end
     strokes = system.motion.half_cycles

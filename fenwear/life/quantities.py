@@ -3,10 +3,11 @@
     wear of strip at 3 mm after 3600 m       steady largest_pressure
     cycles until largest_depth 0.2 mm        run_in_distance
 
-A quantity is written as: [steady] NAME [of punch|strip] [in CONTACT] [at X[, Y]] [after AMOUNT], or
-cycles|distance|time until NAME [of punch|strip] [in CONTACT] [at X[, Y] to] LEVEL, where CONTACT is one that has a
-name. NAME is that of the registry (`fenwear.results.registry`), by which runs compute it, too. In the plane a place is
-x, or the length along a curve; in rings r; in solids x and y, y being 0 by default.
+A quantity is written as: [steady] NAME [of punch|strip|both] [in CONTACT] [at X[, Y]] [after AMOUNT], or
+cycles|distance|time until NAME [of punch|strip|both] [in CONTACT] [at X[, Y] to] LEVEL, where CONTACT is one that has a
+name. `of both` is of both bodies together: what opens between them. `approach` is how far they have come nearer along
+z. NAME is that of the registry (`fenwear.results.registry`), by which runs compute it, too. In the plane a place is x,
+or the length along a curve; in rings r; in solids x and y, y being 0 by default.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import brentq
@@ -43,7 +44,17 @@ OLD_NAMES = {
     "run-in distance": "run_in_distance",
     "critical speed": "critical_speed",
 }
-GROWING = ("wear", "largest_depth", "worn_volume", "worn_area", "scar_width", "scar_length")  # that lives count to
+APPROACH, BOTH = "approach", "both"  # of the bodies along z; both bodies together
+OF_BOTH = ("wear", "largest_depth", "worn_volume")
+GROWING = (
+    "wear",
+    "largest_depth",
+    "worn_volume",
+    "worn_area",
+    "scar_width",
+    "scar_length",
+    APPROACH,
+)  # that lives count to
 OF_NODES = ("contact_width", "contact_area")  # what is counted in nodes
 LIVES = {"cycles": "", "distance": "mm", "time": "s"}
 WARMER = ("temperature_punch", "temperature_strip")  # the larger of which is the temperature at a place
@@ -95,6 +106,11 @@ class Quantity:
         return f"{self.text} ({self.unit or '-'})"
 
     @property
+    def level_unit(self) -> str:
+        """The unit of its level."""
+        return unit_of(self.name)
+
+    @property
     def of_strip(self) -> str:
         """How the names of what is the strip's end."""
         return "_strip" if self.body == "strip" else ""
@@ -108,13 +124,26 @@ class Quantity:
         own = self._own(snapshot)
         if self.name.startswith("lambda_"):
             return self._velocity(own)
+        if self.body == BOTH:
+            return self._of_both(own)
         known = registry.quantities_of(own.end.system)
+        if self.name == APPROACH:
+            moved = [self._registered(known, "moved_z", own), *filter(None, [known.get("moved_z_strip")])]
+            return float(sum(sign * one.of_cycle(own.end) for sign, one in zip((-1, 1), moved, strict=False)))
         if self.at is None:
             return float(self._registered(known, self.name + self.of_strip, own).of_cycle(own.end))
         fields = WARMER if self.name == "temperature" else (self.name + self.of_strip,)
         found = [self._registered(known, name, own) for name in fields]
         on_strip = found[0].dims[-1].endswith("_strip")
         return self._at_place(own, np.max([one.of_cycle(own.end) for one in found], axis=0), on_strip=on_strip)
+
+    def _of_both(self, snapshot: Snapshot) -> float:
+        """Return the volume worn off both bodies, or the depth that is worn off both between them."""
+        if self.name == "worn_volume":
+            return sum(replace(self, body=body).of_snapshot(snapshot) for body in ("punch", "strip"))
+        end: Any = snapshot.end
+        depth = end.system.pair.opening(end.wear[-1], end.wear_strip[-1])
+        return float(depth.max()) if self.at is None else self._at_place(snapshot, depth, on_strip=False)
 
     def _at_place(self, snapshot: Snapshot, values: Array, *, on_strip: bool) -> float:
         """Return what nodal values (n,) are at its place.
@@ -158,6 +187,8 @@ class Quantity:
     def rate(self, snapshot: Snapshot) -> float:
         """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
         own = self._own(snapshot)
+        if self.body == BOTH or self.name == APPROACH:
+            return float("nan")
         depth: Array = getattr(own.rate, self.body)
         if self.name == "worn_volume":
             return float(cycle_of(own.end).of(f"volume_{self.body}"))
@@ -174,7 +205,7 @@ class Quantity:
             CaseError: there is none, or its body's surface has none of this name.
         """
         own = snapshot.within(self.contact, self.text)
-        names = getattr(own.end.system.pair, self.body).names
+        names = getattr(own.end.system.pair, "punch" if self.body == BOTH else self.body).names
         if self.contact and self.contact not in names:
             raise CaseError(InputError(self.text, f"the surface of the {self.body} is not named by contacts"))
         return own
@@ -252,6 +283,8 @@ def _unknown(text: str, word: str) -> str:
 def registered_name(word: str, *, at_a_place: bool) -> str:
     """Return the registry's name of a quantity, of values at a place or of one number; "" where it has none."""
     name = OLD_NAMES.get(word, word)
+    if name == APPROACH:
+        return "" if at_a_place else name
     if at_a_place:
         field = registry.known(WARMER[0] if name == "temperature" else name)
         return "" if field is None or field.dims[1:] not in (("x",), ("x_strip",)) else name
@@ -262,6 +295,7 @@ def registered_name(word: str, *, at_a_place: bool) -> str:
 
 def registered(name: str, body: str = "punch") -> Registered:
     """Return what the registry has of a name; of the strip where the strip has its own."""
+    name = "moved_z" if name == APPROACH else name
     names = (f"{name}_strip", name) if body == "strip" else (name, f"{name}_punch")
     return next(found for one in names if (found := registry.known(one)) is not None)
 
@@ -270,6 +304,18 @@ def unit_of(name: str) -> str:
     """Return the unit of a quantity of the registry, as keys of a case are given."""
     unit = re.sub(r"(?<=m)(?=[23])", "^", registered(OLD_NAMES.get(name, name)).unit)
     return "" if unit == "1" else unit
+
+
+def parse_level(text: str, option: str, names: Names = BY_ROLE) -> Quantity:
+    """Return the quantity with a level that a text names, such as "depth 0.2 mm" or "approach 5 um".
+
+    Raises:
+        CaseError: it names none.
+    """
+    found = parse_quantity(text, option, names)
+    if found.kind != "life":
+        raise CaseError(InputError(option, f"expected a quantity with a level, such as 'depth 0.1 mm', got {text!r}"))
+    return found
 
 
 def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
@@ -296,10 +342,13 @@ def _place(
 ) -> tuple[str, tuple[float, ...] | None]:
     """Return the body and the place of a quantity."""
     body = names.role_of(match["body"] or "punch")
-    if body not in ("punch", "strip") or (
-        body == "strip" and (name == "temperature" or registry.known(f"{name}_strip") is None)
-    ):
-        message = "expected 'of punch', or 'of strip' behind what each body has"
+    wrong = {
+        "punch": False,
+        "strip": name == "temperature" or registry.known(f"{name}_strip") is None,
+        BOTH: name not in OF_BOTH,
+    }
+    if wrong.get(body, True) or (match["body"] and name == APPROACH):
+        message = "expected 'of punch', or 'of strip' or 'of both' behind what each body has"
         raise CaseError(InputError(option, names.told(f"{message}, such as wear and worn_volume, got {words!r}")))
     if match["contact"] and not registered(name, body).nodal:
         raise CaseError(InputError(option, f"{name} is of all contacts together: expected no contact, got {words!r}"))
@@ -327,10 +376,11 @@ def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
     """
     if (quantity.name == "critical_speed" or "temperature" in quantity.name) and case.heat is None:
         raise CaseError(InputError(option, f"{quantity.text!r} needs the table heat, which the case does not have"))
-    worn = quantity.name in (*GROWING, "worn_volume_increment", "worn_mass")
-    if worn and getattr(case.wear, quantity.body) is None:
-        other = "strip" if quantity.body == "punch" else "punch"
-        message = f"{quantity.text!r}: the case has no wear.{quantity.body}; expected it 'of {other}'"
+    worn = quantity.name in (*GROWING, "worn_volume_increment", "worn_mass") and quantity.name != APPROACH
+    lacking = [body for body in ("punch", "strip") if getattr(case.wear, body) is None]
+    if worn and (quantity.body in lacking or (quantity.body == BOTH and lacking)):
+        other = next(body for body in ("strip", "punch") if body not in lacking)
+        message = f"{quantity.text!r}: the case has no wear.{lacking[0]}; expected it 'of {other}'"
         raise CaseError(InputError(option, message))
     return replace(quantity, unit="rad/s") if quantity.name == "critical_speed" and case.turns else quantity
 
@@ -456,12 +506,12 @@ def _until(
     made = Path(Course.of(run), edge_moved(run))
     factors = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}
     found = [
-        _crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)
+        crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)
     ]
     return np.array(found), made
 
 
-def _crossing(taken: Array, level: float) -> float:
+def crossing(taken: Array, level: float) -> float:
     """Return where values (cycle, value, growth in a cycle) first reach a level; infinite if they do not."""
     from scipy.interpolate import CubicHermiteSpline  # which takes long to load
 

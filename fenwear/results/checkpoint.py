@@ -56,7 +56,7 @@ FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes foll
 GRID = "grid"  # corner, spacing and counts of the contact grid (3, d - 1), where it grows
 BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
 # A run may go on farther than it was meant to, and keep other things.
-FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "setup.", "title")
+FREE_KEYS = ("run.half_cycles", "run.periodic_within", "run.until", "output.", "setup.", "title")
 
 
 def save(directory: Path, system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> None:

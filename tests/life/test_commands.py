@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from fenwear import Case
 from fenwear.case import changed_case, load_case
 from fenwear.cli import app
 from fenwear.errors import CaseError, InputError
@@ -86,7 +88,6 @@ def test_bounds_that_exclude_the_data_lose_nothing(call: Call, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["life", "example2", "--until", "volume 3 mm^3"], "at least one key"),
         (["life", "example2", "--until", "volume 3 mm^3", "--scatter", f"{K}=normal(1e-8, 5 %)", "--resume"], "-o DIR"),
         (["life", "example2", "--until", "volume 3", "--scatter", f"{K}=normal(1e-8, 5 %)"], "with its unit"),
         (["calibrate", "example2", "none.csv", "--unknown", K], "cannot be read"),
@@ -125,3 +126,15 @@ def test_stick_that_is_left_out_is_told_before_a_fit(monkeypatch: pytest.MonkeyP
     assert not Model(
         load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=8"])
     ).stick_left_out()
+
+
+def test_a_life_without_scatter(small: Callable[..., Case], tmp_path: Path) -> None:
+    """V = k F s: the one number, in cycles and metres; an option of samples is rejected."""
+    case, until = small("example2"), ["volume 3 mm^3", "distance until volume 3 mm^3"]
+    found, folder = commands.run_life(case, "e", until, [], None, 5, 0, None, tmp_path / "life", lambda message: None)
+    cycles = 3 / (1.25 * np.pi * 1e-8 * 1e4 * 6)
+    assert found.as_json()["lives"][0]["value"] == pytest.approx(cycles, rel=1e-9)
+    assert found.as_json()["lives"][1]["value"] == pytest.approx(6 * cycles, rel=1e-9)
+    assert (folder / "life.json").is_file()
+    with pytest.raises(CaseError, match="--wanted"):
+        commands.run_life(case, "e", until, [], None, 5, 0, "9 cycles", tmp_path / "w", lambda message: None)

@@ -192,7 +192,7 @@ def make_case(
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
-    given = Given(meshes, stresses)
+    given = Given(dict(meshes), dict(stresses))
     data = _on_meshes(data, given)
     data = with_profiles(with_program(with_cycle(data, folder), folder), folder)
     run = data.get("run", {})

@@ -47,7 +47,7 @@ class Written:
 MADE = "made in Python"  # geometry.file of a case whose meshes are given
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Given:
     """Meshes and stresses that a program in Python gives to a case, by the bodies' roles.
 

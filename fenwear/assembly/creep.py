@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,24 @@ from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
 from fenwear.interface import Interface
 
+TIMES = 33  # in a phase whose loads vary; odd
 KEPT = 4  # couplings of the last steps
+
+
+class CreepTangent(NamedTuple):
+    """What changes of the state of what creeps, and of the pressures, do in a phase.
+
+    Attributes:
+        opened: Gap by a state (n, state).
+        stay, seen: What is left of its changes at the end of the phase, and as the contact sees them (state,).
+        by_pressure, seen_by_pressure: State at the end, and as the contact sees it, by the pressures (state, n).
+    """
+
+    opened: Array
+    stay: Array
+    seen: Array
+    by_pressure: Array
+    seen_by_pressure: Array
 
 
 @dataclass(frozen=True)
@@ -37,6 +55,7 @@ class Creep:
     Attributes:
         members: The bodies and the layer that creep.
         durations: Of the phases of the motion (m,), s.
+        courses: Loads over those of the middle, at even times of each phase (m, 2 k + 1).
         interfaces: What the surfaces answer at once in each phase.
         moved: Displacement of punch and strip by moved supports alone in each phase (q, d), mm.
         middle: A phase in the middle of a half-cycle.
@@ -44,6 +63,7 @@ class Creep:
 
     members: tuple[Member, ...]
     durations: Array
+    courses: Array
     interfaces: tuple[Interface, ...]
     moved: tuple[tuple[Array, Array], ...]
     middle: int = 0
@@ -51,7 +71,7 @@ class Creep:
     @cached_property
     def cycles(self) -> list[RetardedCycle]:
         """What a cycle does to each member."""
-        return [member.retardation.over(self.durations) for member in self.members]
+        return [member.retardation.over(self.durations, self.courses) for member in self.members]
 
     @cached_property
     def _cuts(self) -> list[int]:
@@ -150,27 +170,32 @@ class Creep:
             load: Factor of all loads.
         """
         found = [
-            cycle.taken[phase][:, None] * (member.displacement(phase, pressure, ratio, load) - y)
+            cycle.taken[phase][:, None] * member.displacement(phase, pressure, ratio, load)
+            - (1 - cycle.decays[phase])[:, None] * y
             for (member, y), cycle in zip(self._each(crept), self.cycles, strict=True)
         ]
         return np.concatenate([one.ravel() for one in found])
 
-    def tangent(self, phase: int, ratio: Array) -> tuple[Array, Array, Array]:
-        """Return what changes of the state do in a phase.
-
-        Returns:
-            Of the gap by the state (n, state), of the state at its end by that at its start (state,), and by the
-            pressures (state, n).
-        """
-        gaps, stay, by_pressure = [], [], []
+    def tangent(self, phase: int, ratio: Array) -> CreepTangent:
+        """Return what changes of state and pressure do in a phase."""
+        gaps: list[Array] = []
+        by_pressure: tuple[list[Array], list[Array]] = [], []
+        stay: tuple[list[Array], list[Array]] = [], []
         for member, cycle in zip(self.members, self.cycles, strict=True):
             opened, matrix = member.opened(phase, np.eye(member.size)), member.matrix(phase, ratio)
-            compliances = member.retardation.compliances
-            for compliance, decay, taken in zip(compliances, cycle.decays[phase], cycle.taken[phase], strict=True):
+            for k, compliance in enumerate(member.retardation.compliances):
                 gaps.append(compliance * opened)
-                stay.append(np.full(member.size, decay))
-                by_pressure.append(taken * matrix)
-        return np.concatenate(gaps, axis=1), np.concatenate(stay), np.concatenate(by_pressure)
+                for seen, decays, taken in (
+                    (0, cycle.decays, cycle.taken),
+                    (1, cycle.seen_decays, cycle.seen_taken),
+                ):
+                    stay[seen].append(np.full(member.size, decays[phase, k]))
+                    by_pressure[seen].append(taken[phase, k] * matrix)
+        return CreepTangent(
+            np.concatenate(gaps, axis=1),
+            *map(np.concatenate, stay),
+            *map(np.concatenate, by_pressure),
+        )
 
     # ------------------------------------------------------------------ whole cycles
 
@@ -236,6 +261,26 @@ class Creep:
         self._couplings.append((list(shares), list(ratios), found))
         del self._couplings[:-KEPT]
         return found
+
+
+def _courses(placed: ContactSetup) -> Array:
+    """Return the loads over those of the middle, at even times of each phase (m, 2 k + 1); ones where they stay."""
+    phases, case, found = placed.motion.phases, placed.made_from, np.ones((len(placed.motion.phases), TIMES))
+    loads = [] if case is None else [load for body in case.bodies for load in case.loads_of(body)]
+    if all(load.steady for load in loads):
+        return found
+    period = sum(phase.duration for phase in phases)
+
+    def at(fraction: float) -> Array:
+        given = [load.at(fraction % 1.0 if fraction > 1 else max(fraction, 0.0)) for load in loads]
+        return np.concatenate([part for load in given for part in (load.force, load.traction, load.moment) if part])
+
+    for own, phase in zip(found, phases, strict=True):
+        middle, half = at(phase.fraction), phase.duration / period / 2
+        if middle.any():
+            times = np.linspace(phase.fraction - half, phase.fraction + half, TIMES)
+            own[:] = [at(float(time)) @ middle / (middle @ middle) for time in times]
+    return found
 
 
 def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
@@ -319,4 +364,4 @@ def creep_of(
         moved if face is own else (moved[0], by_supports(1, own.strip))
         for face, own in zip(faces, interfaces, strict=True)
     ]
-    return Creep(tuple(members), durations, interfaces, tuple(found), placed.motion.positions // 2)
+    return Creep(tuple(members), durations, _courses(placed), interfaces, tuple(found), placed.motion.positions // 2)

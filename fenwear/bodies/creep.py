@@ -16,7 +16,14 @@ In a march v is constant within each phase of the motion: exactly,
 
     y -> e y + (1 - e) v,    e = exp(-T / tau),
 
-T its duration. With v that of the end of the phase, creep is implicit, and stable for any duration. The phases of a
+T its duration. With v that of the end of the phase, creep is implicit, and stable for any duration. Where the load
+varies within a phase, by l(t) over that of its middle, v does, and exactly
+
+    y -> e y + v integral of exp(-(T - t) / tau) l(t) dt / tau,
+
+in closed form for straight lines between times. Contact has the load of the middle, and then sees y of the middle.
+
+The phases of a
 cycle one after the other make y -> E y + sum of g_i v_i of it; the solution after whole cycles of
 
     dy/dn = X (sum of g_i v_i / (1 - E) - y),    X = -ln E,
@@ -28,12 +35,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case.creep import Creep
 
+STAYS = 1e-12  # change of a load over that of the middle: rounding
 PER_DECADE, FIRST, LAST = 2, -1, 15  # terms of a logarithm's, and the decades around its onset that they reach over
 
 
@@ -68,22 +78,40 @@ class Retardation:
         shares = -np.expm1(-np.asarray(time)[..., None] / self.times)
         return np.asarray(1 + shares @ self.compliances)
 
-    def over(self, durations: Array) -> RetardedCycle:
-        """Return what a cycle does whose phases last so long (m,), s."""
-        return RetardedCycle(self, np.asarray(durations, dtype=float))
+    def over(self, durations: Array, courses: Array | None = None) -> RetardedCycle:
+        """Return what a cycle does whose phases last so long (m,), s.
+
+        Args:
+            durations: Of the phases.
+            courses: Loads over those of the middle, at even times from begin to end of each phase (m, 2 k + 1); by
+                default they stay.
+        """
+        even = np.ones((len(durations), 3)) if courses is None else courses
+        return RetardedCycle(self, np.asarray(durations, dtype=float), even)
+
+    def taken(self, duration: float, course: Array) -> Array:
+        """Return the y (terms,) that v = 1 at loads of a course, at even times (k + 1,), gives to y = 0."""
+        step = duration / (len(course) - 1) / self.times
+        kept, grown = np.exp(-step), -np.expm1(-step)
+        found = np.zeros(len(self.times))
+        for first, last in pairwise(course):
+            found = kept * found + last - first * kept - (last - first) * grown / step
+        return found
 
 
 @dataclass(frozen=True)
 class RetardedCycle:
-    """A cycle of m phases, in each of which the elastic displacement v is constant.
+    """A cycle of m phases, in each of which the elastic displacement v is constant, or varies as its loads do.
 
     Attributes:
         of: The law, with its c (terms,).
         durations: Of the phases (m,), s.
+        courses: Loads over those of the middle, at even times of each phase (m, 2 k + 1).
     """
 
     of: Retardation
     durations: Array
+    courses: Array
 
     @cached_property
     def decays(self) -> Array:
@@ -92,18 +120,37 @@ class RetardedCycle:
 
     @cached_property
     def taken(self) -> Array:
-        """Share of v that y takes in each phase, 1 - e (m, terms)."""
-        return np.asarray(-np.expm1(-self.durations[:, None] / self.of.times))
+        """Share of v that y takes in each phase, 1 - e where v stays (m, terms)."""
+        both = zip(self.durations, self.courses, strict=True)
+        return np.array([self.of.taken(duration, course) for duration, course in both])
+
+    @cached_property
+    def varies(self) -> NDArray[np.bool_]:
+        """Phases whose loads vary (m,): their contact sees y of the middle, that of others y of the end."""
+        return np.asarray(np.ptp(self.courses, axis=1) > STAYS)
+
+    @cached_property
+    def seen_decays(self) -> Array:
+        """What is left of the y at the start of a phase as its contact sees it (m, terms)."""
+        seen = np.where(self.varies, 0.5, 1.0) * self.durations
+        return np.asarray(np.exp(-seen[:, None] / self.of.times))
+
+    @cached_property
+    def seen_taken(self) -> Array:
+        """Share of v in y as the contact of a phase sees it (m, terms)."""
+        middle = self.courses.shape[1] // 2 + 1
+        rows = zip(self.durations, self.courses, self.taken, self.varies, strict=True)
+        return np.array([self.of.taken(t / 2, own[:middle]) if varies else end for t, own, end, varies in rows])
 
     @cached_property
     def factors(self) -> Array:
-        """Compliance in each phase, over that of the elastic body (m,): 1 + sum of c (1 - e)."""
-        return 1 + self.taken @ self.of.compliances
+        """Compliance in each phase, over that of the elastic body (m,)."""
+        return 1 + self.seen_taken @ self.of.compliances
 
     @cached_property
     def left(self) -> Array:
-        """What each y at the start of a phase opens at its end, c e (m, terms)."""
-        return self.of.compliances * self.decays
+        """What each y at the start of a phase opens as its contact sees it (m, terms)."""
+        return self.of.compliances * self.seen_decays
 
     @cached_property
     def cycles(self) -> Array:
@@ -112,21 +159,26 @@ class RetardedCycle:
 
     @cached_property
     def _kept(self) -> Array:
-        """What is left of the y at the start of a cycle after each phase (m, terms)."""
-        return np.asarray(np.exp(-np.cumsum(self.durations)[:, None] / self.of.times))
+        """What is left of the y at the start of a cycle as the contact of each phase sees it (m, terms)."""
+        begins = np.cumsum(self.durations) - self.durations
+        return np.asarray(np.exp(-begins[:, None] / self.of.times)) * self.seen_decays
 
     @cached_property
     def _given(self) -> Array:
-        """What each v_i has given to y after each phase (phases, i, terms); no more than those before have."""
-        ends = np.cumsum(self.durations)
-        since = ends[:, None] - ends
+        """What each v_i has given to y as the contact of each phase sees it (phases, i, terms)."""
+        ends, phases = np.cumsum(self.durations), np.arange(len(self.durations))
+        since = (ends - self.durations)[:, None] - ends  # from the end of phase i to the begin of a phase
         later = np.exp(-np.maximum(since, 0.0)[:, :, None] / self.of.times)
-        return np.where((since >= 0)[:, :, None], later * self.taken, 0.0)
+        before = (phases[:, None] > phases)[:, :, None]
+        found = np.where(before, later * self.seen_decays[:, None] * self.taken, 0.0)
+        found[phases, phases] = self.seen_taken
+        return found
 
     @cached_property
     def lasting(self) -> Array:
         """Shares of the v_i in what y comes to at the end of cycles that repeat, g / (1 - E) (i, terms)."""
-        return self._given[-1] / -np.expm1(-self.cycles)
+        since = self.durations.sum() - np.cumsum(self.durations)
+        return np.asarray(np.exp(-since[:, None] / self.of.times) * self.taken / -np.expm1(-self.cycles))
 
     @cached_property
     def repeating(self) -> Array:

@@ -64,18 +64,20 @@ def phase_tangent(
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
     gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)
+    gap_by_p, gap_by_s = gap_rows @ state_p, gap_rows @ state_s
     if creep is not None:
         crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
         none: Array = np.zeros((n, len(crept.stays)))
         laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
         traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
-        gap_rows = np.hstack([gap_rows, crept.opened])
+        gap_by_p = gap_by_p + crept.gap_by_pressure
+        gap_by_s = np.hstack([gap_by_s + crept.gap_by_heat, crept.gap_by_state])
         state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
         state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
-    opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
-    by_state = by_mu @ traction_s + gap_rows @ state_s + before_s
+    opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p
+    by_state = by_mu @ traction_s + gap_by_s + before_s
     slope = system.layers.slope(pressure[None])
     if slope is not None:
         opened = opened + np.diag(slope[0])
@@ -245,13 +247,17 @@ class _Creeping(NamedTuple):
     """What creeps in a phase.
 
     Attributes:
-        opened: Gap by its state (n, k).
+        gap_by_state: Gap by its state at the start (n, k).
+        gap_by_heat: By the state of the heat (n, dim).
+        gap_by_pressure: By the pressures (n, n).
         stays: What is left of its state (k,).
         by_state: Its state at the end by that of the heat (k, dim).
         by_pressure: By the pressures (k, n).
     """
 
-    opened: Array
+    gap_by_state: Array
+    gap_by_heat: Array
+    gap_by_pressure: Array
     stays: Array
     by_state: Array
     by_pressure: Array
@@ -266,9 +272,16 @@ def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p:
         ratios: tau (n, d), and that of a friction that is larger by 1.
         traction_p, traction_s: What changes of pressure and of the state of the heat add to mu, times the pressure.
     """
-    opened, stays, by_pressure = creep.tangent(phase, ratios[0])
-    by_mu = creep.tangent(phase, ratios[1])[2] - by_pressure
-    return _Creeping(opened, stays, by_mu @ traction_s, by_pressure + by_mu * traction_p)
+    own, more = creep.tangent(phase, ratios[0]), creep.tangent(phase, ratios[1])
+    by_mu, seen_by_mu = more.by_pressure - own.by_pressure, more.seen_by_pressure - own.seen_by_pressure
+    return _Creeping(
+        own.opened * own.seen,
+        own.opened @ seen_by_mu @ traction_s,
+        own.opened @ (own.seen_by_pressure + seen_by_mu * traction_p),
+        own.stay,
+        by_mu @ traction_s,
+        own.by_pressure + by_mu * traction_p,
+    )
 
 
 def _heated(

@@ -46,7 +46,8 @@ def conductance_of(layers: Layers, case: Case | None, regions: Regions, pair: Co
         given_way = np.zeros_like(pressure) if layers.winkler is None else layers.winkler
         closure, carried = layers.closure, np.maximum(pressure, 0.0)
         if isinstance(closure, SharedClosure):  # the spots conduct that asperities make
-            closure, carried = closure.law, closure.carried(carried)
+            carried = closure.carried(carried)
+            closure = closure.law
         slope = given_way if closure is None else given_way + closure.slope(carried)
         return np.asarray(share / slope)
 

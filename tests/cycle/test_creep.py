@@ -111,9 +111,33 @@ def test_a_pressure_relaxes_under_supports_that_have_moved() -> None:
     assert wrong[0] / wrong[1] == pytest.approx(2, abs=0.2)
 
 
-def test_growth_rates_see_creep() -> None:
+@pytest.mark.parametrize("tau", [0.002, 0.05, 0.6])
+@pytest.mark.parametrize("how", ["explicit", "jump"])
+def test_creep_faster_than_a_half_cycle(how: str, tau: float) -> None:
+    """A layer between stiff bodies under a load that varies within each half-cycle, in one phase: the exact history."""
+    stiff = [f"materials.{name}.young='1e9 MPa'" for name in ("steel", "composite")]
+    mesh = ["geometry.degree=1", "geometry.parameters.elements_along_contact=4", "geometry.parameters.edge_grading=1"]
+    load = "punch.loads=[{on='punch_load', force=['0 N', '-10 kN'], over_cycle=[[0, 0.2], [0.5, 1.8], [1, 0.2]]}]"
+    layer = (
+        f"contact.layer={{kind='linear', stiffness='1e3 MPa/mm', creep={{terms=[{{compliance=1, time='{tau} s'}}]}}}}"
+    )
+    system = assemble(load_case("example2", [*mesh, *stiff, load, layer, "wear.punch.coefficient=1e-14"]))
+    half, steps = np.pi / 10, 2000
+    exact, y = [], 0.0
+    for number in range(40):
+        ends = (0.2, 1.8) if number % 2 == 0 else (1.8, 0.2)
+        load_at = np.interp((np.arange(steps) + 0.5) / steps, (0, 1), ends)
+        for v in load_at * (1e4 / 600 / 1e3):
+            y = v + (y - v) * np.exp(-half / steps / tau)
+        exact.append(y)
+    block = end(system, how, 40, 1e-3)
+    assert crept(block) == pytest.approx(exact[-1], rel=1e-3)
+
+
+@pytest.mark.parametrize("load", ["", "punch.loads.0.over_cycle=[[0, 0.9], [0.3, 1.1], [0.7, 0.8], [1, 0.9]]"])
+def test_growth_rates_see_creep(load: str) -> None:
     """Small changes of depths and of what has crept become in a cycle what the cycle's tangent makes of them."""
-    system = assemble(case_of(*WHO["all"][:-1], "wear.punch.coefficient='1e-4 1/MPa'"))
+    system = assemble(case_of(*WHO["all"][:-1], "wear.punch.coefficient='1e-4 1/MPa'", *([load] if load else [])))
     creep = system.creep
     assert creep is not None
     begin = end(system, "jump", 4000, 1e-2).end

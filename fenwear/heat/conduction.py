@@ -45,7 +45,7 @@ from fenwear.sliding.field import ALONG_X, SlidingField
 PREFIX = "fenwear_heat_"
 CONVECTING, CONTACT, HELD, INSULATED = 1, 2, 3, 4
 FREE = (CONVECTING, INSULATED)  # boundaries that material may move through
-END = 0.3  # cosine of the angle between v and n: below, a boundary of what turns is a chord of its round side, no end
+END = 0.03  # mean cosine of the angle between v and n: below, an element's boundary turns in its place and is no end
 WARMER = 100.0  # K: the mean rise that a convection is proposed for
 CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
 LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
@@ -341,15 +341,20 @@ class _Flow:
         A turning body keeps its place: what enters and leaves through one facet of a round boundary, whose
         facets are chords, is no flow.
         """
-        body, v, normal = self.body, self.velocity, ufl.FacetNormal(self.body.body.mesh)
-        comm, through = body.body.mesh.comm, ufl.dot(v, normal)
-        if self.turns:
-            means = assembled_vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
-            flow = comm.allreduce(float(np.abs(means).sum()))
-        else:
-            flow = comm.allreduce(fem.assemble_scalar(compiled(body._ds(abs(through), FREE))))
-        along = comm.allreduce(fem.assemble_scalar(compiled(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
-        return bool(flow > 1e-9 * along)
+        body, v = self.body, self.velocity
+        flows = self.entering(v), self.entering(-v), ufl.sqrt(ufl.dot(v, v))
+        into, out, along = (fem.assemble_scalar(compiled(body._ds(one, FREE))) for one in flows)
+        return bool(body.body.mesh.comm.allreduce(into + out - 1e-9 * along) > 0)
+
+    @cached_property
+    def _slant(self) -> fem.Function:
+        """Cosine of the angle between v and n, the mean over the free boundary of each element; collective."""
+        body, v, w = self.body, self.velocity, ufl.TestFunction(self._constants)
+        through, slant = ufl.dot(v, ufl.FacetNormal(body.body.mesh)), fem.Function(self._constants)
+        flow, along = (assembled_vector(body._ds(one * w, FREE)) for one in (through, ufl.sqrt(ufl.dot(v, v))))
+        slant.x.array[: len(flow)] = np.divide(flow, along, out=np.zeros_like(flow), where=along > 0)
+        slant.x.scatter_forward()
+        return slant
 
     @cached_property
     def _constants(self) -> fem.FunctionSpace:
@@ -367,8 +372,8 @@ class _Flow:
         A round side turns in its place, though one half of each of its chords takes in what the other lets out.
         """
         through = ufl.dot(v, ufl.FacetNormal(self.body.body.mesh))
-        least = END * ufl.sqrt(ufl.dot(v, v)) if self.turns else 0.0
-        return ufl.conditional(ufl.lt(through, -least), -through, 0.0)
+        entering = ufl.max_value(-through, 0.0)
+        return ufl.conditional(ufl.gt(abs(self._slant), END), entering, 0.0) if self.turns else entering
 
     @cached_property
     def forms(self) -> _StepForms:

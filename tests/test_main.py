@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -81,14 +81,19 @@ def test_version_of_a_module_without_metadata(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_reader_that_goes_away_ends_nothing() -> None:
     """What is written to `head`, or `less` that was left, is lost, and the run goes on."""
-    reader, writer = os.pipe()
-    os.close(reader)
-    stream = __main__._Patient(os.fdopen(writer, "w"))
-    for _ in range(3):
-        stream.write("x" * 100_000)
-        stream.flush()
-    assert stream.fileno() == writer
-    stream.close()
+    script = """
+import os
+from fenwear.__main__ import _Patient
+reader, writer = os.pipe()
+os.close(reader)
+stream = _Patient(os.fdopen(writer, "w"))
+for _ in range(3):
+    stream.write("x" * 100_000)
+    stream.flush()
+assert stream.fileno() == writer
+stream.close()
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)  # PETSc, which tests load, takes the signal
 
 
 def test_a_folder_of_results_is_overwritten_or_left(tmp_path: Path) -> None:

@@ -5,11 +5,20 @@ Every number is held in mm, N, s, K (see `fenwear.case.units`); a case file may 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
 
 from fenwear.case.units import convert, hardness, quantity_text
@@ -82,6 +91,20 @@ Moments = Annotated[tuple[Annotated[float, *quantity("N*mm")], ...], Field(min_l
 Stresses = Annotated[tuple[Stress, ...], Field(min_length=2, max_length=3)]
 
 
+@cache
+def _kinds(part: type[BaseModel], name: str) -> frozenset[object]:
+    """Return the plain types that a key takes, without None."""
+
+    def plain(kind: object) -> set[object]:
+        if get_origin(kind) is Annotated:
+            return plain(get_args(kind)[0])
+        if get_origin(kind) in (Union, UnionType):
+            return {one for part in get_args(kind) for one in plain(part)}
+        return {kind}
+
+    return frozenset(plain(part.model_fields[name].annotation) - {type(None)})
+
+
 class Part(BaseModel):
     """A table of the case file: unknown keys refused, values frozen."""
 
@@ -89,3 +112,18 @@ class Part(BaseModel):
     model_config = ConfigDict(
         defer_build=True, extra="forbid", frozen=True, hide_input_in_errors=True, ser_json_inf_nan="strings"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_in_the_schema(cls, data: object) -> object:
+        """Take whole numbers with a point and no words for true, as the JSON schema does."""
+        if not isinstance(data, Mapping):
+            return data
+        changed = dict[str, object]()
+        for name, value in data.items():
+            kinds = _kinds(cls, name) if isinstance(value, str | int | float) and name in cls.model_fields else None
+            if kinds == {bool} and not isinstance(value, bool):
+                raise ValueError(f"{name}: expected true or false, got {value!r}")
+            if isinstance(value, float) and value.is_integer() and kinds and int in kinds and float not in kinds:
+                changed[name] = int(value)
+        return {**data, **changed} if changed else data

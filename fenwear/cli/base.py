@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any, ClassVar, TextIO
 
 import typer
 from mpi4py import MPI
@@ -54,6 +56,17 @@ class _Spoken:
     """What the case that a command has read calls its bodies: all that it prints for people has these names."""
 
     names = BY_ROLE
+    record: ClassVar[list[str] | None] = None  # what is logged, where a command gives it as JSON
+
+
+@contextmanager
+def recorded() -> Iterator[list[str]]:
+    """Keep what is logged within a block."""
+    _Spoken.record = []
+    try:
+        yield _Spoken.record
+    finally:
+        _Spoken.record = None
 
 
 def told(text: str) -> str:
@@ -63,6 +76,8 @@ def told(text: str) -> str:
 
 def log(message: str) -> None:
     """Print to standard error; every rank but 0 has it closed."""
+    if _Spoken.record is not None:
+        _Spoken.record.append(told(message))
     _write(sys.stderr, told(message))
 
 

@@ -25,8 +25,10 @@ from fenwear.cli.base import (
     log,
     print_case,
     print_json,
+    recorded,
     show,
     show_results,
+    told,
 )
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
     from fenwear.progress import How
 
 HEAT_SECONDS = 60.0  # that `check` looks at the heat
+
+
+WARNING = "warning: "
 
 
 @app.callback(invoke_without_command=True)
@@ -97,8 +102,26 @@ def check_command(
     heat_seconds: Annotated[
         float, typer.Option("--heat-seconds", help="How long it may take to look at the heat.")
     ] = HEAT_SECONDS,
+    as_json: JsonOption = False,
 ) -> None:
     """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
+    if not as_json:
+        _check(case, settings, heat_seconds, accuracy=accuracy, full=full)
+        return
+    with recorded() as said:
+        try:
+            _check(case, settings, heat_seconds, accuracy=accuracy, full=False)
+        except CaseError as error:
+            problems = [{"key": told(problem.key), "message": told(problem.message)} for problem in error.problems]
+            print_json({"valid": False, "errors": problems})
+            raise
+        warnings = [line.removeprefix(WARNING) for line in said if line.startswith(WARNING)]
+        messages = [line for line in said if not line.startswith(WARNING)]
+        print_json({"valid": True, "warnings": warnings, "messages": messages})
+
+
+def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: bool, full: bool) -> None:
+    """Validate a case and say what it comes to."""
     from fenwear.assembly import elastic, law_named, place_case, resources_of
     from fenwear.cycle import stability_number
     from fenwear.heat.periodic import cycle_memory
@@ -137,7 +160,7 @@ def check_command(
     warm, of_heat = _with_heat(system, heat_seconds)
     warnings += of_heat
     for warning in warnings:
-        log(f"warning: {warning}")
+        log(f"{WARNING}{warning}")
     if full:
         print_case(loaded)
     if warm.exchange is not None:
@@ -201,7 +224,7 @@ def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: boo
     system = system or assemble(case)
     text = check_text(case, system)
     for warning in plausibility_warnings(case):
-        log(f"warning: {warning}")
+        log(f"{WARNING}{warning}")
     if full:
         print_case(case)
     log(text)

@@ -306,7 +306,7 @@ def test_table(tmp_path: Path) -> None:
         ("distance (m), lode (N)\n0, 1\n5, 2\n", "did you mean 'load'"),
         ("load (N), distance (m)\n0, 1\n5, 2\n", "as the first column"),
         ("distance (m), load (N)\n0, 1\n5\n", "row 3: expected 2 values, got 1"),
-        ("distance (m), load (N)\n0, 1\n5, much\n", "row 3: load: expected a finite number, got 'much'"),
+        ("distance (m), load (N)\n0, 1\n5, much\n", "row 3, column 'load': expected a finite number, got 'much'"),
         ("cycles, load (N)\n0, 1\n5.5, 2\n", "row 3: cycles: expected a whole number"),
     ],
 )  # fmt: skip

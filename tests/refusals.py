@@ -86,10 +86,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
     "case/motions.py": {"a motion that ends where it starts": (PHYSICS, "a stroke that does not come back")},
     "case/schema.py": {
         "as thin as its own nodes are wide": (MODEL, 'heat on contact grids, `"fine"` bodies and half-spaces: above'),
-        "on the bodies' meshes": (
-            MODEL,
-            '`contact.solver = "full"` on what is no mesh: it keeps the displacements of one',
-        ),
         "one solution for each node; or": (
             MODEL,
             "`grid.across` with condensed bodies: each growth would condense them anew",
@@ -166,7 +162,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         ),
     },
     "case/setup.py": {
-        "whose sums": (MODEL, '`setup.reproducible` with `contact.solver = "full"`, whose sums go over the ranks'),
         "whose steps every rank makes alike": (MODEL, "the same with all temperatures, which the ranks share"),
     },
     "cycle/steady.py": {

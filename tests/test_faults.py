@@ -561,7 +561,7 @@ def test_second_signal_ends_all_ranks(run_python: Run, tmp_path: Path, ranks: in
 def test_signals_until_the_end(tmp_path: Path) -> None:
     """Those that come while an interrupted run ends do not kill it, to the last moment: the exit status stays."""
     folder = tmp_path / "run"
-    with running(folder, "contact.solver='full'", ranks=2, case="example1") as process:
+    with running(folder, ranks=2, case="example1") as process:
         ranks = ranks_of(process)
         os.kill(ranks[1], signal.SIGTERM)
         wait_until((folder / "summary.json").exists)

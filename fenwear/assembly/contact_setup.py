@@ -67,7 +67,6 @@ class ContactSetup:
         bodies: Under the mean loads.
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies; None without.
-        solver: Of the contact: "condensed", or "full" for the reference on both bodies' meshes.
         law: Of the contact, by its name: see `laws`.
         made_from: The case; None where it was made in Python.
         loaded: The bodies under the loads of each phase.
@@ -82,7 +81,6 @@ class ContactSetup:
     bodies: Bodies
     sliding: Sliding
     heat: Heat | None
-    solver: str
     law: str = "gross-sliding"
     made_from: Case | None
     loaded: tuple[Bodies, ...]

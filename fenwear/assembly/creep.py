@@ -126,20 +126,15 @@ class Creep:
         known: dict[tuple[float, ...], Interface] = {}
         found = []
         for phase, own in enumerate(self.interfaces):
-            times = self._factors(phase)
+            times = self.factors(phase)
             alike = (id(own), *times)
             if alike not in known:
                 known[alike] = self._scaled(own, times, self.moved[phase])
             found.append(known[alike])
         return tuple(found)
 
-    def softer(self, phase: int) -> tuple[float, float]:
-        """Return how many times as soft as at once punch and strip are over a phase of a march."""
-        punch, strip, _ = self._factors(phase)
-        return punch, strip
-
-    def _factors(self, phase: int) -> tuple[float, ...]:
-        """Return the same of punch, strip and layer."""
+    def factors(self, phase: int) -> tuple[float, ...]:
+        """Return how many times as soft as at once punch, strip and layer are over a phase of a march."""
         factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
         return tuple(float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER))
 

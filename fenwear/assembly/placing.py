@@ -28,9 +28,7 @@ STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stay
 
 
 @told_by_name
-def place(
-    bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, solver: str = "condensed", case: Case | None = None
-) -> ContactSetup:
+def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: Case | None = None) -> ContactSetup:
     """Bring the surfaces opposite each other in every phase of the motion; collective.
 
     Without heat the strip moves as a whole. With heat its elasticity is that of the middle position: then only its
@@ -40,7 +38,6 @@ def place(
         bodies: Both bodies.
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies.
-        solver: Of the contact, "condensed" or "full".
         case: What they were made from: it gives the loads of each phase, and whether meshes follow the wear.
 
     Raises:
@@ -82,7 +79,6 @@ def place(
         bodies=bodies,
         sliding=sliding,
         heat=heat,
-        solver=solver,
         made_from=case,
         loaded=loaded,
         rigids=tuple(rigids),
@@ -121,7 +117,6 @@ def place_at_rest(
         bodies=bodies,
         sliding=sliding,
         heat=None if case is None else case.heat,
-        solver="condensed" if case is None else case.contact.solver,
         law=law,
         made_from=case,
         loaded=loaded,

@@ -25,7 +25,6 @@ from fenwear.bodies.response import Request, identity
 from fenwear.case.names import told_by_name
 from fenwear.case.program import speeds_of
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
-from fenwear.contact.full import FullContact
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.passage import Passage
@@ -129,13 +128,13 @@ class Tribosystem(ContactSetup):
             directions: Sliding direction d of each phase that is solved for.
         """
         phases = [SlidingContact(self.interface, self.friction_ratio(d)) for d in directions]
-        return self._contact(phases, [self.bodies] * len(phases))
+        return self._contact(phases)
 
     def phase_contact(self, phases: Sequence[int]) -> ContactSolver:
         """Return the contact of phases of the motion, given by their numbers."""
         ratios = self.friction_ratios()
         sliding = [SlidingContact(self.interfaces[k], ratios[k]) for k in phases]
-        return self._contact(sliding, [self.loaded[k] for k in phases])
+        return self._contact(sliding)
 
     def passed_contact(self, phase: int, *, capped: bool = True, following: bool = False) -> ContactSolver:
         """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can.
@@ -145,10 +144,8 @@ class Tribosystem(ContactSetup):
         interface = self.interfaces[phase] if self.creep is None else self.creep.grown[phase]
         return self._contact(
             [SlidingContact(interface, self.friction_ratios()[phase])],
-            [self.loaded[phase]],
             self.layers.hardness if capped else np.inf,
             following=following,
-            softer=None if self.creep is None else self.creep.softer(phase),
         )
 
     def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
@@ -170,15 +167,10 @@ class Tribosystem(ContactSetup):
     def _contact(
         self,
         phases: list[SlidingContact],
-        bodies: list[Bodies],
         most: float = np.inf,
         *,
         following: bool = False,
-        softer: tuple[float, float] | None = None,
     ) -> ContactSolver:
-        if self.solver == "full":
-            pairs = [(own.punch, own.strip) for own in bodies]
-            return FullContact(phases, pairs, None if softer is None else [softer])
         return CondensedContact(phases, self.remedies, self.team, most, following=following)
 
     @told_by_name

@@ -1,7 +1,7 @@
 """What takes long to compute, kept on disk under a key of all that it follows from, for the next start.
 
-Files are written under another name and then renamed, so that no other process sees a part of one. A file that cannot be
-read is computed again, and one that cannot be written is mentioned once: a kept file saves time and decides nothing.
+Files are written under another name and then renamed, so that no other process sees a part of one. A file that cannot
+be read is computed again. A file that cannot be written is mentioned once: it saves time and decides nothing.
 """
 
 from __future__ import annotations

@@ -38,10 +38,6 @@ class Contact(Part):
     transverse_friction: Number = Field(
         default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
     )
-    solver: Literal["condensed", "full"] = Field(
-        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
-    )
-
     lubrication: Lubrication | None = Field(
         default=None, description="mixed lubrication; without this table asperities carry all"
     )

@@ -121,7 +121,7 @@ class Case(Part):
             ]
         if self.heat is not None:
             problems += self._thermal_problems(self.heat)
-        problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
+        problems += self.setup.problems(None if self.heat is None else self.heat.operator)
         problems += [*self._kind_problems(), *self._sliding_problems(), *self._operator_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
         problems += [f"{body}.regions: missing, but required" for body, part in self.bodies.items() if not part.regions]
@@ -142,7 +142,6 @@ class Case(Part):
         against = {
             "with heat: a contact finer than the meshes warms a layer as thin as its own nodes are wide, whose "
             "temperatures and expansion the meshes do not have": self.heat is not None,
-            "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
         }
         bare = [name for name in ("punch", "strip") if getattr(self, name).topography is not None and self.grid is None]
         lacking = [

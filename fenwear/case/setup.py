@@ -17,16 +17,13 @@ class Setup(Part):
         description="results equal to the last bit on any number of ranks: each body is on one, so that two work",
     )
 
-    def problems(self, heat: Literal["reduced", "full"] | None, contact: Literal["condensed", "full"]) -> list[str]:
+    def problems(self, heat: Literal["reduced", "full"] | None) -> list[str]:
         """Return what of it does not go together.
 
         Args:
             heat: The operator of the heat; None without.
-            contact: What the contact is solved with.
         """
         found = []
-        if self.reproducible and contact == "full":
-            found.append("setup.reproducible: expected contact.solver = 'condensed', whose sums stay on a rank")
         if self.reproducible and heat == "full":
             found.append("setup.reproducible: expected heat.operator = 'reduced', whose steps every rank makes alike")
         return found

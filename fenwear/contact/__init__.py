@@ -1,10 +1,9 @@
-"""Contact as variational inequalities: on the condensed interface, and on the full bodies.
+"""Contact as variational inequalities: on the condensed interface.
 
 Which nodes touch, p >= 0, g >= 0, p g = 0, is decided in `inequality`; what a pressure does to gaps comes from
 `fenwear.interface`. Wear that is implicit in the pressure is a part of the same system (`worn_shape`).
 """
 
 from fenwear.contact.condensed import CondensedContact, ContactSolver, ContactState, SlidingContact, WearCompliance
-from fenwear.contact.full import FullContact
 
-__all__ = ["CondensedContact", "ContactSolver", "ContactState", "FullContact", "SlidingContact", "WearCompliance"]
+__all__ = ["CondensedContact", "ContactSolver", "ContactState", "SlidingContact", "WearCompliance"]

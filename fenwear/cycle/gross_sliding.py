@@ -241,7 +241,7 @@ class GrossSliding:
 
     def replicated(self, system: Tribosystem) -> bool:
         """Return whether every rank could go on alone."""
-        return system.solver == "condensed" and (system.exchange is None or system.exchange.reduced)
+        return system.exchange is None or system.exchange.reduced
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""

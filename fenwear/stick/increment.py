@@ -10,7 +10,6 @@ import scipy.optimize
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import ContactStatus, StatusSolution, Step
-from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position, along_tangents
 from fenwear.stick.products import GridStep
@@ -67,9 +66,7 @@ def advance(
 
 
 def _step(interface: OppositeBodies, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
-    """Return the equations of a time step: on all displacements where the bodies are wanted whole, or on a grid."""
-    if interface.full:
-        return FullStep(interface, position, before, end, friction)
+    """Return the equations of a time step, on a grid by its products."""
     gridded = position.compliance.on_grid is not None
     return (GridStep if gridded else Step)(interface, position, before, end, friction)
 

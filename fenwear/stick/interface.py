@@ -31,7 +31,6 @@ from fenwear.stick.position import LoadEffect, Position, along_tangents, positio
 from fenwear.stick.program import steps_of
 from fenwear.stick.state import StickState
 from fenwear.stick.strain import surface_gradient
-from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
 class OppositeBodies:
@@ -44,7 +43,6 @@ class OppositeBodies:
     """
 
     moves = False
-    full = False  # whether each step is solved on all displacements
     team = ALONE  # the ranks that have them, of which one leads
     moved: WornDepths | None = None  # depths that the meshes have followed
     creep: StickCreep | None = None  # what creeps
@@ -95,7 +93,6 @@ class StickInterface(OppositeBodies):
         far: Whether the strip goes so far that its own place says what gap there is, not what it is moved by.
         keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
         fresh: Condense them whatever is kept.
-        full: Whether each time step is solved on all displacements, nothing condensed.
         condensed: Both bodies, where they are condensed already.
 
     Raises:
@@ -112,14 +109,13 @@ class StickInterface(OppositeBodies):
         far: bool = False,
         keep: bool = False,
         fresh: bool = False,
-        full: bool = False,
         condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
     ) -> None:
         self.moved = bodies.moved
         self.bodies, self.sliding, self.case, self.moves, self.far = bodies, sliding, case, moves, moves or far
         self.team = Team.of(bodies.comm)
         self.team.serve(self)
-        self.keep, self.fresh, self.full = keep, fresh, full
+        self.keep, self.fresh = keep, fresh
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
@@ -147,7 +143,6 @@ class StickInterface(OppositeBodies):
         self.creep = self._creep()
         self._positions = {0.0: self._position(middle)}
         self._loaded: dict[float | None, LoadEffect] = {}
-        self._whole: dict[float | Placement, WholeBodies] = {}
 
     def _needs(self, nodes: int, on_strip: int) -> Resources:
         """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
@@ -212,17 +207,6 @@ class StickInterface(OppositeBodies):
     def placement(self, offset: float | Placement) -> Placement:
         """Return the place of the strip moved by this amount of its motion, or there by a table."""
         return offset if isinstance(offset, Placement) else self.field.placement(offset)
-
-    def whole(self, position: Position) -> WholeBodies:
-        """Return both bodies with nothing condensed in a position of these; collective, or for rank 0 that leads."""
-        offset = next(place for place, known in self._positions.items() if known.pair is position.pair)
-        if offset not in self._whole:
-            self.team.each(self, "prepare_whole", offset)
-        return self._whole[offset]
-
-    def prepare_whole(self, offset: float | Placement) -> None:
-        """Make the bodies with nothing condensed for a place of the strip; collective."""
-        self._whole[offset] = whole_bodies(self.bodies, self._positions[offset], moves=self.moves)
 
     def loaded(self, fraction: float | None) -> LoadEffect:
         """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""

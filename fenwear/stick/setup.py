@@ -100,7 +100,6 @@ def unheated_problem(
         far=case.stick.force is None and far_enough(case, surface),
         keep=bodies.warmed is None,
         fresh=fresh,
-        full=case.contact.solver == "full",
         condensed=condensed,
     )
     middle = interface.middle

@@ -24,8 +24,9 @@ from mpi4py import MPI
 from fenwear import Tribosystem
 from fenwear.assembly import elastic, place_case, with_exchange
 from fenwear.case import Case, make_case
-from fenwear.contact import FullContact, SlidingContact
+from fenwear.contact import SlidingContact
 from fenwear.cycle import jump, march, steady
+from fenwear_verify.full_space import FullContact
 
 PARTS = ("warm", "jumps", "steady", "full", "heat")
 COMM = MPI.COMM_WORLD

@@ -367,7 +367,6 @@ def test_sphere_on_a_layer(radius: float, larger: float) -> None:
         (["grid.middle=['1 mm', '0 mm']"], "grid.size"),
         (["motion.amplitude='1000 km'"], "grid.size"),  # before there are nodes
         (["grid.size=['0.3 mm']"], "grid.size"),
-        (["contact.law='coulomb'", "contact.solver='full'"], "grid"),
     ],
 )
 def test_what_a_grid_cannot_lie_on(settings: list[str], key: str) -> None:

@@ -11,6 +11,7 @@ from fenwear import Tribosystem, assemble, load_case, march, vary
 from fenwear.arrays import Array
 from fenwear.parallel import total
 from fenwear.results.fields import body_fields
+from fenwear_verify.full_space import nothing_condensed
 
 MU, LOAD = 0.2, 1000.0
 
@@ -75,20 +76,18 @@ def test_nothing_turns_in_the_mean() -> None:
     np.testing.assert_allclose(opened, first.gap[-1], rtol=0, atol=1e-9 * gap.max())
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize("law", ["gross-sliding", "coulomb"])
 def test_solvers_agree(law: str) -> None:
     """The condensed inequality, and that on all displacements, whose guides are further unknowns."""
     motion = ["run.integration=explicit", "run.half_cycles=2"]
     if law == "coulomb":
         motion += ["contact.law=coulomb"]
-    found = []
-    for solver in ("condensed", "full"):
-        settings = ["geometry.parameters.elements_along_contact=4", "geometry.degree=1", "punch.no_turning_about=['y']"]
-        system = assemble(load_case("example1", [*settings, *motion, f"contact.solver={solver}"]))
-        assert system.bodies.punch.guides is not None
-        (last,) = march(system, 1)
-        found.append(last.pressure[-1])
+    settings = ["geometry.parameters.elements_along_contact=4", "geometry.degree=1", "punch.no_turning_about=['y']"]
+    system = assemble(load_case("example1", [*settings, *motion]))
+    assert system.bodies.punch.guides is not None
+    found = [next(march(system, 1)).pressure[-1]]
+    with nothing_condensed():
+        found.append(next(march(system, 1)).pressure[-1])
     np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * found[0].max())
 
 

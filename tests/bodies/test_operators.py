@@ -159,7 +159,6 @@ def test_by_name_or_condensed(name: str, small: list[str]) -> None:
         ("ring-on-ring", ["geometry.degree=1", HALF_SPACES[0]], "punch.operator: expected 'condensed' for rings"),
         ("example1", ["geometry.degree=2", HALF_SPACES[1]], "geometry.degree: expected 1"),
         ("example1-heat", [HALF_SPACES[0]], "punch.operator: expected 'condensed' with heat"),
-        ("example1", [HALF_SPACES[0], "contact.solver='full'"], "punch.operator: expected 'condensed' with contact"),
         ("ball-on-flat", [*BALL, *HALF_SPACES, "geometry.parameters.across=6"], "strip.operator: .* on a regular grid"),
         (
             "ball-on-flat",

@@ -24,5 +24,6 @@ def test_a_removed_key_or_word_says_what_takes_its_place(monkeypatch: pytest.Mon
 
 def test_removed_keys_of_the_set_up() -> None:
     """They were in case files once."""
-    with pytest.raises(CaseError, match=r"^setup.way: removed\. Leave it out"):
-        load_case("example1", ["setup.way=multigrid"])
+    for setting in ("setup.way=multigrid", "contact.solver=full"):
+        with pytest.raises(CaseError, match=rf"^{setting.split('=')[0]}: removed\. Leave it out"):
+            load_case("example1", [setting])

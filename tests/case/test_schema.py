@@ -160,7 +160,6 @@ LOAD_TWICE = "punch.loads=[{on='punch_load', force=[0, -1], traction=[0, -1]}]"
         (["geometry.degree=9"], "geometry.degree", "8"),
         (["geometry.degree=0"], "geometry.degree", "1"),
         (["contact.friction=-0.1"], "contact.friction", "0"),
-        (["contact.solver='full'", "setup.reproducible=true"], "setup.reproducible", "condensed"),
         (["wear.punch.coefficient=-1"], "wear.punch.coefficient", "zero or larger"),
         (["wear.punch.coefficient='1 mm'"], "wear.punch.coefficient", "MPa^-1"),
         (["wear.punch.pressure_exponent=0"], "wear.punch.pressure_exponent", "greater than 0"),

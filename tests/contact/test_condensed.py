@@ -14,10 +14,10 @@ from scipy.optimize import brentq
 from fenwear import ConvergenceError, Tribosystem, assemble, march
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
-from fenwear.contact.full import FullContact
 from fenwear.interface import Interface
 from fenwear.remedies import PIVOTS
 from fenwear.sliding.wear import WornDepths
+from fenwear_verify.full_space import FullContact
 
 P = 1000.0  # load per thickness, N/mm
 BOTH = ("polyethylene", "cobalt-chromium")  # bodies of the cup

@@ -11,9 +11,9 @@ from mpi4py import MPI
 
 from fenwear import assemble, load_case
 from fenwear.contact import ContactState
-from fenwear.contact.full import FullContact
 from fenwear.cycle import Block, evolve
 from fenwear.cycle.jump_step import _Trend
+from fenwear_verify.full_space import FullContact, nothing_condensed
 
 CLOSE = 1e-8
 LINEAR = "geometry.degree=1"
@@ -26,16 +26,18 @@ DRY = ("contact.friction=0.7",)
 PROGRAM = "program={steps=[{cycles=1, load_factor=[0.5, 1]}, {cycles=1, amplitude='2 um'}]}"
 
 
-def last_block(feature: str, how: str, solver: str, *more: str, sticks: bool = False) -> Block:
+def last_block(feature: str, how: str, *more: str, sticks: bool = False) -> Block:
     base, settings = FEATURES[feature]
     law = ("contact.law='coulomb'", *STICK) if sticks else ("contact.law='gross-sliding'", "stick={}")
-    ways = (f"run.integration='{how}'", f"contact.solver='{solver}'", "run.half_cycles=4")
+    ways = (f"run.integration='{how}'", "run.half_cycles=4")
     return list(evolve(assemble(load_case(base, [*settings, *law, *ways, *more]))))[-1]
 
 
 def agree(feature: str, how: str, *more: str, sticks: bool = False) -> Block:
     """Both ways give the same pressures, gaps and depths at every node, at the ends of the contact, too."""
-    one, other = (last_block(feature, how, solver, *more, sticks=sticks) for solver in ("condensed", "full"))
+    one = last_block(feature, how, *more, sticks=sticks)
+    with nothing_condensed():
+        other = last_block(feature, how, *more, sticks=sticks)
     assert (other.pressure >= 0).all()
     assert ((other.pressure > 0) == (one.pressure > 0)).all()
     gives = one.pressure.max() * one.system.elastic_length
@@ -105,9 +107,8 @@ def test_sets_follow_each_other_where_cut_off_pressures_stay(monkeypatch: pytest
 def test_on_ranks(feature: str) -> None:
     """All phases of a jump together, spread over the ranks with their bodies, as on one rank."""
     base, settings = FEATURES[feature]
-    case = load_case(
-        base, [*settings, "contact.law='gross-sliding'", "stick={}", "run.integration='jump'", "contact.solver='full'"]
-    )
-    one, other = (list(evolve(assemble(case, comm)))[-1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    case = load_case(base, [*settings, "contact.law='gross-sliding'", "stick={}", "run.integration='jump'"])
+    with nothing_condensed():
+        one, other = (list(evolve(assemble(case, comm)))[-1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     assert np.abs(one.pressure - other.pressure).max() < 1e-9 * other.pressure.max()
     assert np.abs(one.wear - other.wear).max() < 1e-9 * other.wear.max()

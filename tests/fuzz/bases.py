@@ -126,7 +126,6 @@ wear.punch = {per_area = "1e-9"}
 BLOCKS = """
 program = {steps = [{cycles = 1, load_factor = [0.5, 1], ambient = [0, 5]}, {distance = "4 mm", amplitude = [1, 2]}, {time = "0.5 s", load = ["100 N"]}]}
 """  # noqa: E501
-FULL = (*TINY[:-2], "run.half_cycles=1", "output.figures_at=[]", "contact.solver=full")
 PAD = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=2", "geometry.parameters.along=2",
        "geometry.parameters.pad_layers=1", "geometry.parameters.disc_layers=1", "run.half_cycles=2",
        "run.integration=explicit")  # fmt: skip
@@ -185,7 +184,6 @@ BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "profile": ("fretting", (*TINY, "motion.positions=3"), PROFILE),
     "stick cycle": ("fretting-partial-slip", STICK, FRETTING_CYCLE),
     "blocks": ("example2-heat", (*WITH_HEAT, "run.half_cycles=4"), BLOCKS),
-    "all displacements": ("example2", FULL, ""),
     "warm pad": ("brake-pad", (*PAD, "heat.steps=2"), ""),
     "two pads": ("disc-brake-two-pads", TWO_PADS, ""),
     "two bushings": ("two-bushings", SHAFT, ""),

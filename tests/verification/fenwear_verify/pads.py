@@ -18,9 +18,10 @@ from scipy.interpolate import CloughTocher2DInterpolator
 from fenwear import vary
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
-from fenwear.contact import FullContact, SlidingContact
+from fenwear.contact import SlidingContact
 from fenwear_verify.bodies import builtin
 from fenwear_verify.brakes import INNER, OUTER, PADS, SPEED
+from fenwear_verify.full_space import FullContact
 from fenwear_verify.suite import Result, Row, number, observed_order, profile, verification
 
 TURNS, MIDDLE = 12, (INNER + OUTER) / 2

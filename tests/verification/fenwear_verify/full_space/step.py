@@ -25,7 +25,7 @@ from fenwear.parallel import on_root
 from fenwear.stick.cone import derivative
 from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
 from fenwear.stick.interface import meshed
-from fenwear.stick.whole import WholeBodies
+from fenwear_verify.full_space.bodies import WholeBodies, whole_bodies
 
 
 class FullStep(Step):
@@ -38,7 +38,7 @@ class FullStep(Step):
             ConvergenceError: its equations are singular.
         """
         bodies = meshed(self.interface)
-        whole = bodies.whole(self.position)
+        whole = whole_bodies(bodies.bodies, self.position, moves=bodies.moves)
         return on_root(bodies.bodies.comm, lambda: self._solve(whole, status))
 
     def _solve(self, whole: WholeBodies, status: ContactStatus) -> StatusSolution:

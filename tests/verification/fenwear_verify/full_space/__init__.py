@@ -1,0 +1,51 @@
+"""Contact and stick on all displacements of both bodies, to compare the package's condensed solvers with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+from unittest.mock import patch
+
+from fenwear.assembly import Bodies, Tribosystem
+from fenwear.contact import SlidingContact
+from fenwear.cycle.gross_sliding import GrossSliding
+from fenwear.stick import increment
+from fenwear_verify.full_space.contact import FullContact
+from fenwear_verify.full_space.step import FullStep
+
+__all__ = ["FullContact", "FullStep", "nothing_condensed"]
+
+
+@contextmanager
+def nothing_condensed() -> Iterator[None]:
+    """Solve contacts and time steps on all displacements meanwhile."""
+
+    def whole(phases: Sequence[SlidingContact], bodies: Sequence[Bodies]) -> FullContact:
+        return FullContact(phases, [(own.punch, own.strip) for own in bodies])
+
+    def middle(system: Tribosystem, directions: Sequence[int]) -> FullContact:
+        phases = [SlidingContact(system.interface, system.friction_ratio(d)) for d in directions]
+        return whole(phases, [system.bodies] * len(phases))
+
+    def phases_of(system: Tribosystem, phases: Sequence[int]) -> FullContact:
+        ratios = system.friction_ratios()
+        sliding = [SlidingContact(system.interfaces[k], ratios[k]) for k in phases]
+        return whole(sliding, [system.loaded[k] for k in phases])
+
+    def passed(system: Tribosystem, phase: int, **_how: Any) -> FullContact:
+        interface = system.interfaces[phase] if system.creep is None else system.creep.grown[phase]
+        softer = None if system.creep is None else [system.creep.factors(phase)[:2]]
+        both = [(system.loaded[phase].punch, system.loaded[phase].strip)]
+        return FullContact([SlidingContact(interface, system.friction_ratios()[phase])], both, softer)
+
+    with ExitStack() as patches:
+        for owner, name, new in (
+            (Tribosystem, "contact", middle),
+            (Tribosystem, "phase_contact", phases_of),
+            (Tribosystem, "passed_contact", passed),
+            (GrossSliding, "replicated", lambda *_: False),
+            (increment, "_step", FullStep),
+        ):
+            patches.enter_context(patch.object(owner, name, new))
+        yield

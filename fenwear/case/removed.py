@@ -9,7 +9,7 @@ from __future__ import annotations
 from fnmatch import fnmatchcase
 
 REMOVED: dict[str, str] = {
-    "contact.solver": "Leave it out: contacts are solved on the condensed bodies, which the package's tests compare with "
+    "contact.solver": "Leave it out: contacts are solved on the condensed bodies, which tests compare with "
     "all displacements.",
     "setup.way": "Leave it out: each body is factored on a rank of its own, or over all ranks where its factor takes "
     "more than 4 GiB.",

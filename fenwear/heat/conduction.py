@@ -45,7 +45,8 @@ from fenwear.sliding.field import ALONG_X, SlidingField
 PREFIX = "fenwear_heat_"
 CONVECTING, CONTACT, HELD, INSULATED = 1, 2, 3, 4
 FREE = (CONVECTING, INSULATED)  # boundaries that material may move through
-END = 0.03  # mean cosine of the angle between v and n: below, an element's boundary turns in its place and is no end
+END = 0.1  # mean cosine of the angle between v and n: below, an element's boundary turns in its place and is no end
+CROSSED = 1e-6  # of the speed, above which v crosses a boundary
 WARMER = 100.0  # K: the mean rise that a convection is proposed for
 CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
 LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
@@ -348,10 +349,12 @@ class _Flow:
 
     @cached_property
     def _slant(self) -> fem.Function:
-        """Cosine of the angle between v and n, the mean over the free boundary of each element; collective."""
+        """Cosine of the angle between v and n, the mean over the free boundary of each element that v crosses."""
         body, v, w = self.body, self.velocity, ufl.TestFunction(self._constants)
         through, slant = ufl.dot(v, ufl.FacetNormal(body.body.mesh)), fem.Function(self._constants)
-        flow, along = (assembled_vector(body._ds(one * w, FREE)) for one in (through, ufl.sqrt(ufl.dot(v, v))))
+        size = ufl.sqrt(ufl.dot(v, v))
+        crossed = ufl.conditional(ufl.gt(abs(through), CROSSED * size), size, 0.0)
+        flow, along = (assembled_vector(body._ds(one * w, FREE)) for one in (through, crossed))
         slant.x.array[: len(flow)] = np.divide(flow, along, out=np.zeros_like(flow), where=along > 0)
         slant.x.scatter_forward()
         return slant

@@ -219,6 +219,6 @@ def test_modes_of_a_track_carry_no_heat(count: int) -> None:
     section = section_modes(body, TURNING, speed, 0.1)
     assert len(section.rates) > 2
     flow = comm.allreduce(step.entering.sum())
-    assert flow == pytest.approx(RHO_C * ((5**2 - 1**2) + (4**2 - 2**2)) / 2, rel=0.01)
+    assert flow == pytest.approx(RHO_C * ((5**2 - 1**2) + (4**2 - 2**2)) / 2, rel=1e-9)
     sums = [comm.allreduce(loads.sum(axis=0)) for loads in (section.entering, section.leaving)]
     np.testing.assert_allclose(sums, 0.0, atol=1e-12 * flow)

@@ -208,8 +208,8 @@ def test_half_a_disc_and_the_rest_of_its_track() -> None:
 def test_modes_of_a_track_carry_no_heat(count: int) -> None:
     """A ring that turns about an axis beside it: material enters and leaves by oblique facets, some only in part.
 
-    Whatever the facets are, the modes bring no heat in all, and uniform material that leaves has none of them. What
-    enters is what the stream function r^2 / 2 says: through the outer side from r = 1 to 5, through the hole from 2 to 4.
+    Whatever the facets are, the modes bring no heat in all, and uniform material that leaves has none of them. The
+    flow is that of the stream function r^2 / 2: through the outer side from r = 1 to 5, through the hole from 2 to 4.
     """
     mesh = ring(count)
     mesh.geometry.x[:, 0] += 3.0

@@ -12,6 +12,7 @@ from fenwear.case import Case
 from fenwear.cycle.totals import approach
 from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
+from fenwear.results.steps import REGIMES, regime_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.final import FinalShape
 from fenwear.stick.interface import meshed
@@ -38,9 +39,7 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     thick, weights = case.model.thickness, problem.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
     stuck = weights @ records.sticking.all(axis=0)
-    regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
-    if stuck == closed:
-        regime = "full stick"
+    regime = REGIMES[regime_of(records, stuck / closed)]
     seen = Seen.of_pressure(system, records.pressure, "in the first cycle")
     texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown", "large")]
     warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))

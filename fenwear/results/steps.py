@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 S = TypeVar("S", Block, Tribosystem)
 T = TypeVar("T")
 STEP = "step"
+ROUNDING = 1e-9  # of a share
 VARIABLES: dict[str, Variable] = {
     "step_fraction": (("half_cycle", STEP), "1", "fraction of the cycle at the end of the time step"),
     "displacement": (("half_cycle", STEP), "mm", "displacement of the strip's supports at the end of the time step"),
@@ -42,6 +43,8 @@ VARIABLES: dict[str, Variable] = {
     "surface_stress": (("half_cycle", STEP, "x"), "MPa", "stress along x in the strip's surface opposite each node"),
     "friction_work_increment": (("half_cycle",), "mJ", "work of friction in the half-cycle"),
     "energy_ratio": (("half_cycle",), "1", "work of friction over largest force times stroke"),
+    "stick_share": (("half_cycle",), "1", "share of the contact that sticks all through the cycle that ends here"),
+    "regime": (("half_cycle",), "1", "regime of fretting: 0 stick, 1 partial slip, 2 gross sliding"),
     "energy_balance_error": (("half_cycle",), "1", "missing energy of the half-cycle over its largest term"),
     "stick_width": (("half_cycle",), "mm", "width that sticks all through the cycle that ends here"),
     "stick_width_within": (("half_cycle",), "mm", "half the interval in which the width that sticks is known to lie"),
@@ -154,6 +157,7 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
     turn = along_sliding(problem.interface.middle)
     traction, slip = (np.einsum("nam,knm->akn", turn, v) for v in (records.traction, records.slip))
     stuck, within = stuck_size(pair, steps)
+    share = float(pair.weights @ (steps.stuck & records.touched)) / max(float(pair.weights @ records.touched), 1e-300)
     found: dict[str, Any] = {
         "step_fraction": [program[steps.first + k].fraction for k in range(len(records))],
         "displacement": records.displacement,
@@ -165,6 +169,8 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
         "surface_stress": surface_stress(system.case, records),
         "friction_work_increment": thick * records.energy(problem.weights),
         "energy_ratio": steps.energy_ratio,
+        "stick_share": share,
+        "regime": regime_of(records, share),
         "energy_balance_error": records.balance_error(problem.weights),
         "stick_width": stuck,
         "stick_width_within": within,
@@ -178,6 +184,21 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
         for k, body in enumerate(("punch", "strip")):
             found[f"step_temperature_{body}"] = records.temperature[:, k]
     return found
+
+
+REGIMES = ("stick", "partial slip", "gross sliding")
+
+
+def regime_of(records: TimeStepRecords, share: float) -> int:
+    """Return the regime of time steps by its number in `REGIMES`: gross where nothing sticks in one of them.
+
+    Args:
+        records: The time steps.
+        share: Of the contact, that sticks all through.
+    """
+    if not records.sticking.any(axis=1).all():
+        return 2
+    return 0 if share > 1 - ROUNDING else 1
 
 
 def stuck_size(pair: ContactPair, steps: Steps) -> tuple[float, float]:

@@ -1,4 +1,7 @@
-"""The picture of a sweep: its key numbers over one or two of its keys."""
+"""The picture of a sweep: its key numbers over one or two of its keys.
+
+Of contact with stick over two keys, such as amplitude and load, it is a map of fretting.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from matplotlib.colors import ListedColormap
 
-from fenwear.report.style import legend_beside, panels, run_style, shades
+from fenwear.report.style import BLUE, GREY, RED, legend_beside, panels, run_style, shades
 from fenwear.results.disk import writing
+from fenwear.results.steps import REGIMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PICTURE = "sweep.png"
+FRETTING = ("regime", "stick_share", "energy_ratio", "largest_depth", "largest_depth_strip")
 SHOWN = (
     "largest_pressure",
     "contact_width",
@@ -39,7 +45,12 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
     """
     first, second, fixed = _chosen(dataset)
     at_first = dataset.isel(dict.fromkeys(fixed, 0))
-    shown = [name for name in SHOWN if name in at_first and np.isfinite(at_first[name].values).any()]
+    of_fretting = second is not None and "regime" in at_first
+    shown = [
+        name
+        for name in (FRETTING if of_fretting else SHOWN)
+        if name in at_first and np.isfinite(at_first[name].values).any()
+    ]
     count = len(shown)
     figure, axes = panels(count, 2.6, share_x=False)
     for ax, name in zip(axes, shown, strict=True):
@@ -48,8 +59,8 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
         unit = unit or values.attrs["units"]
         ax.set_title(_capital(values.attrs["long_name"]), loc="left")
         label = f"{values.attrs['long_name'].split(' of ')[0]} ({unit})" if unit else values.attrs["long_name"]
-        if second is not None and at_first.sizes[second] > LINES:
-            _map(figure, ax, factor * values, first, second, label)
+        if second is not None and (at_first.sizes[second] > LINES or of_fretting):
+            _map(figure, ax, factor * values, first, second, label if unit else "")
         else:
             _lines(ax, factor * values, first, second)
             ax.set_ylabel(label)
@@ -144,8 +155,13 @@ def _lines(ax: Axes, values: xarray.DataArray, first: str, second: str | None) -
 
 def _map(figure: Figure, ax: Axes, values: xarray.DataArray, first: str, second: str, label: str) -> None:
     (x, x_names), (y, y_names) = (_places(values, key) for key in (first, second))
-    mesh = ax.pcolormesh(x, y, values.transpose(second, first).values, shading="nearest", cmap="viridis")
-    figure.colorbar(mesh, ax=ax, label=label)
+    colours: dict[str, Any] = {"cmap": "viridis"}
+    if values.name == "regime":  # a map of fretting
+        colours = {"cmap": ListedColormap([BLUE, GREY, RED]), "vmin": -0.5, "vmax": len(REGIMES) - 0.5}
+    mesh = ax.pcolormesh(_edges(x), _edges(y), values.transpose(second, first).values, **colours)
+    bar = figure.colorbar(mesh, ax=ax, label=label)
+    if values.name == "regime":
+        bar.set_ticks(range(len(REGIMES)), labels=REGIMES)
     if x_names:
         ax.set_xticks(x, x_names)
     if y_names:
@@ -155,6 +171,14 @@ def _map(figure: Figure, ax: Axes, values: xarray.DataArray, first: str, second:
             scale("log")
     ax.set_xlabel(_axis_label(values, first))
     ax.set_ylabel(_axis_label(values, second))
+
+
+def _edges(places: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return the edges of the cells around places on an axis (n + 1,), on a logarithmic one of equal ratios."""
+    scale, back = (np.log, np.exp) if _even_ratios(places) else (np.asarray, np.asarray)
+    at = np.asarray(scale(places), dtype=float)
+    half = np.diff(at) / 2 if len(at) > 1 else np.full(1, 0.5)
+    return np.asarray(back(np.concatenate([[at[0] - half[0]], at[:-1] + half[: len(at) - 1], [at[-1] + half[-1]]])))
 
 
 def _even_ratios(places: np.ndarray[Any, Any]) -> bool:

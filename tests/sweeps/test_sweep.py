@@ -247,3 +247,30 @@ def test_command_on_processes_and_ranks(fenwear: Callable[..., Any], tmp_path: P
     assert wrong.returncode == 2
     assert "did you mean 'friction'" in wrong.stderr
     assert not (tmp_path / "0").exists()
+
+
+def test_a_map_of_fretting() -> None:
+    """Over amplitude and load: the force that slides is mu F, at an amplitude that grows with the load.
+
+    Gross sliding dissipates 4 mu F (u0 - u_e) in a cycle, u_e the elastic way: the energy ratio is 1 - u_e / u0, and
+    partial slip has less than Fouvry's 0.2.
+    """
+    small = ("geometry.parameters.elements_along_contact=10", "geometry.degree=1", "run.half_cycles=2",
+             "stick.steps=16", "run.integration=explicit", "contact.law=coulomb")  # fmt: skip
+    case = load_case("fretting-partial-slip", small)
+    force = case.punch.loads[0].force[1]
+    over = {"motion.amplitude": [1e-4, 1e-3, 8e-3], "punch.loads.0.force.1": [force / 2, force]}
+    found = package.sweep(case, over, of="run")
+    regime, share, ratio = (found[name].values for name in ("regime", "stick_share", "energy_ratio"))
+    assert (np.diff(regime, axis=0) >= 0).all()
+    assert (np.diff(regime, axis=1) <= 0).all()
+    assert {*regime[0]} <= {0, 1}
+    assert {*regime[-1]} == {2}
+    assert (np.diff(share, axis=0) <= 0).all()
+    assert (np.diff(share, axis=1) >= 0).all()
+    np.testing.assert_array_equal(share[regime == 2], 0)
+    ratio = ratio.mean(axis=-1) if ratio.ndim > 2 else ratio
+    assert ratio[regime == 2].min() > 0.2 > ratio[regime == 1].max()
+    figure = sweep_figure(found)
+    assert figure.axes[0].get_title(loc="left") == "Regime of fretting: 0 stick, 1 partial slip, 2 gross sliding"
+    np.testing.assert_array_equal(np.sort(figure.axes[0].collections[0].get_array().ravel()), np.sort(regime.ravel()))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from mpi4py import MPI
 
-from fenwear.cli.base import JsonOption, SetOption, app, load, log, show, show_results
-from fenwear.errors import CaseError, InputError
+from fenwear.cli.base import JsonOption, app, log, show, show_results
 from fenwear.parallel import on_root
 
 
@@ -101,44 +99,15 @@ def flash_command(
 
 @app.command("compare")
 def compare_command(
-    directories: Annotated[
-        list[Path] | None, typer.Argument(metavar="DIR...", help="The folders of several runs.")
-    ] = None,
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The folders of several runs.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The figure to write: .png, .pdf or .svg.")] = Path(
         "compare.png"
     ),
-    jumped: Annotated[
-        str | None,
-        typer.Option(
-            "--jumped",
-            metavar="CASE",
-            help="March this case and jump it, into folders beside the figure; compare both.",
-        ),
-    ] = None,
-    settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
     """Put several runs in one figure and one table, with the differences of their cases."""
-    directories = list(directories or [])
-    if jumped is not None:
-        directories += _march_and_jump(jumped, settings, output)
-    elif settings:
-        raise CaseError(InputError("--set", "expected together with --jumped CASE: runs that are there do not change"))
     from fenwear.report.compare import compare, draw_comparison
 
     comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
     on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))
     show_results(comparison.as_json() if as_json else comparison.text(), f"figure in {output}")
-
-
-def _march_and_jump(name: str, settings: list[str], output: Path) -> list[Path]:
-    """March a case and jump it, each into a new folder beside a figure; return the folders; collective."""
-    from fenwear.results.history import free_directory
-    from fenwear.run import run_case
-
-    folders = []
-    for way, integration in (("marched", "implicit"), ("jumped", "jump")):
-        case = load(name, [*settings, f"run.integration={integration}", "output.report=false"])
-        folder = on_root(MPI.COMM_WORLD, partial(free_directory, output.parent / f"{Path(name).stem}-{way}"))
-        folders.append(run_case(case, name, folder, log)[1])
-    return folders

@@ -9,6 +9,7 @@ from fenwear.errors import CaseError, InputError
 REMOVED = {
     "--posterior": "removed. Sample the posterior with emcee: docs/how-to/calibrate.md has the recipe",
     "--sobol": "removed. Compute Sobol indices with SALib: docs/how-to/calibrate.md has the recipe",
+    "--jumped": "removed. Run the case twice, with --set run.integration=implicit and =jump, then compare both folders",
     "serve": "removed. Offer the model with the package umbridge: docs/how-to/other-programs.md has the script",
 }
 

@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from fenwear import CaseError, load_case
-from fenwear.cli import app
 from fenwear.report.compare import at_same_places, compare, comparison_figure, draw_comparison
 from fenwear.run import run_case
 
@@ -131,17 +129,3 @@ def test_worn_strips_are_drawn(tmp_path: Path) -> None:
     titles = [ax.get_title("left") for ax in comparison_figure(comparison).axes]
     assert any("strip at the end" in title for title in titles)
     assert any(name.startswith("worn depth of the strip") for name in comparison.named()["at the same places"])
-
-
-def test_marched_against_jumped(tmp_path: Path) -> None:
-    """One command runs both and compares them."""
-    settings = [f"--set={one}" for one in (*SMALL, "run.half_cycles=40")]
-    done = CliRunner().invoke(app, ["compare", "--jumped", "example1", *settings, "-o", str(tmp_path / "both.png")])
-    assert done.exit_code == 0, done.output
-    assert (tmp_path / "both.png").exists()
-    for way in ("marched", "jumped"):
-        assert (tmp_path / f"example1-{way}" / "history.nc").exists()
-    assert "run.integration" in done.output
-    refused = CliRunner().invoke(app, ["compare", "a", "b", "--set=run.half_cycles=2"])
-    assert isinstance(refused.exception, CaseError)
-    assert "expected together with --jumped" in str(refused.exception)

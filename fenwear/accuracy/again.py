@@ -64,17 +64,17 @@ class Again:
         """
         return values_of(self.ends()[1])
 
-    def ends(self) -> tuple[Block, Block]:
-        """Return its first half-cycles and its last ones; collective.
+    def ends(self) -> tuple[Block, Block, Block]:
+        """Return its first half-cycles, its last ones, and of jumps those that end a cycle before; collective.
 
         Raises:
             ConvergenceError: a half-cycle did not converge.
         """
         blocks = follow_program(self.system, self._integrate, self.until)
-        first = last = next(blocks)
+        first = last = before = next(blocks)
         while last.end.half_cycle < self.until and (block := next(blocks, None)) is not None:
-            last = block
-        return first, last
+            before, last = last, block
+        return first, last, before
 
     def _integrate(
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
@@ -86,7 +86,8 @@ class Again:
             return
         state, left = start, False
         reduced, tolerance = with_reduced_heat(system), run.jump_tolerance
-        for block in jump(reduced, span.until, tolerance=tolerance, start=start, finer=True, **shared):
+        stops = frozenset({self.until - system.motion.half_cycles})
+        for block in jump(reduced, span.until, tolerance=tolerance, start=start, finer=True, stops=stops, **shared):
             yield block
             state, left = block.end, leave(block.end)
         if not left and (0 if state is None else state.half_cycle) < span.until:  # a cycle that is not whole

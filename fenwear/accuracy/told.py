@@ -31,6 +31,7 @@ from fenwear.errors import CaseError, ConvergenceError
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
 AT_EDGE, INSIDE, OF_VOLUME = 1.0, 1.5, 2.0  # orders in the distance of nodes, see `order_of`
 NOTICED = 0.1  # of the wear from which on meshes follow: before, what it would do is not asked for
+LATE = 0.5  # of a cycle: within it temperatures of jumps, which see whole cycles, may be any
 ROUNDING = 1e-12
 NOTHING_BELOW = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
 
@@ -92,17 +93,19 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         longer = by_jumps and are_dear(last)
         share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
         again = Again(set_up(in_longer_jumps(base) if longer else base, last.system, lower), until, watch)
-        first, end = again.ends()
+        first, end, a_cycle_ago = again.ends()
         before, without = values_of(end), by_short_jumps(end)
         short = before if without is None else values_of(without)
         if lower is not None:
             coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
             found["mesh"] = of_mesh(values, coarse, lower.ratio)
-        of_jumps = _apart(before, short, SAFETY * share)
-        if (
-            last.steps and (warmest := values.get(Quantity("largest_temperature"))) is not None
-        ):  # by the last jump's own error
-            of_jumps[Quantity("largest_temperature")] = getattr(last.steps[-1], "jump_error", 0.0) * abs(warmest.number)
+        of_jumps = {quantity: SAFETY * share * value.apart(short[quantity]) for quantity, value in before.items()}
+        warmest = Quantity("largest_temperature")
+        if warmest in before and by_jumps:
+            late = LATE * before[warmest].apart(values_of(a_cycle_ago)[warmest])
+            if last.steps:  # by the last jump's own error
+                of_jumps[warmest] = getattr(last.steps[-1], "jump_error", 0.0) * abs(values[warmest].number)
+            of_jumps[warmest] = max(of_jumps[warmest], late)
         for source, contribution in _steps(again, before, of_jumps, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
@@ -178,7 +181,7 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
     """Return what steps of half-cycles leave: in depths, of first order, half of what the wear of one has changed.
 
     The sums of explicit and of implicit steps differ by the wear of the first half-cycle less that of the last one, and
-    lie on either side of the wear that goes on within the steps. The pressure is half a half-cycle late.
+    lie on either side of the wear that goes on within the steps. Pressure and temperature are half a half-cycle late.
     """
     strokes = last.system.motion.half_cycles
     late = float(last.periodicity[-1]) * pressure_scale(last.system, last.pressure[-1]) / (2 * strokes)
@@ -187,6 +190,10 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
         rate = float(start[0].max()) / int(first.half_cycle[0])
         mean = float(depth[-1].max()) / int(last.half_cycle[-1])
         found[Quantity("largest_depth", body)] = abs(rate - mean) / 2
+    if last.heat is not None and len(last.half_cycle) > strokes:
+        sides = (last.heat.temperature_punch, last.heat.temperature_strip)
+        change = max(float(np.abs(side[-1] - side[-1 - strokes]).max()) for side in sides)
+        found[Quantity("largest_temperature")] = change / (2 * strokes)
     return {
         quantity: found.get(quantity, late if "pressure" in quantity.name and np.isfinite(late) else 0.0)
         for quantity in before
@@ -218,7 +225,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles
     one = replace(system, made_from=base) if below is None else set_up(base, system, below)
-    _, last = Again(one, until, watch).ends()
+    _, last, _ = Again(one, until, watch).ends()
     found = uncertainty(base, last, watch)
     if below is not None and "mesh" in found.contributions:
         mesh = {

@@ -479,7 +479,7 @@ class Jumps(_Run):
         end = replace(cycle.end, temperature=exchange.own(after).values)
         return replace(cycle, end=end, warm=self.temperature(state))
 
-    def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: int) -> Totals:
+    def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: float) -> Totals:
         """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
         adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
         found = (adds[0] + adds[1]).times(cycles / 2)

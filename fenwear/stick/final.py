@@ -368,7 +368,8 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     system, load = np.zeros((k + r, k + r)), np.zeros(k + r)
     system[:k, :k] = position.compliance.entries(zone, zone) / scale
     system[:k, k:], system[k:, :k] = position.modes[zone], position.balance[:, zone]
-    load[k:], approach = -problem.interface.loaded(None).resultant, np.zeros(n)
+    load[k:] = -problem.interface.loaded(None).resultant
+    approach: Array = np.zeros(n)
     if not load.any():  # the punch is moved: as a flat one by as much as it comes nearer
         approach = position.interface.load_gap
         load[:k] = -approach[zone]

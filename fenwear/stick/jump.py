@@ -106,7 +106,7 @@ def _length(cycles: float) -> float:
 
 
 def first_cycle(
-    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: int, warm: Array | None = None
+    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array | None = None
 ) -> FrettingCycle:
     """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,)."""
     return _rate(problem, at, worn, number, warm=warm)

@@ -100,9 +100,9 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "expected the axis z of the rings": (PHYSICS, "rings that turn about another axis than theirs"),
         "rotation or oscillation, or a cycle": (PHYSICS, "rings that slide along a line: they open"),
         "motion.along: belongs to solids": (PHYSICS, "directions in space of a plane model"),
-        "heat out of the plane": (
+        "takes heat out of a plane model": (
             MODEL,
-            "heat and sliding out of a plane model, which carries it away along y: a solid has it",
+            "heat and sliding along x and y together: what leaves along y carries heat away; a solid has it",
         ),
         "the strip stays in its place": (PHYSICS, "gross sliding without motion"),
         "expected 1 for sliding out of the plane": (

@@ -24,6 +24,7 @@ from fenwear.errors import CaseError, InputError
 SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about {0}: hold it against turning"
 FLAT = 1e-6  # of the body: what lies in a plane
 WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
+STEEP = 0.02  # component of normals along z, below which all pressure acts across it: a cone of a degree
 PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
 RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
     "stress": PLANE,
@@ -375,16 +376,15 @@ def _check_facing(surface: ContactSurface, outward: NDArray[np.float64]) -> None
         outward: Normals at those of its nodes that are of the part.
 
     Raises:
-        CaseError: all of its contact surface looks nearer to x or y than to z.
+        CaseError: none of its contact surface looks along z in part.
     """
-    across = np.abs(outward[:, :-1]).max(axis=1, initial=0.0) - np.abs(outward[:, -1])
-    if len(across) and (across > 1e-9).all():  # a wedge of 45 degrees still works
+    if len(outward) and (np.abs(outward[:, -1]) < STEEP).all():
         mean = np.abs(outward).sum(axis=0)
         name, axis = surface.body, next(a for a, c in axes(surface.dim).items() if c == mean.argmax())
         message = (
             f"{name}_contact looks along {axis}, and the {name} is not held: pressure would have to carry its loads "
-            f"along z, the only direction in which a body may be free to move. Expected a contact whose normal is "
-            f"nearest to z somewhere (turn the geometry, and with it supports, loads and motion), or a {name} that "
+            f"along z, the only direction in which a body may be free to move. Expected a contact whose normal has "
+            f"a part along z somewhere (turn the geometry, and with it supports, loads and motion), or a {name} that "
             "supports hold in all directions and press by a displacement (by)"
         )
         raise CaseError(InputError("geometry", message))

@@ -17,7 +17,11 @@ from fenwear.case.quantities import Angle, AngularFrequency, Length, Number, Par
 class _Along(Part):
     """What translations of the strip share."""
 
-    axis: Literal["x", "y"] = Field(default="x", description="x: along the contact; y: out of the plane")
+    axis: Literal["x", "y"] = Field(
+        default="x",
+        description="x: along the contact; y: out of the plane, "
+        "as of bodies that are endless along y: with heat, no cold material comes in",
+    )
     along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
 
     @model_validator(mode="after")

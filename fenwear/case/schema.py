@@ -209,7 +209,7 @@ class Case(Part):
         problems = motion.model_problems(self.model.kind, self.model.axes)
         if self.heat is not None and self.model.kind == "plane" and self.passes:
             leaving = [name for name in motion.column_names if name.endswith("shift_y")]
-            why = "with heat: a plane model does not follow heat out of the plane"
+            why = "with heat: what moves along x as well takes heat out of a plane model"
             problems += [f"motion.columns: expected no column {name} {why}" for name in leaving]
         if motion.course.rests and not self.sticks:
             problems.append("motion.columns: expected a motion: the strip stays in its place in all rows")
@@ -318,8 +318,6 @@ class Case(Part):
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
         if self.strip_changes and self.passes and not self.sticks:
             problems += self._track_problems()
-        if not self.passes and self.model.kind == "plane" and self.heat is not None:
-            problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         passes_on = one_way and self.passes
         problems += creep_problems(self.bodies, self.contact.layer, passes_on=passes_on)
         several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1
@@ -488,7 +486,10 @@ class Case(Part):
             "contact.transverse_friction: expected 0, friction being against the slip that is found,": (
                 self.contact.transverse_friction != 0
             ),
-            "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
+            "model.kind: expected a plane model or a solid, such as fretting-sphere with motion.kind = 'oscillation': "
+            "rings slide around their axis, where displacements in (r, z) do not give way, so that nothing sticks": (
+                self.model.kind == "axisymmetric"
+            ),
             "heat.operator: expected 'reduced', whose heat each time step has as a matrix of its tractions,": (
                 self.heat is not None and self.heat.operator == "full"
             ),
@@ -496,7 +497,9 @@ class Case(Part):
                 self.heat is not None and self.heat.coupling == "split"
             ),
             "motion.kind: expected a motion to and fro, or a cycle,": isinstance(self.motion, OneWay | Rotation),
-            "motion.axis: expected 'x'": not self.passes and not table,
+            "motion.axis: expected 'x', as bodies of a plane model do not give way along y,": (
+                not self.passes and not table
+            ),
             "motion.columns: expected no column shift_y in a plane model, whose tractions lie in the plane,": (
                 table and self.model.kind == "plane" and any(name.endswith("shift_y") for name in columns)
             ),

@@ -131,7 +131,7 @@ class Correction:
         response: Displacement at each point along each direction, from unit forces at each (m, a, m, d), mm.
         fields: Displacement of this rank's own degrees of freedom from unit forces at each point along each direction
             (owned, m, a), mm: what loads do on them they do to the contact.
-        uneven: How much of the response was not symmetric, over its largest.
+        uneven: How much of the response was not symmetric, at most, mm/N, in the plane mm/(N/mm).
         moments: Of the tractions that unit forces at the points leave on the body, about what guides hold (m, d, g): of
             the forces themselves, but for quadrature.
         guided: What the body answers to its guides, their rotations and what their couples move at the points
@@ -203,7 +203,7 @@ def correct(elastic: ElasticBody, ground: Ground, counts: tuple[int, ...], along
     change = rest.reshape(m, len(along), m, len(along))
     found = found + np.einsum("iajb,bd->iajd", change, along)
     fields = moved.reshape(size, m, -1) + np.einsum("smd,ad->sma", own, along)
-    uneven = float(2 * np.abs(rest).max() / max(np.abs(part).max(), 1e-300))
+    uneven = float(2 * np.abs(rest).max())
     moments = np.moveaxis(elastic.couple_of(every).reshape(-1, m, d), 0, 2)
     return Correction(counts, found, fields, uneven, moments)
 

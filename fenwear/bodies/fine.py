@@ -36,7 +36,7 @@ FEWEST, MOST = 5, 17  # points along an axis
 PER_DEPTH = 2.5  # further points for each distance of the next boundary that the grid is long
 RESOLVED, TRUSTED = 1e-3, 1e-2  # of the half-space's mean over the grid: what polynomials should, and may leave out
 FALLS = 0.7  # of what polynomials leave out: by how much two more points along an axis have to lessen it
-UNEVEN = 0.05  # of the correction: what may not be symmetric of it, by coarse elements or a strongly curved surface
+UNEVEN = 0.1  # of the same mean: what may not be symmetric, by coarse elements or a strongly curved surface
 OF_SQUARE, OF_LINE = 2.97, 1.5  # mean of s / r, and of ln(s / r), over two points of a square or line of side s
 LARGE = 2**25  # entries of a factor, a quarter of a GiB, above which it is not kept beside the contact
 SAME = 1e-9  # of a material's constants: one material
@@ -271,11 +271,13 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
             "from edges, or take 'condensed'"
         )
         raise CaseError(InputError(key, message))
-    if correction.uneven > UNEVEN:
+    uneven = correction.uneven / _mean_compliance(ground)
+    if uneven > UNEVEN:
         message = (
-            f"what the {elastic.body.name} does otherwise than a half-space differs by {100 * correction.uneven:.2g} % "
-            f"from Betti's theorem, where 'fine' expects at most {100 * UNEVEN:g} %: take smaller elements, or a "
-            "contact that is small against the radius of the surface, or 'condensed'"
+            f"what the {elastic.body.name} does otherwise than a half-space violates Betti's theorem by "
+            f"{100 * uneven:.2g} % of the half-space's compliance, where 'fine' expects at most {100 * UNEVEN:g} %. "
+            "Take smaller elements, a smaller grid.size (the contact should be small against the radius of the "
+            "surface), or 'condensed'"
         )
         raise CaseError(InputError(key, message))
     return correction, float(rests.max())
@@ -287,7 +289,6 @@ def rest_of(correction: Correction, ground: Ground) -> Array:
     Over the mean of the half-space's compliance over the grid. From the last two orders and the two before them, as
     the coefficients of a smooth function fall by the same factor from order to order.
     """
-    d, sides = len(correction.counts) + 1, ground.grid.sides
     to_orders: Array = np.ones((1, 1))
     numbers: NDArray[np.int64] = np.zeros((1, 0), dtype=np.int64)
     for count in correction.counts:
@@ -295,9 +296,7 @@ def rest_of(correction: Correction, ground: Ground) -> Array:
         own = np.tile(np.arange(count), len(numbers))
         numbers = np.column_stack([np.repeat(numbers, count, axis=0), own])
     orders = np.einsum("pi,iajd->pajd", to_orders, correction.response)
-    ease = (1 - ground.poisson) / (2 * np.pi * ground.shear)  # 1 / (pi E*) of one body
-    mean = ease * OF_SQUARE / np.sqrt(np.prod(sides)) if d == 3 else 2 * ease * OF_LINE
-    found = []
+    mean, found = _mean_compliance(ground), []
     for axis, count in enumerate(correction.counts):
         pairs = [(count - 2, count), (count - 4, count - 2)]
         sizes = [
@@ -306,6 +305,12 @@ def rest_of(correction: Correction, ground: Ground) -> Array:
         ]
         found.append(sizes[0] * min(sizes[0] / max(sizes[1], 1e-300), 1.0) / mean)
     return np.array(found)
+
+
+def _mean_compliance(ground: Ground) -> float:
+    """Return the mean of the half-space's compliance over the grid, mm/N, in the plane mm/(N/mm)."""
+    ease, sides = (1 - ground.poisson) / (2 * np.pi * ground.shear), ground.grid.sides  # 1 / (pi E*) of one body
+    return float(ease * OF_SQUARE / np.sqrt(np.prod(sides)) if len(sides) == 2 else 2 * ease * OF_LINE)
 
 
 def _ground(elastic: ElasticBody, key: str) -> Ground:

@@ -196,7 +196,7 @@ class Patch:
         for s in range(r):
             for t in range(r):
                 schur[:, s, :, t] = endless.between(held[s], self._moved[t])
-        free = np.abs(modes).reshape(m * r, -1).any(axis=1)
+        free = modes.any(axis=tuple(range(2, modes.ndim))).ravel()
         self._schur = np.where(np.outer(free, free), schur.reshape(m * r, m * r), np.diag(np.where(free, 0.0, 1.0)))
         if r and not (np.abs(np.diagonal(self._schur)) > 0).all():
             raise np.linalg.LinAlgError("singular matrix")

@@ -136,8 +136,9 @@ class PhasesBox:
         gaps, (m, r) = self.products.apply(p), a.shape
         if by is not None:
             gaps += self.opened(by, p)
-        gaps += (a[:, None] @ self.modes.reshape(m, r, -1)).reshape(gaps.shape)
-        return gaps, (self.balance.reshape(m, r, -1) @ p.reshape(m, -1, 1))[:, :, 0]
+        size = p[0].size  # of the box: there may be no rigid motions
+        gaps += (a[:, None] @ self.modes.reshape(m, r, size)).reshape(gaps.shape)
+        return gaps, (self.balance.reshape(m, r, size) @ p.reshape(m, size, 1))[:, :, 0]
 
     def _boxed(self, values: Array) -> Array:
         m, r, n = values.shape

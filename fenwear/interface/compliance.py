@@ -258,9 +258,11 @@ class Interface:
         if self.like is not None:
             return self.like.elastic_length
         pair, modes = self.pair, self.rigid.rigid_normal
-        inverse = np.linalg.pinv(modes)
-        opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
-        rigid = opened.T * pair.weights  # what modes take up of S, which is symmetric but for the weights
+        rigid = np.zeros(modes.T.shape)  # what modes take up of S, which is symmetric but for the weights
+        if rigid.size:
+            inverse = np.linalg.pinv(modes)
+            opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
+            rigid = opened.T * pair.weights
         count, compliance = len(pair.weights), self.compliance(0.0)
         step = 1 if self.cost is None else max(count // SOME, 1)
         runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]

@@ -434,3 +434,34 @@ def test_factors_wait_for_the_fields_of_the_end(monkeypatch: pytest.MonkeyPatch)
     right = np.random.default_rng(0).standard_normal(kept.load.size)
     right[kept.supported] = 0.0
     np.testing.assert_allclose(freed.solve(right), kept.solve(right), rtol=1e-12, atol=0)
+
+
+APPROACH = "punch.supports=[{on='punch_top', fix=['x', 'y', 'z'], by=['0 mm', '0 mm', '-5 um']}]"
+
+
+def test_a_prescribed_approach_presses_as_its_force() -> None:
+    """Without any load on a contact grid: the pressures are those of the force that supports then carry.
+
+    But for how an even load bends the top of the ball, 0.3 % of the pressures and 0.6 % of the approach.
+    """
+    coarse = [*BALL, "grid.nodes=33"]
+    by = assemble(load_case("ball-on-flat", [*coarse, "punch.loads=[]", APPROACH]))
+    (held,) = march(by, 1)
+    weights, pressure = by.pair.weights, held.pressure[0]
+    force = float(weights @ pressure)
+    load = f"punch.loads=[{{on='punch_top', force=['0 N', '0 N', '{-force} N']}}]"
+    free = assemble(load_case("ball-on-flat", [*coarse, load]))
+    (pressed,) = march(free, 1)
+    assert weights @ np.abs(pressed.pressure[0] - pressure) < 5e-3 * force
+    assert pressed.rigid[0, 0] == pytest.approx(-5e-3, rel=1e-2)
+
+
+@pytest.mark.parametrize("held", [[], ["punch.loads=[]", APPROACH]], ids=["load", "approach"])
+def test_what_is_not_symmetric_does_not_depend_on_supports(held: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a ball in one mesh, under a load and by an approach: some 5e-4 of the half-space's compliance."""
+    case = load_case("ball-on-flat", [*BALL, "grid.nodes=17", *held])
+    monkeypatch.setattr(fine_bodies, "UNEVEN", 1e-3)
+    assemble(case)
+    monkeypatch.setattr(fine_bodies, "UNEVEN", 2e-4)
+    with pytest.raises(CaseError, match=r"punch\.operator: .* Betti"):
+        assemble(case)

@@ -21,7 +21,7 @@ from fenwear.cli.base import (
     show,
     show_results,
 )
-from fenwear.errors import StackError
+from fenwear.errors import CaseError, InputError, StackError
 
 QuantitiesOption = Annotated[
     list[str],
@@ -139,6 +139,7 @@ def calibrate_command(
         bool, typer.Option("--each", help="Fit every file alone, and print the scatter between them.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Take the trials of an interrupted fit in -o DIR.")] = False,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
@@ -147,13 +148,17 @@ def calibrate_command(
 
     loaded = load(case, settings)
     if each:
+        if resume:
+            raise CaseError(InputError("--resume", "resumes the fit of all files together. Leave out --each"))
         tests, between, folder = commands.run_calibrate_each(
             loaded, Path(case).stem, data, unknowns, baseline, output, log
         )
         text = "\n".join([*(one.text() for one in tests), *between.text])
         show_results(commands.each_as_json(tests, between) if as_json else text, f"results in {folder}")
         return
-    found, folder = commands.run_calibrate(loaded, Path(case).stem, data, unknowns, baseline, output, log)
+    found, folder = commands.run_calibrate(
+        loaded, Path(case).stem, data, unknowns, baseline, output, log, resume=resume
+    )
     show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 
 

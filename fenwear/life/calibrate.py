@@ -25,13 +25,14 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.data import DataSet, Series
 from fenwear.life.identifiable import hardly_known, known_together, not_determined, without_baselines
 from fenwear.life.keys import nearest_possible
-from fenwear.life.least_squares import STEP, LeastSquares
+from fenwear.life.least_squares import LeastSquares
 from fenwear.life.noise import FEW, SMOOTH, Noise, in_order, neighbours_ratio
 from fenwear.life.quantities import GROWING, unit_of
 from fenwear.life.scatter import Scatter
+from fenwear.life.trials import Trials
 from fenwear.life.unknowns import ScaledUnknown, Unknown
+from fenwear.parallel import on_root
 
-ROUNDS = 2  # of fits, each on the jumps of a run at its start
 LARGEST_CONDITION = 1e12  # of the Jacobian, beyond which the data do not tell what is fitted
 WIDER = 1.5  # factor of a standard error worth a word
 
@@ -192,6 +193,8 @@ def calibrate(
     baseline: Sequence[str] = (),
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Callable[[str], None] = lambda message: None,
+    trials: Trials | None = None,
+    resume: bool = False,
 ) -> Calibration:
     """Return the unknown keys of a case that fit measurements best; collective.
 
@@ -201,36 +204,36 @@ def calibrate(
         unknowns: Keys, with or without bounds.
         baseline: "offset" and "tilt" of each profile's trace, to be found too.
         comm: The ranks.
-        progress: Told what goes on.
+        progress: Gets the stage, and the number of runs with their residual.
+        trials: Keeps the predictions of each trial, for a fit that is interrupted.
+        resume: Take those that it holds already.
 
     Raises:
         CaseError: an unknown without influence, bounds that make no sense, or too few data.
         ConvergenceError: a run or the fit did not converge.
     """
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
-    problem = LeastSquares(case, data, asked, baseline, comm, progress)
+    kept = Trials() if trials is None else trials
+    problem = LeastSquares(case, data, asked, baseline, comm, progress, kept)
+    about = f"{case.to_toml()} {list(data)} {asked} {list(baseline)}"
+    on_root(comm, lambda: kept.begin(about, resume=resume))
     return problem.team.lead(partial(_calibrated, problem, progress))
 
 
 def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calibration:
     z = np.zeros(len(problem.unknowns))
-    result = None
-    for number in range(ROUNDS):  # the jumps of the start are too long or too short for the end
-        if not _begin(problem, z):
-            break  # the fit is on the jumps of its own end
-        if number == 0:
-            problem.check_influence(problem.jacobian(z), z)
-        progress(f"fit {number + 1} of {ROUNDS}")
-        result = problem.fit(start=z)
-        before, z = z, np.asarray(result.x[: len(z)])
-        if np.abs(z - before).max() < STEP:
-            break
-        if not result.success:
-            raise ConvergenceError(
-                f"the fit did not converge in {result.nfev} trials; expected fewer unknowns, bounds, or a better start"
-            )
-    if result is None:
-        raise ConvergenceError("the fit did not begin")
+    _begin(problem, z)
+    problem.check_influence(problem.jacobian(z), z)
+    progress("approach to the fit")
+    z = problem.approach(z)
+    if _begin(problem, z):  # the jumps of the start are too long or too short for the end
+        progress("fit on the jumps of its end")
+    result = problem.fit(start=z)
+    if not result.success:
+        raise ConvergenceError(
+            f"the fit did not converge in {result.nfev} trials. Give fewer unknowns, bounds, or a better start"
+        )
+    z = np.asarray(result.x[: len(z)])
     problem.predicted(z, strict=True)  # raises what a trial may do, and a result may not
     return _calibration(problem, result)
 

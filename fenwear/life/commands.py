@@ -24,6 +24,7 @@ from fenwear.life.quantities import Quantity, cycles_of, lives, of_case, parse_a
 from fenwear.life.ranks import everywhere
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
+from fenwear.life.trials import TRIALS, Trials
 from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
 from fenwear.progress import now_and_then
@@ -95,8 +96,10 @@ def run_calibrate(
     output: Path | None,
     log: Log,
     comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    resume: bool = False,
 ) -> tuple[Calibration, Path]:
-    """Calibrate; write the fitted case, calibration.json and residuals; collective.
+    """Calibrate; write the fitted case, calibration.json, residuals and the trials of the fit; collective.
 
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
@@ -106,8 +109,9 @@ def run_calibrate(
     for one in data:
         log(one.listing)
     _tell_of_stick(case, log, comm)
-    found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log)
-    folder = _folder(output, "calibrate", name, comm)
+    folder = _resumed(output) if resume else _folder(output, "calibrate", name, comm)
+    trials = Trials(folder / TRIALS)
+    found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log, trials=trials, resume=resume)
 
     def write() -> None:
         write_case(folder, case)
@@ -220,10 +224,8 @@ def run_life(
         return _one_life(case, name, quantities, output, log, comm)
     scatter.check(case)
     _tell_of_stick(case, log, comm)
-    if resume and output is None:
-        raise CaseError(InputError("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
     level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
-    folder = output if resume and output is not None else _folder(output, "life", name, comm)
+    folder = _resumed(output) if resume else _folder(output, "life", name, comm)
     if resume:
         on_root(comm, lambda: _check_folder(folder, case))
     on_root(comm, lambda: write_case(folder, case))
@@ -254,6 +256,17 @@ def _one_life(
     found = Lives(tuple(one.text for one in asked), tuple(one.unit for one in asked), tuple(values))
     on_root(comm, lambda: write_text(folder / "life.json", json.dumps(found.as_json(), indent=1)))
     return found, folder
+
+
+def _resumed(output: Path | None) -> Path:
+    """Return the folder to resume in.
+
+    Raises:
+        CaseError: none is given.
+    """
+    if output is None:
+        raise CaseError(InputError("--resume", "needs the folder of the study to resume, as -o DIR"))
+    return output
 
 
 def _check_folder(folder: Path, case: Case) -> None:

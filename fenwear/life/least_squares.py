@@ -18,16 +18,19 @@ from fenwear.life.identifiable import hardly_known, without_baselines
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
 from fenwear.life.ranks import share
+from fenwear.life.trials import Trials
 from fenwear.life.unknowns import Unknown, scaled
 from fenwear.parallel import Team
 from fenwear.progress import Log, now_and_then
 
 STEP = 1e-5  # of the unknowns in the Jacobian, which are of order one
 NO_INFLUENCE = 1e-9  # relative change of all predictions over the relative change of an unknown
-KEPT = 16  # predictions
 REFUSED = 1e3  # times what was measured: the prediction of values that the model refuses
 MOST_TRIALS = 100
 SETTLED = 1e-5  # change of the unknowns over themselves that ends a fit: Newton's next one would be its square
+FLAT = 1e-3  # change of chi^2 over itself that ends a fit: a thirtieth of a standard deviation of each measurement
+NEAR = 1e-2  # the same of the approach to the fit, which is on jumps of its start
+FAR = 10.0  # e-folds that the first step of an approach may go, where logarithms are nearly linear in each other
 BASELINES = ("offset", "tilt")
 
 Vector: TypeAlias = Sequence[float] | Array
@@ -44,8 +47,9 @@ class LeastSquares:
         baseline: Sequence[str] = (),
         comm: MPI.Comm = MPI.COMM_WORLD,
         progress: Log = lambda message: None,
+        trials: Trials | None = None,
     ) -> None:
-        """Check what is asked for; computes nothing. `progress` is told now and then of the runs that are done.
+        """Check the problem; computes nothing. `progress` gets the number of runs, `trials` keeps their predictions.
 
         Raises:
             CaseError: a key, bound or combination of data that makes no sense.
@@ -60,8 +64,9 @@ class LeastSquares:
         self.baseline = tuple(baseline)
         self._check(unknowns)
         self.predict = Predictor(self.model, data)
-        self._known: dict[bytes, Array] = {}  # predictions of fitted unknowns, on the jumps kept
-        self._derivatives: dict[bytes, Array] = {}  # of predictions at the last of them, on every rank
+        self.trials = Trials() if trials is None else trials
+        self._jumps = 0  # how often the jumps that runs follow have changed
+        self._computed = False  # whether a trial on them has a prediction
         self.observed = np.concatenate([series.values for series in self.series])
         self.has_sigma = self.series[0].sigma is not None
         self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
@@ -127,15 +132,13 @@ class LeastSquares:
 
         Collective, or for rank 0 that leads. Returns whether they jump otherwise than before.
         """
+        self._jumps += 1
+        self._computed = False
         return bool(self.team.each(self, "keep_own_jumps", z))
 
     def keep_own_jumps(self, z: Vector) -> bool:
-        """Do so on this rank."""
-        if not self.predict.keep_jumps(self.values(z)):
-            return False
-        self._known.clear()
-        self._derivatives.clear()
-        return True
+        """Let runs of this rank follow those jumps; return whether they differ from those before."""
+        return self.predict.keep_jumps(self.values(z))
 
     def values(self, z: Vector) -> dict[str, float]:
         """Return the keys' values of fitted unknowns."""
@@ -143,45 +146,50 @@ class LeastSquares:
 
     def predicted(self, z: Vector, *, strict: bool = False) -> Array:
         """Return the predictions without baselines (n,); `strict` as of `Predictor`."""
-        found = np.concatenate(self.predict(self.values(z), strict=strict))
-        self._tell(f"{self.model.evaluations:,} runs done")
-        return found
+        return np.concatenate(self.predict(self.values(z), strict=strict))
 
     def _tried(self, z: Array) -> Array:
-        """Return the predictions of a trial; far too large where the model refuses it, so that it is not kept."""
-        key, known = z.tobytes(), self._known
-        if key not in known:
-            while len(known) >= KEPT:
-                known.pop(next(iter(known)))
-            try:
-                known[key] = self.predicted(z)
-            except (CaseError, ConvergenceError):
-                if not known:
-                    raise
-                known[key] = self.observed + REFUSED * (np.abs(self.observed) + self.sigma)
-        return known[key]
+        """Return the predictions of a trial (n,); far too large where the model rejects it, so that it is not kept."""
+        kind = f"prediction {self._jumps}"
+        known = self.trials.get(kind, z)
+        if known is not None:
+            return known
+        try:
+            found = self.trials.put(kind, z, self.predicted(z))
+            self._computed = True
+            return found
+        except (CaseError, ConvergenceError):
+            if not self._computed:
+                raise
+            return self.trials.put(kind, z, self.observed + REFUSED * (np.abs(self.observed) + self.sigma))
 
-    def jacobian(self, z: Vector) -> Array:
-        """Return the predictions' derivatives by the fitted unknowns (n, m); collective, or for rank 0 that leads."""
-        return np.asarray(self.team.each(self, "shared_jacobian", np.array(z, dtype=float)))
+    def jacobian(self, z: Vector, *, central: bool = False) -> Array:
+        """Return the predictions' derivatives by the fitted unknowns (n, m); collective, or for rank 0 that leads.
 
-    def shared_jacobian(self, base: Array) -> Array:
-        """Return the same, one column on each rank; collective."""
-        key = base.tobytes()
-        if key in self._derivatives:
-            return self._derivatives[key]
+        Args:
+            z: The fitted unknowns.
+            central: Whether by differences to both sides, for standard errors; else to one side, for half the runs.
+        """
+        at = np.array(z, dtype=float)
+        if central:
+            return (self.jacobian(at) + self._one_sided(at, -STEP)) / 2
+        return self._one_sided(at, STEP)
+
+    def _one_sided(self, at: Array, step: float) -> Array:
+        kind = f"derivative {self._jumps} {step}"
+        known = self.trials.get(kind, at)
+        if known is not None:
+            return known
+        here = self._tried(at)
+        return self.trials.put(kind, at, np.asarray(self.team.each(self, "shared_jacobian", at, here, step)))
+
+    def shared_jacobian(self, base: Array, here: Array, step: float) -> Array:
+        """Return the derivatives by differences to the predictions `here`, one column on each rank; collective."""
 
         def shifted(k: int) -> Array:
-            ends = []
-            for sign in (-1, 1):
-                moved = base.copy()
-                moved[k] += sign * STEP
-                ends.append(self.predicted(moved))
-            return np.asarray((ends[1] - ends[0]) / (2 * STEP))
+            return np.asarray((self.predicted(base + step * np.eye(len(base))[k]) - here) / step)
 
-        found = np.array(share(self.comm, len(base), shifted), dtype=float).T
-        self._derivatives = {key: found}
-        return found
+        return np.array(share(self.comm, len(base), shifted), dtype=float).T
 
     def check_influence(self, jacobian: Array, z: Vector) -> None:
         """Check that every unknown changes some prediction.
@@ -214,11 +222,57 @@ class LeastSquares:
         rows = np.split(values, np.cumsum([len(series.values) for series in self.series])[:-1])
         return np.concatenate([series.whitened(own) for series, own in zip(self.series, rows, strict=True)])
 
+    def approach(self, start: Array) -> Array:
+        """Return fitted unknowns near those of the fit (m,), from any start within the bounds; collective.
+
+        The logarithms of scars, volumes and depths are nearly linear in those of coefficients and loads: where all
+        values are above zero, their logarithms are fitted, whatever their sigma.
+        """
+        if self._lines.shape[1] or not (self.observed > 0).all() or not (self._tried(start) > 0).all():
+            return np.asarray(self.fit(start=start, settled=NEAR).x[: len(start)])
+        low, high = self._ends()
+
+        def residual(z: Array) -> Array:
+            return np.log(np.maximum(self._tried(z) / self.observed, NO_INFLUENCE))
+
+        at = np.clip(start, low, high)
+        slope = self.jacobian(at) / self._tried(at)[:, None]
+
+        def derivative(z: Array) -> Array:
+            """Return the slope at the start with Broyden's update for the way since, which takes no run."""
+            nonlocal at, slope
+            way = z - at
+            if way.any():
+                slope = slope + np.outer(residual(z) - residual(at) - slope @ way, way) / (way @ way)
+                at = z.copy()
+            return slope
+
+        found = least_squares(
+            residual,
+            at,
+            derivative,
+            (low, high),
+            x_scale=np.where([one.logarithmic for one in self.unknowns], FAR, 1.0),
+            xtol=NEAR,
+            ftol=NEAR,
+            max_nfev=MOST_TRIALS,
+        )
+        return np.asarray(found.x)
+
+    def _ends(self) -> Array:
+        """Return the bounds of the fitted unknowns (2, m)."""
+        ends = [
+            [one.fitted(b) if np.isfinite(b) else b for b in (one.unknown.low, one.unknown.high)]
+            for one in self.unknowns
+        ]
+        return np.array(ends).T
+
     def fit(
         self,
         observed: Array | None = None,
         start: Vector | None = None,
         jacobian: Array | None = None,
+        settled: float = SETTLED,
     ) -> OptimizeResult:
         """Return scipy's result, whose `x` has the fitted unknowns and the baselines; collective.
 
@@ -227,24 +281,31 @@ class LeastSquares:
             start: Fitted unknowns to start from; by default zero, the start of each.
             jacobian: Of the predictions (n, m), kept instead of computed anew in each step: for data near those
                 it belongs to.
+            settled: Change of the unknowns over themselves that ends the fit.
         """
         values = self.observed if observed is None else observed
         m, lines = len(self.unknowns), self._lines.shape[1]
-        ends = [[one.fitted(b) if np.isfinite(b) else b for b in (one.unknown.low, one.unknown.high)]
-                for one in self.unknowns]  # fmt: skip
-        low, high = np.array([*ends, *[[-np.inf, np.inf]] * lines]).T
-        begin = np.clip(np.concatenate([np.zeros(m) if start is None else start, np.zeros(lines)]), low, high)
+        low, high = np.hstack([self._ends(), np.outer([-np.inf, np.inf], np.ones(lines))])
+        z = np.clip(np.zeros(m) if start is None else start, low[:m], high[:m])
+        traces = self.whitened(self._lines), self.whitened(values - self._tried(z))
+        begin = np.concatenate([z, np.linalg.lstsq(*traces, rcond=None)[0]])
 
         def derivative(both: Array) -> Array:
             columns = self.jacobian(both[:m]) if jacobian is None else jacobian
             return self.whitened(np.hstack([columns, self._lines]))
 
         def residual(both: Array) -> Array:
-            return self.whitened(self.with_baselines(both) - values)
+            found = self.whitened(self.with_baselines(both) - values)
+            self._tell(f"{self.model.evaluations:,} runs, residual {np.sqrt(np.mean(found**2)):.3g} sigma or units")
+            return found
 
-        return least_squares(
-            residual, begin, derivative, (low, high), x_scale=self._reach, xtol=SETTLED, max_nfev=MOST_TRIALS
+        result = least_squares(
+            residual, begin, derivative, (low, high), x_scale=self._reach, xtol=settled, ftol=FLAT, max_nfev=MOST_TRIALS
         )
+        if jacobian is None and settled == SETTLED:
+            columns = self.jacobian(result.x[:m], central=True)
+            result.jac = self.whitened(np.hstack([columns, self._lines]))
+        return result
 
     def with_baselines(self, both: Array) -> Array:
         """Return the predictions (n,) of fitted unknowns and baselines."""

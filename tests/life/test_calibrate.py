@@ -27,6 +27,7 @@ from fenwear.life import (
     repeated,
 )
 from fenwear.life.keys import nearest_possible
+from fenwear.life.trials import Trials
 
 BETA, LOAD, AMPLITUDE = 3.926990816987242e-8, 1e4, 1.5
 K, B = "wear.punch.coefficient", "wear.punch.pressure_exponent"
@@ -292,3 +293,23 @@ def test_three_measured_scars() -> None:
     scatter = between(found)
     assert scatter.marginals[0].median() == pytest.approx(stats.gmean(values), rel=1e-9)
     assert np.log(values).std(ddof=1) > 3 * found[2].fitted[0].standard_error / values[2]
+
+
+def test_an_interrupted_fit_resumes_at_any_run(small: Callable[..., Case], tmp_path: Path) -> None:
+    """Trials on the disk take the place of runs: the same numbers, and fewer runs the more there are."""
+    after = np.array([100.0, 200.0, 300.0])
+    case, data = small("example2", f"{K}=9e-8"), [volumes(after, [0.25, 0.49, 0.74], [0.01] * 3)]
+    path = tmp_path / "trials.jsonl"
+    whole = calibrate(case, data, [K], trials=Trials(path))
+    lines = path.read_text("utf-8").splitlines(keepends=True)
+    runs = []
+    for kept in (1, len(lines) // 2, len(lines)):
+        path.write_text("".join(lines[:kept]) + lines[-1][:20], "utf-8")  # the process was killed in the last line
+        resumed = calibrate(case, data, [K], trials=Trials(path), resume=True)
+        assert resumed.as_json() | {"evaluations": 0} == whole.as_json() | {"evaluations": 0}
+        runs.append(resumed.evaluations)
+    assert whole.evaluations >= runs[0] > runs[1] > runs[2]
+    with pytest.raises(CaseError, match="--resume"):
+        calibrate(case, data, [f"{K}"], baseline=[], trials=Trials(tmp_path / "other.jsonl"), resume=True)
+    with pytest.raises(CaseError, match="--resume"):
+        calibrate(small("example2", f"{K}=8e-8"), data, [K], trials=Trials(path), resume=True)

@@ -22,6 +22,7 @@ from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Sco
 GRAVITY = 9.80665e-3  # N/g
 LOADS = (10, 100)  # g
 KEPT = 50  # g: its measured values are kept apart
+SHARE = 0.1  # of a width: the standard deviation given to each, the same for all
 LENGTH = 10.0  # of the contact line, mm: not published, without a part in exponents and ratios
 SHORT = ("geometry.parameters.elements_along_contact=24",)
 
@@ -98,8 +99,8 @@ def _data(folder: Path, load: int, cycles: Array, width: Array) -> Path:
     with path.open("w", newline="") as file:
         file.write(f'# set punch.loads.0.force = ["0 N", "{-load * GRAVITY} N"]\n')
         writer = csv.writer(file)
-        writer.writerow(["after (cycles)", "scar_width (um)"])
-        writer.writerows(zip(cycles, width, strict=True))
+        writer.writerow(["after (cycles)", "scar_width (um)", "sigma (um)"])
+        writer.writerows(zip(cycles, width, SHARE * width, strict=True))
     return path
 
 

@@ -221,7 +221,7 @@ def calibrate(
 
 
 def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calibration:
-    z = np.zeros(len(problem.unknowns))
+    z: Array = np.zeros(len(problem.unknowns))
     _begin(problem, z)
     problem.check_influence(problem.jacobian(z), z)
     progress("approach to the fit")

@@ -127,7 +127,7 @@ def draw(finding: Finding) -> bytes:
             )
         drawn += 1
     ax.set(xlabel=finding.axes[0], ylabel=finding.axes[1], xscale=finding.scales[0], yscale=finding.scales[1])
-    ax.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    ax.legend(frameon=False, fontsize="small", loc="best")
     buffer = io.BytesIO()
     canvas.savefig(buffer, format="png", dpi=130)
     return buffer.getvalue()

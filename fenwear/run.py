@@ -219,7 +219,7 @@ class _Run:
         self.start = start
         self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
-        self._level = _level_of(self.case)
+        self._level = level_of(self.case)
         self.extremes = {} if start is None else checkpoint.extremes(directory, self.comm)  # of all half-cycles so far
         self.numbers: dict[str, float] = {}
         self.warnings: list[str] = []
@@ -515,7 +515,7 @@ class _Run:
         return reason
 
 
-def _level_of(case: Case) -> RunLevel | None:
+def level_of(case: Case) -> RunLevel | None:
     """Return what ends a run at a level of a quantity; None where nothing does."""
     if not case.run.until:
         return None

@@ -279,6 +279,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "layers/debris.py": ("the conditions of the phases",),
     "life/calibrate.py": ("where the fit begins",),
     "life/commands.py": ("the folder of the sampling",),
+    "life/commands.py": ("with --scatter",),
     "life/data.py": (
         "each with its unit",
         "with one column",

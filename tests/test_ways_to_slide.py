@@ -85,7 +85,7 @@ def test_heat_of_sliding_out_of_the_plane() -> None:
             "strip": {"regions": {"strip_body": "steel"}, "supports": [{"on": "far", "fix": ["x", "z"]}]},
             "contact": {"friction": 0.2},
             "wear": {"punch": {"coefficient": 0}},
-            "motion": {"kind": "one-way", "axis": "y", "direction": "rightward", "speed": "100 mm/s", "duration": "0.1 s"},
+            "motion": {"kind": "one-way", "axis": "y", "direction": "rightward", "speed": 100, "duration": 0.1},
             "heat": {"conductance": "perfect", "convection": 0, "steps": 20, "convecting_faces": False},
             "run": {"half_cycles": 1},
         },

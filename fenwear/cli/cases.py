@@ -128,12 +128,13 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
     from fenwear.law_choice import choose_law, with_law
     from fenwear.memory import memory_size
     from fenwear.plausibility import fineness_text, initial_warnings
-    from fenwear.run import position_warnings
+    from fenwear.run import level_of, position_warnings
 
     loaded = load(case, settings)
     if loaded.sticks:
         _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy, full=full)
         return
+    level_of(loaded)
     placed = place_case(loaded)
     log(resources_of(placed).text())
     system = elastic(placed)

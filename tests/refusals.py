@@ -278,8 +278,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "layers/between.py": ("missing, but required",),
     "layers/debris.py": ("the conditions of the phases",),
     "life/calibrate.py": ("where the fit begins",),
-    "life/commands.py": ("the folder of the sampling",),
-    "life/commands.py": ("with --scatter",),
+    "life/commands.py": ("the folder of the sampling", "with --scatter"),
     "life/data.py": (
         "each with its unit",
         "with one column",

@@ -341,13 +341,9 @@ class Snapshot:
             one.nodes_of(contact) if contact in one.names else np.zeros(len(one.weights), dtype=bool)
             for one in (pair.punch, pair.strip)
         ]
-        rate = WornDepths(*(np.where(own, depth, 0.0) for own, depth in zip(masks, self.depths_of_rate, strict=True)))
+        depths = zip(masks, (self.rate.punch, self.rate.strip), strict=True)
+        rate = WornDepths(*(np.where(own, depth, 0.0) for own, depth in depths))
         return replace(self, end=within(self.end, contact, self.rate), rate=rate)
-
-    @property
-    def depths_of_rate(self) -> tuple[Array, Array]:
-        """Depths worn in a cycle off punch (n,) and strip (n_strip,), mm."""
-        return self.rate.punch, self.rate.strip
 
     def at_cycle(self, cycle: float) -> Snapshot:
         """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""

@@ -28,7 +28,7 @@ COURSES = {
         "largest_temperature": ("Largest temperature", "temperature (K)"),
     },
     "cycle": {
-        "dissipated_energy": ("Work of friction in a cycle", "work (mJ)"),
+        "friction_work_increment": ("Work of friction in a cycle", "work (mJ)"),
         "largest_temperature": ("Largest temperature in a cycle", "temperature (K)"),
     },
 }

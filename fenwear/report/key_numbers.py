@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tomllib
 from collections.abc import Mapping
@@ -63,14 +62,14 @@ def read_summary(directory: Path) -> dict[str, Any]:
     """
     path = directory / SUMMARY
     try:
-        summary = json.loads(path.read_text("utf-8"))
+        summary = in_current_names(path.read_text("utf-8"))
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
         raise CaseError(InputError(str(path), f"no readable summary of a run: {error}")) from None
     if not isinstance(summary, dict):
         raise CaseError(InputError(str(path), "no summary of a run"))
-    return in_current_names(summary)
+    return summary
 
 
 def names_in(directory: Path) -> Names:

@@ -65,7 +65,7 @@ def energy(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw friction's work and the energy ratio over the cycles."""
     figure, (upper, lower) = panels(2, 2.2, look=look)
     x = course_axis(lower, history, look)
-    upper.plot(x, 1e3 * history.dissipated_energy, color=BLUE, marker=".", markersize=3)
+    upper.plot(x, 1e3 * history.friction_work_increment, color=BLUE, marker=".", markersize=3)
     upper.set_ylabel("work of friction in a cycle (µJ)")
     from_zero(upper)
     lower.plot(x, history.energy_ratio, color=RED, marker=".", markersize=3, label="energy ratio")

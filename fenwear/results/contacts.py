@@ -19,7 +19,7 @@ from fenwear.case.names import Names
 from fenwear.cycle import Block
 from fenwear.cycle.steady_cycle import SteadyCycle
 from fenwear.cycle.totals import SUMS
-from fenwear.results import place, sheet
+from fenwear.results import sheet
 from fenwear.results.degrees import degrees_of
 from fenwear.results.forces import node_forces
 from fenwear.results.registry import quantities_of
@@ -29,6 +29,7 @@ from fenwear.sliding.wear import WornDepths
 CONTACTS = "contacts"  # the table of summary.json
 SCARS = [key for key in sheet.LINES if key.startswith("scar_")]
 OF_BODIES = ("worn_volume_mm3", "largest_depth_mm", *(f"largest_depth_at_{axis}_mm" for axis in sheet.PLACES), *SCARS)
+PLACES = {"eccentricity_mm": "eccentricity", "attitude_angle_deg": "attitude_angle"}
 R = TypeVar("R", bound=Block | SteadyCycle)
 LINES = {
     **{f"force_{axis}_N": sheet.Line(f"force on the punch, {axis}", "N") for axis in "xyz"},
@@ -123,7 +124,7 @@ def _carried(part: Block, name: str) -> dict[str, Any]:
         **{known[one].key: float(known[one].of_cycle(part)) for one in ("mean_pressure", "contact_area")},
         "friction_work_mJ": float(area @ energy),
         "largest_energy_mJ_per_mm2": float(energy.max()),
-        **place.numbers(part, name),
+        **{key: float(known[of].of_cycle(part)) for key, at in PLACES.items() if (of := f"{at}_{name}") in known},
     }
     if "largest_temperature" in known:
         warmest = float(known["largest_temperature"].of_cycle(part))

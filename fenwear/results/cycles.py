@@ -8,25 +8,14 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from fenwear.heat.exchange import CROSSING, TERMS
+from fenwear.results.quantity import RECORD, reduced
+from fenwear.results.registry import known
 from fenwear.results.steps import STEP
 
 STEPS = {"displacement": "displacement", "tangential_force": "tangential_force", "pressure": "step_pressure",
          "traction": "traction", "traction_across": "traction_across", "slip": "slip", "slip_across": "slip_across",
          "stick": "stick", "surface_stress": "surface_stress", "temperature_punch": "step_temperature_punch",
          "temperature_strip": "step_temperature_strip"}  # fmt: skip
-AT_END = (
-    "time",
-    "sliding_distance",
-    "wear",
-    "wear_strip",
-    "stick_width",
-    "stick_area",
-    "stick_width_within",
-    "stick_area_within",
-)
-SUMMED = ("worn_area_increment", "worn_area_increment_strip", "worn_volume_increment", "worn_volume_increment_strip")
-LARGEST = ("complementarity_error", "energy_balance_error", "jump_error", "heat_balance_error")
 
 
 def resolves(history: xarray.Dataset) -> bool:
@@ -38,8 +27,8 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
     """Return the whole cycles of a history with time steps, each with all of its steps one after the other.
 
     Dimensions are `cycle`, whose coordinate is the number of cycles done, `step` and those of the nodes; cycles of
-    fewer steps than others end in NaN (`cycle_at`). Worn depths are those at the end of the cycle, `dissipated_energy`
-    is the work of friction in it, mJ.
+    fewer steps than others end in NaN (`cycle_at`). Other variables are reduced to one value of each cycle as the
+    registry says: depths and totals at its end, increments added up, pressures and errors the largest.
     """
     numbers = history.half_cycle.values.astype(int)
     strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
@@ -66,27 +55,15 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
             found = one_after_the_other(history[of].values[rows])
             put(name, ("cycle", STEP, *map(str, history[of].dims[2:])), found, of)
     data["stick"] = (data["stick"][0], np.nan_to_num(data["stick"][1]).astype(np.int8), data["stick"][2])
-    for name in AT_END:
-        if name in history:
-            put(name, ("cycle", *map(str, history[name].dims[1:])), history[name].values[last], name)
-    for name in LARGEST:
-        if name in history:
-            put(name, ("cycle",), history[name].values[rows].max(axis=1), name)
-    for name in SUMMED:
-        if name in history:
-            put(name, ("cycle",), history[name].values[rows].sum(axis=1), name)
-    touched = data["pressure"][1] > 0
-    size = "contact_width" if "contact_width" in history else "contact_area"
-    put(size, ("cycle",), (touched * history.weight.values[last][:, None]).sum(axis=2).max(axis=1), size)
-    put("energy_ratio", ("cycle",), history.energy_ratio.values[rows].mean(axis=1), "energy_ratio")
-    work = history.friction_work_increment.values[rows].sum(axis=1)
-    put("dissipated_energy", ("cycle",), work, "friction_work_increment")
-    put("accumulated_energy", ("cycle",), history.friction_work.values[last], "friction_work")
-    for term in (*TERMS, *CROSSING) if "heat_friction" in history else ():
-        put(f"heat_{term}", ("cycle",), history[f"heat_{term}"].values[rows].sum(axis=1), f"heat_{term}")
-    if "temperature_punch" in data:
-        hottest = np.maximum(*(np.nanmax(data[f"temperature_{body}"][1], axis=(1, 2)) for body in ("punch", "strip")))
-        put("largest_temperature", ("cycle",), hottest, "largest_temperature")
+    for name, one in history.data_vars.items():
+        if one.dims[:1] == RECORD and STEP not in one.dims and name != "weight" and str(name) not in data:
+            quantity, values = known(str(name)), one.values[rows]
+            put(
+                str(name),
+                ("cycle", *map(str, one.dims[1:])),
+                reduced(values, "last" if quantity is None else quantity.cycle),
+                str(name),
+            )
     fixed = {name: one for name, one in history.variables.items() if "half_cycle" not in one.dims and name != STEP}
     weight = history.weight.isel(half_cycle=-1, drop=True)
     half = np.where(there, np.repeat(np.arange(1, strokes + 1), history.sizes[STEP]), 0).reshape(*rows.shape, -1)

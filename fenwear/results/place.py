@@ -97,16 +97,6 @@ def values(block: Block) -> dict[str, Array]:
     return found
 
 
-def numbers(last: Block, contact: str = "") -> dict[str, float]:
-    """Return the eccentricity at the end of a run in a named contact, or the only one, for its sheet; or nothing."""
-    bore = bores_of(last.system).get(contact)
-    if bore is None:
-        return {}
-    found = _eccentricity(last, bore, named=bool(contact))
-    names = {"eccentricity_mm": "eccentricity", "attitude_angle_deg": "attitude_angle"}
-    return {key: float(found[name][-1]) for key, name in names.items()}
-
-
 def _end(name: str) -> str:
     return f"_{name}" if name else ""
 

@@ -64,10 +64,15 @@ class Quantity:
         if not self.dims:
             return np.asarray(self.compute(records), dtype=np.float64)
         values: Array = np.asarray(self.compute(records), dtype=np.float64)[-records.system.motion.half_cycles :]
-        if self.cycle == "last":
-            return values[-1]
-        reduced: dict[str, Callable[..., Any]] = {"largest": np.max, "mean": np.mean, "sum": np.sum}
-        return np.asarray(reduced[self.cycle](values, axis=0))
+        return np.asarray(reduced(values[None], self.cycle)[0])
+
+
+def reduced(values: Array, cycle: Literal["last", "largest", "mean", "sum"]) -> Array:
+    """Return one value of each of m cycles (m, ...) from those of its half-cycles (m, k, ...)."""
+    if cycle == "last":
+        return values[:, -1]
+    by: dict[str, Callable[..., Any]] = {"largest": np.max, "mean": np.mean, "sum": np.sum}
+    return np.asarray(by[cycle](values, axis=1))
 
 
 @dataclass(frozen=True)

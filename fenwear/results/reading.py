@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,46 +56,36 @@ def load_history(directory: Path) -> xarray.Dataset:
     return history.rename(current_names(map(str, history.variables)))
 
 
-def current_names(names: Iterable[str], *, old: bool = False) -> dict[str, str]:
-    """Return the present name of each of a file's names that has changed, by its old one.
-
-    Args:
-        names: In the file, or in a table of it.
-        old: Whether other names of the file show that it is an older one.
-    """
+def current_names(names: Iterable[str]) -> dict[str, str]:
+    """Return the present name of each of a file's names that has changed, by its old one."""
     known = [*names]
-    found = {name: _replaced(name, OLD_NAMES) for name in known}
-    if old or any(name != new for name, new in found.items()):
-        found = {name: _replaced(name, TAKEN_NAMES) if new == name else new for name, new in found.items()}
-    return {name: new for name, new in found.items() if new != name}
+    changes = _changes(any(re.search(old, name) for old, _ in OLD_NAMES for name in known))
+    return {name: new for name in known if (new := changes(name)) != name}
 
 
-def in_current_names(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an older summary with the present names of all quantities; one of today as it is."""
-    if not any(current_names(names) for names in _names(summary)):
-        return dict(summary)
-    found = _renamed(summary)
-    if "mean_pressure_MPa" in found:  # was the load over the meshed surface; now only of what touches
+def in_current_names(summary: str) -> Any:
+    """Return the tables of a summary with the present names of all quantities.
+
+    Raises:
+        ValueError: the text is no JSON.
+    """
+    old = any(re.search(f'"{pattern[1:]}', summary) for pattern, _ in OLD_NAMES)
+    changes = _changes(old)
+    found = json.loads(summary, object_pairs_hook=lambda pairs: {changes(key): value for key, value in pairs})
+    if old and "mean_pressure_MPa" in found:  # was the load over the meshed surface; now only of what touches
         found["pressure_over_surface_MPa"] = found.pop("mean_pressure_MPa")
     return found
 
 
-def _names(tables: Mapping[str, Any]) -> Iterator[list[str]]:
-    yield list(tables)
-    for value in tables.values():
-        if isinstance(value, Mapping):
-            yield from _names(value)
+def _changes(old: bool) -> Callable[[str], str]:
+    """Return how names of an older file change to those of today; those of today do not."""
 
+    def changed(name: str) -> str:
+        for pattern, new in (*TAKEN_NAMES, *OLD_NAMES) if old else ():
+            name = re.sub(pattern, new, name)
+        return name
 
-def _renamed(tables: Mapping[str, Any]) -> dict[str, Any]:
-    new = current_names(tables, old=True)
-    return {new.get(key, key): _renamed(one) if isinstance(one, Mapping) else one for key, one in tables.items()}
-
-
-def _replaced(name: str, table: Iterable[tuple[str, str]]) -> str:
-    for old, new in table:
-        name = re.sub(old, new, name)
-    return name
+    return changed
 
 
 def is_older(names: Iterable[Hashable]) -> bool:

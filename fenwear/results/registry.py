@@ -59,9 +59,10 @@ IN_RUN = (
                 "half the integral of their difference"),
     _of_records("periodicity", RECORD, "1",
                 "largest change of pressure against one cycle ago over the pressure scale"),
-    _of_records("equilibrium_error", RECORD, "1", "error of the force and moment balance relative to the load"),
+    _of_records("equilibrium_error", RECORD, "1", "error of the force and moment balance relative to the load",
+                cycle="largest"),
     _of_records("complementarity_error", RECORD, "1",
-                "largest error of p >= 0, gap >= 0, p gap = 0 over their scales"),
+                "largest error of p >= 0, gap >= 0, p gap = 0 over their scales", cycle="largest"),
     _of_records("retries", RECORD, "1", "solves that took a second attempt, in another way or in smaller steps"),
     Quantity("weight", ALONG, "mm", "length that each contact node stands for, on the mesh of the half-cycle",
              partial(_weights, body="punch")),
@@ -107,9 +108,10 @@ OF_HEAT = (
     _of_heat("largest_temperature", RECORD, "K", "largest temperature of the contact surfaces at the end",
              cycle="largest", steady=True, nodal=True),
     _of_heat("coupling_iterations", RECORD, "1", "iterations of heat and contact"),
-    _of_heat("heat_balance_error", RECORD, "1", "missing heat over the largest term of the balance", "balance_error"),
+    _of_heat("heat_balance_error", RECORD, "1", "missing heat over the largest term of the balance", "balance_error",
+             cycle="largest"),
     *(
-        Quantity(f"heat_{name}", RECORD, "mJ", TERM_TEXTS[name], partial(_term, number=k))
+        Quantity(f"heat_{name}", RECORD, "mJ", TERM_TEXTS[name], partial(_term, number=k), "sum")
         for k, name in enumerate((*TERMS, *CROSSING))
     ),
 )  # fmt: skip
@@ -161,7 +163,12 @@ def _in_cycle(records: Block | SteadyCycle) -> float:
 
 IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pressure at any time of the cycle",
                     _in_cycle, steady=True, of="end")  # fmt: skip
-CYCLES: dict[str, Literal["mean", "sum"]] = {"energy_ratio": "mean", "friction_work_increment": "sum"}
+CYCLES: dict[str, Literal["largest", "mean", "sum"]] = {
+    "energy_ratio": "mean",
+    "friction_work_increment": "sum",
+    "energy_balance_error": "largest",
+    "jump_error": "largest",
+}
 
 
 def _of_steps(name: str) -> Quantity:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -20,7 +19,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface import is_translation
 from fenwear.law_choice import check_decided
 from fenwear.results import registry
-from fenwear.results.quantity import RECORD, computed
+from fenwear.results.quantity import RECORD, Quantity, computed
 from fenwear.results.summary import nominal_pressure
 from fenwear.stick.final import FinalShape, cycle_of_final
 from fenwear.sweeps.plan import Of, preparation_for
@@ -28,48 +27,41 @@ from fenwear.sweeps.plan import Of, preparation_for
 Values = Mapping[str, NDArray[np.float64]]
 
 
-@dataclass(frozen=True)
-class Meaning:
-    """What a result is.
-
-    Attributes:
-        dims: Its dimensions besides those of the sweep.
-        unit: Of its values.
-        name: In words.
-    """
-
-    dims: tuple[str, ...]
-    unit: str
-    name: str
+def _other(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> Quantity:
+    """Return a quantity of sweeps alone, whose values come with the state."""
+    return Quantity(name, dims, unit, long_name, lambda _: np.nan)
 
 
 # What is not of the registry.
-MEANINGS = {
-    "x": Meaning(("node",), "mm", "position along the contact"),
-    "y": Meaning(("node",), "mm", "position across the contact"),
-    "shape": Meaning(("node",), "mm", "worn shape without the rigid motion of the punch"),
-    "wear_per_cycle": Meaning(("node",), "mm", "depth worn off both bodies in a cycle"),
-    "nominal_pressure": Meaning((), "MPa", "load over the projected area of the contact"),
-    "angle": Meaning(("half_cycle", "node"), "rad", "angle chi between the normal and the wear velocity"),
-    "half_cycles": Meaning((), "", "half-cycles done"),
-    "iterations": Meaning((), "", "Newton iterations"),
+OTHERS = {
+    one.name: one
+    for one in (
+        _other("x", ("node",), "mm", "position along the contact"),
+        _other("y", ("node",), "mm", "position across the contact"),
+        _other("shape", ("node",), "mm", "worn shape without the rigid motion of the punch"),
+        _other("wear_per_cycle", ("node",), "mm", "depth worn off both bodies in a cycle"),
+        _other("nominal_pressure", (), "MPa", "load over the projected area of the contact"),
+        _other("angle", ("half_cycle", "node"), "rad", "angle chi between the normal and the wear velocity"),
+        _other("half_cycles", (), "", "half-cycles done"),
+        _other("iterations", (), "", "Newton iterations"),
+    )
 }
 FIELDS = ("pressure", "wear", "temperature_punch", "temperature_strip")  # of the registry; and single numbers
 LEFT_OUT = ("half_cycle", "time", "direction")
 
 
-def meaning(name: str, of: Of, case: Case) -> Meaning:
-    """Return what a result is."""
-    if name in MEANINGS:
-        return MEANINGS[name]
+def meaning(name: str, of: Of, case: Case) -> Quantity:
+    """Return what a result is, with its dimensions besides those of the sweep."""
+    if name in OTHERS:
+        return OTHERS[name]
     found = registry.known(name)
     if found is None or name.startswith("lambda_"):
         unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
-        return Meaning(("half_cycle",) if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
+        return _other(name, RECORD if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
     nodes = tuple("node" for d in found.dims[1:])
     unit, text = registry.in_model(found, on_surface=case.model.kind != "plane")
     each = name == "direction" or (found.dims and found.cycle != "last")
-    return Meaning((*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
+    return _other(name, (*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
 
 
 class VariantRunner:

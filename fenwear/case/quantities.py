@@ -122,7 +122,7 @@ class Part(BaseModel):
         changed = dict[str, object]()
         for name, value in data.items():
             kinds = _kinds(cls, name) if isinstance(value, str | int | float) and name in cls.model_fields else None
-            if kinds == {bool} and not isinstance(value, bool):
+            if kinds == frozenset({bool}) and not isinstance(value, bool):
                 raise ValueError(f"{name}: expected true or false, got {value!r}")
             if isinstance(value, float) and value.is_integer() and kinds and int in kinds and float not in kinds:
                 changed[name] = int(value)

@@ -352,7 +352,9 @@ def _from_instrument(path: Path) -> Raw:
         return _by_surfalize(path)
     found = open_topography(str(path)).topography()
     unit = _unit(found.unit or "1", "the map")
-    z = np.ma.filled(np.ma.asarray(found.heights(), dtype=np.float64), np.nan)
+    heights = found.heights()  # masked where there are holes
+    z = np.array(getattr(heights, "data", heights), dtype=np.float64)
+    z[np.broadcast_to(np.asarray(getattr(heights, "mask", False)), z.shape)] = np.nan
     axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, found.physical_sizes, strict=True)]
     return [axis * unit for axis in axes], z * unit, []
 

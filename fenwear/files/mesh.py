@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -353,7 +353,8 @@ def completed(mesh: MeshFile) -> MeshFile:
             corners = list(face) or list(range(kind.corners))
             mids = x[:, [kind.corners + k for k in edges]]
             middle = mids.sum(axis=1) * (1 / 2 if face else 1 / 4) - x[:, corners].sum(axis=1) / 4
-            keys: list[tuple[int, ...]] = [tuple(key) for key in np.sort(block.nodes[:, corners], axis=1).tolist()]
+            rows: Any = np.sort(block.nodes[:, corners], axis=1).tolist()
+            keys: list[tuple[int, ...]] = [tuple(row) for row in rows]
             numbers = np.empty(len(keys), dtype=np.int64)
             new: list[int] = []
             for row, key in enumerate(keys):

@@ -81,7 +81,10 @@ def test_file(tmp_path: Path) -> None:
     assert [load.mean().force for load in case.loads_of("punch")] == [(0.0, -15.0)]
     (tmp_path / "again.toml").write_text(case.to_toml())
     assert load_case(tmp_path / "again.toml") == case
-    for line, told in (("1500,0,-10", "row 5: time goes back"), ("x,0,-10", "row 5, column 'time': expected a finite number")):
+    for line, told in (
+        ("1500,0,-10", "row 5: time goes back"),
+        ("x,0,-10", "row 5, column 'time': expected a finite number"),
+    ):
         (tmp_path / "gait.csv").write_text(
             f"time (ms),shift_x (mm),force_z (N)\n0,0,-10\n500,2,-2\n2000,1,-1\n{line}\n"
         )

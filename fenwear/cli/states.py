@@ -167,7 +167,7 @@ def _held_json(of_step: tuple[Case, str] | None) -> dict[str, str]:
 
 
 def _forces(state: SteadyState) -> dict[str, tuple[str, Any]]:
-    """Return what the contact carries in each half-cycle of a state, by names: the unit, and values; collective."""
+    """Return what the contact carries in each half-cycle of a state, by names: the unit, and values."""
     from fenwear.cycle.steady_cycle import cycle_of_state
     from fenwear.results.registry import quantities_of
     from fenwear.results.summary import nominal_pressure

@@ -21,7 +21,7 @@ from fenwear.sliding.wear import WornDepths
 
 @dataclass(frozen=True)
 class SteadyCycle:
-    """The k half-cycles of a steady state, of n contact nodes; collective where it is made with heat.
+    """The k half-cycles of a steady state, of n contact nodes.
 
     Attributes:
         system: What it is the state of.
@@ -30,7 +30,6 @@ class SteadyCycle:
         adds: What each half-cycle adds to the totals, k of them.
         rate: Depths worn in the cycle.
         velocity: Rigid-body wear in the cycle of each mode, mm and rad.
-        temperature: Of the contact surfaces at the end of each phase (m, 2, n), K; empty without heat.
         heat: Temperatures at the ends of the half-cycles; None without heat.
         moves: Whether what half-cycles add is known: forces, work and wear.
     """
@@ -41,7 +40,6 @@ class SteadyCycle:
     adds: Totals
     rate: WornDepths
     velocity: Mapping[str, float]
-    temperature: Array
     heat: BlockHeat | None
     moves: bool = True
 
@@ -67,41 +65,46 @@ class SteadyCycle:
 def steady_cycle(
     system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
 ) -> SteadyCycle:
-    """Return the half-cycles of pressures (m, n) that repeat, with heat of these conductances (m, n); collective."""
-    motion, heat = system.motion, cycle_heat(system)
-    strokes, positions = motion.half_cycles, motion.positions
-    temperature: Array = np.zeros((0, 2, phase_pressure.shape[1]))
+    """Return the half-cycles of pressures (m, n) that repeat, with heat of conductances (m, n), on one process."""
+    heat, rows = cycle_heat(system), []
     if heat is not None:
         conducting = heat.conductances(touching(phase_pressure)) if conductances is None else conductances
         end = heat.jump(heat.initial(), np.inf, conducting)
-        state, rows = heat.exchange.at(end.state(phase_pressure)), []
+        state = heat.exchange.at(end.state(phase_pressure))
         for phase, pressure in enumerate(phase_pressure):
             state, _ = heat.exchange.half_cycle(state, phase, np.asarray(pressure), conducting[phase])
             rows.append(np.stack(heat.exchange.contact_temperatures(state, phase)))
-        temperature = np.array(rows)
-    latest = (temperature[-1, 0], temperature[-1, 1]) if len(temperature) else None
+    positions = system.motion.positions
+    return _cycle(system, phase_pressure, velocity, heat_of(np.array(rows)[positions - 1 :: positions]))
+
+
+def cycle_of_state(state: SteadyState) -> SteadyCycle:
+    """Return the half-cycles of a cyclic steady state."""
+    sides = [] if state.heat is None else [state.heat.punch, state.heat.strip]
+    heat = heat_of(np.stack(sides, axis=1) if sides else np.zeros(0))
+    return _cycle(state.system, state.phase_pressure, state.velocity, heat)
+
+
+def _cycle(
+    system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], heat: BlockHeat | None
+) -> SteadyCycle:
+    positions = system.motion.positions
+    latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
     each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(phase_pressure)]
     states = [system.conditions(k, p, latest, None, None) for k, p in each]
     if system.layers.memory is not None:
         rest = system.rested(states)
         states = [system.conditions(k, p, latest, rest, None) for k, p in each]
     adds = phase_totals(system, phase_pressure, states)
-    strokes_add = [reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)]
-    return SteadyCycle(
-        system, phase_pressure[positions // 2 :: positions], phase_pressure, stacked(strokes_add),
-        system.wear.phases(states).worn(phase_pressure), velocity, temperature,
-        heat_of(temperature[positions - 1 :: positions] if len(temperature) else temperature, strokes),
-    )  # fmt: skip
+    of_half_cycles = [reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)]
+    middle, rate = phase_pressure[positions // 2 :: positions], system.wear.phases(states).worn(phase_pressure)
+    return SteadyCycle(system, middle, phase_pressure, stacked(of_half_cycles), rate, velocity, heat)
 
 
-def cycle_of_state(state: SteadyState) -> SteadyCycle:
-    """Return the half-cycles of a cyclic steady state; collective."""
-    return steady_cycle(state.system, state.phase_pressure, state.velocity, state.conductances)
-
-
-def heat_of(temperature: Array, strokes: int) -> BlockHeat | None:
-    """Return temperatures at the ends of half-cycles (k, 2, n) as those of a block, without a balance."""
-    if not len(temperature):
+def heat_of(temperature: Array) -> BlockHeat | None:
+    """Return temperatures at the ends of half-cycles (k, 2, n) as those of a block, without a balance; None of none."""
+    count = len(temperature)
+    if not count:
         return None
-    terms, unknown = np.zeros((strokes, len(TERMS) + len(CROSSING))), np.full(strokes, np.nan)
-    return BlockHeat(temperature[:, 0], temperature[:, 1], terms, np.zeros(strokes, dtype=np.int64), unknown)
+    terms, unknown = np.zeros((count, len(TERMS) + len(CROSSING))), np.full(count, np.nan)
+    return BlockHeat(temperature[:, 0], temperature[:, 1], terms, np.zeros(count, dtype=np.int64), unknown)

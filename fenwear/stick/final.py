@@ -472,6 +472,5 @@ def cycle_of_final(found: FinalShape) -> SteadyCycle:
     strokes, steps = system.motion.half_cycles, system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
     adds, rate = stacked([none_yet(system)] * strokes), found.worn.times(0.0)
-    warm = np.zeros((0, 2, 0)) if found.temperature is None else np.stack([found.temperature] * strokes)
-    heat = heat_of(warm, strokes)
-    return SteadyCycle(system, found.pressures[ends], found.pressures, adds, rate, {}, warm, heat, moves=False)
+    heat = heat_of(np.zeros(0) if found.temperature is None else np.stack([found.temperature] * strokes))
+    return SteadyCycle(system, found.pressures[ends], found.pressures, adds, rate, {}, heat, moves=False)

@@ -395,11 +395,13 @@ def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
     assert growth_rate(system, state) == rate
     assert growth_rate(system, rounding) == pytest.approx(rate, rel=1e-9)
     for pressure, conductances in ((state.phase_pressure, state.conductances), (rounding, None)):
-        found = steady_cycle(system, pressure, state.velocity, conductances).temperature
-        np.testing.assert_allclose(found[:, 0], state.heat.punch, rtol=1e-9)
-        np.testing.assert_allclose(found[:, 1], state.heat.strip, rtol=1e-9)
+        heat = steady_cycle(system, pressure, state.velocity, conductances).heat
+        assert heat is not None
+        np.testing.assert_allclose(heat.temperature_punch, state.heat.punch, rtol=1e-9)
+        np.testing.assert_allclose(heat.temperature_strip, state.heat.strip, rtol=1e-9)
     # A node without pressure that conducts changes both: what the state says is followed.
     other = np.where(opened, np.nanmax(state.conductances), state.conductances)
     assert growth_rate(system, state.phase_pressure, other) != pytest.approx(rate, rel=1e-6)
-    warmed = steady_cycle(system, state.phase_pressure, state.velocity, other).temperature
-    assert np.abs(warmed[:, 0] - state.heat.punch).max() > 1e-6 * state.heat.punch.max()
+    warmed = steady_cycle(system, state.phase_pressure, state.velocity, other).heat
+    assert warmed is not None
+    assert np.abs(warmed.temperature_punch - state.heat.punch).max() > 1e-6 * state.heat.punch.max()

@@ -135,7 +135,9 @@ def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
         raise ConvergenceError(
             "no shape to machine: every rigid motion of the punch would have material added somewhere"
         )
-    return np.asarray(scale * (modes @ found.x))
+    depth = shape - scale * (modes @ found.x)  # to the programme's tolerance, which a clipped depth would show
+    touching = np.flatnonzero(where)[found.ineqlin.marginals < 0]
+    return np.asarray(shape - depth + modes @ np.linalg.lstsq(modes[touching], depth[touching], rcond=None)[0])
 
 
 def _steady_pressures(state: SteadyState | FinalShape) -> Array:

@@ -26,6 +26,7 @@ from fenwear.interface.placement import ZERO
 from fenwear.sliding.field import SlidingField
 
 AROUND = 3.0  # sizes of a node, within which the axis counts as passing through its area
+UPRIGHT = 0.1  # cosine between a node's normal and the mean one, below which a rigid motion hardly wears it
 NEAR = 4.0  # sizes of a triangle from the axis, beyond which v is smooth over it
 POINTS, SHARES = np.polynomial.legendre.leggauss(16)
 
@@ -41,7 +42,10 @@ def node_rates(field: SlidingField, pair: ContactPair, power: float = 1.0) -> Ar
     rates, turn = field.rate(pair.opposite, pair.normal), np.array(field.turn)
     if pair.punch.dim < 3 or field.turn == ZERO or power >= 2:
         return rates
-    if (rates > AROUND * np.abs(pair.normal @ turn) * np.sqrt(pair.weights)).all():
+    away = rates / np.maximum(np.abs(pair.normal @ turn) * np.sqrt(pair.weights), 1e-300)  # from the axis, in sizes
+    nearest = int(away.argmin())
+    facing = pair.normal[nearest] @ (pair.weights @ pair.normal) / pair.weights.sum()
+    if away[nearest] > AROUND or facing < UPRIGHT:  # where the rim stands upright it hardly wears
         return rates
     punch = pair.punch
     triangles, node = node_triangles(ChartedSurface(punch.trace, punch.facets, punch.cell, punch.degree, punch.nodes))

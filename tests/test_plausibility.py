@@ -11,10 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import basix.ufl
 import numpy as np
 import pytest
+import ufl
 from dolfinx import fem
-from dolfinx.mesh import CellType, create_rectangle
+from dolfinx.mesh import CellType, create_mesh, create_rectangle
 from markupsafe import escape
 from mpi4py import MPI
 
@@ -751,3 +753,55 @@ def test_balances_are_looked_at(assembled: Assembled) -> None:
         assert "is off by 0.2" in text
     for own, block in ((system, next(march(system, 4, block=4))), (fretting, slipping)):
         assert not [text for text in StateMonitor(own).see(block) if "balance" in text]
+
+
+@pytest.mark.parametrize(("growth", "told"), [(1.3, False), (16.0, True)])
+def test_coarse_elements_beside_a_fine_contact_are_told(growth: float, told: bool) -> None:
+    """Half a cylinder on half a block: rows of elements, 0.02 mm high at the contact, each so many times the last.
+
+    Reference: Hertz's p0 = 271.03 MPa.
+    """
+    x, z = (np.unique(np.minimum(np.cumsum(steps), 40.0)) for steps in (
+        [0.0, *np.full(100, 0.02), *0.04 * 1.3 ** np.arange(30)], [0.0, *0.02 * growth ** np.arange(30)]))  # fmt: skip
+    meshes = {}
+    for body, way in (("punch", 1), ("strip", -1)):
+        crown = np.where(x < 2, x**2 / 100, x / 25 - 0.04)[:, None] if way > 0 else np.zeros((len(x), 1))
+        places = np.stack([np.broadcast_to(x[:, None], (len(x), len(z))), way * (crown + (40 - crown) * z / 40)], -1)
+        i, j = np.divmod(np.arange((len(x) - 1) * (len(z) - 1)), len(z) - 1)
+        first = i * len(z) + j
+        cells = np.stack([first, first + len(z), first + 1, first + len(z) + 1], axis=1)
+        element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
+        mesh = create_mesh(MPI.COMM_SELF, cells, places.reshape(-1, 2), ufl.Mesh(element))
+        groups = {
+            f"{body}_contact": lambda x, way=way: (x[0] < 2.01) & (np.abs(x[1] - (way > 0) * x[0] ** 2 / 100) < 1e-3),
+            "far": lambda x, way=way: np.isclose(x[1], 40 * way),
+            "middle": lambda x: np.isclose(x[0], 0),
+        }
+        meshes[body] = own_mesh(body, mesh, groups)
+    tables = {
+        "geometry": {"degree": 1},
+        "model": {"plane": "strain", "thickness": 10},
+        "materials": {"steel": {"young": "210 GPa", "poisson": 0.3}},
+        "punch": {
+            "regions": {"punch_body": "steel"},
+            "supports": [{"on": "middle", "fix": ["x"]}],
+            "loads": [{"on": "far", "force": [0, -500]}],
+        },
+        "strip": {
+            "regions": {"strip_body": "steel"},
+            "supports": [{"on": "far", "fix": ["z"]}, {"on": "middle", "fix": ["x"]}],
+        },
+        "contact": {"friction": 0},
+        "wear": {"punch": {"coefficient": "1e-9 1/MPa"}},
+        "motion": {"kind": "reciprocating", "amplitude": 1, "period": 1, "positions": 1},
+        "run": {"half_cycles": 2},
+    }
+    system = assemble(make_case(tables, meshes=meshes), MPI.COMM_SELF)
+    too_high = start(system).max() / 271.03
+    texts = [text for text in initial_warnings(system) if "deep, too deep for the contact" in text]
+    assert bool(texts) is told
+    if told:
+        assert too_high > 1.15
+        assert "below the contact" in texts[0]
+    else:
+        assert too_high == pytest.approx(1, abs=0.02)

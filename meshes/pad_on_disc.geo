@@ -63,8 +63,11 @@ growths[] = {growth, top_growth};
 // How far the circles of the margins lie from the pad.
 beside[] = {0};
 For k In {1 : margin_elements}
-  beside[] += (margin_growth == 1) ? margin * k / margin_elements
-              : margin * (margin_growth^k - 1) / (margin_growth^margin_elements - 1);
+  If(margin_growth == 1)
+    beside[] += margin * k / margin_elements;
+  Else
+    beside[] += margin * (margin_growth^k - 1) / (margin_growth^margin_elements - 1);
+  EndIf
 EndFor
 
 For body In {0 : 1}

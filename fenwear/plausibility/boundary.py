@@ -124,7 +124,7 @@ def _at_nodes(surface: ContactSurface, x: Array, values: Array) -> Array:
 
     Nodes on an outer edge have the lesser of both its corners.
     """
-    found = np.zeros(len(surface.trace))
+    found: Array = np.zeros(len(surface.trace))
     if len(x):
         far, nearest = cKDTree(x).query(surface.trace, distance_upper_bound=NEAR * surface.extent())
         found = np.where(np.isfinite(far), np.append(values, 0.0)[nearest], 0.0)
@@ -338,7 +338,9 @@ def _lengths(begin: Array, along: Array, facets: Array) -> Array:
     sides = facets[:, 1:] - facets[:, :1]  # (f, d - 1, d)
     dim = begin.shape[1]
     first, last = sides[:, 0], sides[:, -1]
-    normals: Array = np.cross(first, last) if dim == 3 else np.column_stack([first[:, 1], -first[:, 0]])
+    normals: Array = np.column_stack([first[:, 1], -first[:, 0]])
+    if dim == 3:
+        normals = np.cross(first, last).astype(np.float64)
     across = along @ normals.T  # (m, f)
     meets = np.abs(across) > SLACK * np.linalg.norm(normals, axis=1)
     to = ((facets[:, 0] * normals).sum(axis=1) - begin @ normals.T) / np.where(meets, across, 1.0)

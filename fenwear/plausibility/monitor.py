@@ -76,7 +76,7 @@ class StateMonitor:
     def __init__(self, system: Tribosystem) -> None:
         self.system, self._made = system, Made(system)
         self._texts: dict[str, str] = {}
-        self._kinds = ("run", "first")
+        self._kinds: tuple[str, ...] = ("run", "first")
 
     def move(self, system: Tribosystem) -> None:
         """Look at another contact grid from now on."""

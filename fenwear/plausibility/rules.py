@@ -32,7 +32,7 @@ from fenwear.results.summary import net_of
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:
-    from fenwear.heat.halving import Fineness
+    from fenwear.heat.side import Fineness
     from fenwear.stick.final import FinalShape
 
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds

@@ -196,7 +196,7 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View) -> Figure:
     unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]
     figure = Figure(figsize=(7.0, 6.6), layout="constrained")
-    ax = figure.subplots()
+    ax: Any = figure.subplots()
     most = low
     for body in BODIES:
         seen, triangles, values, outlines = section(data, body, field, view)

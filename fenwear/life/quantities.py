@@ -212,7 +212,9 @@ class Quantity:
 
     def within(self, contact: str) -> Quantity:
         """Return the same of one named contact."""
-        text = re.sub(rf"\b{self.name}\b( of [\w-]+)?", lambda at: f"{at[0]} in {contact}", self.text, count=1)
+        match = _UNTIL.fullmatch(self.text) or _PLAIN.fullmatch(self.text)
+        written = self.name if match is None else match["name"]
+        text = re.sub(rf"\b{written}\b( of [\w-]+)?", lambda at: f"{at[0]} in {contact}", self.text, count=1)
         return replace(self, text=text, contact=contact)
 
 

@@ -155,7 +155,7 @@ def test_each_contact_has_a_life(tmp_path: Path) -> None:
     np.testing.assert_array_equal(depths.lives, np.min([one.lives for one in depths.each], axis=0))
     with pytest.raises(CaseError, match="no contact is called 'middle'; known are left, right"):
         lifetime(case, "depth in middle 1 um", scatter, comm=MPI.COMM_SELF)
-    with pytest.raises(CaseError, match="expected a contact behind depth, volume"):
+    with pytest.raises(CaseError, match="of all contacts together"):
         parse_quantity("friction in left")
     with pytest.raises(CaseError, match="all counted in cycles"):
         lifetime(case, ["depth 1 um", "time until depth 1 um"], scatter, comm=MPI.COMM_SELF)

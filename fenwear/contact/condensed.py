@@ -39,6 +39,7 @@ WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: wha
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
+SETTLED, ROUNDS = 1e-10, 50  # change of gaps over those of the load that ends iterations of friction; the most of them
 PIVOTED = 3000  # unknowns up to which pivots are tried: their cost is the number's third power
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
@@ -171,6 +172,9 @@ class CondensedContact:
         self._rigid_normals = np.array([phase.interface.rigid.rigid_normal.T for phase in self.phases])
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
+        self._splits = True  # whether products of one friction serve where it differs from node to node
+        self._even: dict[int, Array] = {}  # that friction, by phase
+        self._beside: dict[int, Array | None] = {}  # what differs from it, by phase, as forces of unit pressures (n, d)
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
@@ -203,9 +207,19 @@ class CondensedContact:
         self.__dict__.pop("_grid", None)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
-        """Return the block of a phase of many nodes."""
-        interface, alone = self.phases[k].interface, len(self.phases) == 1
-        compliance = interface.compliance(self._ratios[k], scale, self._tables)
+        """Return the block of a phase of many nodes.
+
+        On a grid products are of one friction: that of the first mean. What differs from it is found by iterations.
+        """
+        interface, ratio, alone = self.phases[k].interface, self._ratios[k], len(self.phases) == 1
+        self._beside[k] = None
+        if self._splits and interface.cost is not None and np.ptp(ratio, axis=0).any():
+            even = self._even.setdefault(k, np.broadcast_to(ratio.mean(axis=0), ratio.shape))
+            compliance = interface.compliance(even, scale, self._tables)
+            if isinstance(compliance, Convolution):
+                self._beside[k] = (ratio - even) * interface.pair.weights[:, None]
+                return PhaseBlock(compliance, compliance.diagonal(), modes, balance, iterated=alone)
+        compliance = interface.compliance(ratio, scale, self._tables)
         known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
         return PhaseBlock(known, compliance.diagonal(), modes, balance, iterated=alone)
 
@@ -389,7 +403,40 @@ class CondensedContact:
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        return self._team.lead(partial(self._solved, gap, start, wearing, coupling))
+        return self._team.lead(partial(self._iterated, gap, start, wearing, coupling))
+
+    def _iterated(
+        self, gap: Array, start: ContactState | None, wearing: WearCompliance | None, coupling: Array | None
+    ) -> ContactState:
+        """Return the contact, with the gaps that friction opens where it differs from that of the products.
+
+        Raises:
+            ConvergenceError: SNES did not converge, or these gaps do not settle.
+        """
+        if not self._differs:
+            return self._solved(gap, start, wearing, coupling)
+        opened = np.zeros(self.shape) if start is None else self._opened_beside(start.pressure)
+        enough = max(self.inequality.close, SETTLED) * self._gap_scale
+        for _ in range(ROUNDS):
+            found = self._solved(gap + opened, start, wearing, coupling)
+            before, start = opened, found
+            opened = self._opened_beside(found.pressure)
+            if np.abs(opened - before).max() <= enough:
+                return found
+        raise ConvergenceError(f"{self.inequality.name}: friction that differs from node to node did not settle")
+
+    @property
+    def _differs(self) -> bool:
+        """Whether friction differs from that of the products in some phase."""
+        return any(beside is not None for beside in self._beside.values())
+
+    def _opened_beside(self, pressure: Array) -> Array:
+        """Return the gaps (m, n) that pressures (m, n) open by what friction differs from that of the products."""
+        opened = np.zeros(self.shape)
+        for k, beside in self._beside.items():
+            if beside is not None:
+                opened[k] = self.phases[k].interface.apply(beside * pressure[k][:, None])[:, 0]
+        return opened
 
     def _solved(
         self, gap: Array, start: ContactState | None, wearing: WearCompliance | None, coupling: Array | None
@@ -431,6 +478,10 @@ class CondensedContact:
             use: Called with the operator on the unknowns of `closed` and of the rigid motions.
             closed: Nodes of the only phase that touch (n,); by default all nodes of all phases.
         """
+        if self._differs:
+            self._splits = False
+            self._slide(range(len(self.phases)))
+            self._elastic = self._operator = None
         every = np.arange(self.size, dtype=np.int32)
         kept = every if closed is None else every[np.append(closed, np.ones(self.size - len(closed), dtype=bool))]
         return self._team.lead(lambda: use(self._linear.factor(kept)))

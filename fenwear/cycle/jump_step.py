@@ -165,9 +165,11 @@ class Stepper:
         self._whole: tuple[RunState, _Trend, WornDepths | None] | None = (
             None  # the last attempt as one step: see `finer`
         )
-        passing = bool(system.passing_laws) or system.friction.of_coatings != (None, None)
-        passing = passing or system.layers.varies or system.asks("debris")
-        self._follows = passing or system.layers.memory is not None  # coefficients do, within a step
+        follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
+        follows = follows or system.layers.memory is not None
+        self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
+        laws = [law for law in system.sliding.wear if law is not None]
+        self._wear_follows = follows or (self._follows and any(law.beta or law.energy for law in laws))
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
@@ -205,7 +207,7 @@ class Stepper:
             share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
             estimate = replace(estimate, depth=max(estimate.depth, share))
         self._whole = whole, trend, bent
-        if self._follows:
+        if self._wear_follows:
             missed = self._missed(state, half, halves, cycles)
             estimate = replace(estimate, depth=max(estimate.depth, missed))
         return halves, estimate, recorded

@@ -11,7 +11,7 @@ from half_space_ball import WEAR, ball
 from fenwear import Case, assemble, evolve
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact import CondensedContact, ContactState, condensed
 from fenwear.contact.gridded import GriddedPhases
 from fenwear.contact.krylov import flexible
 from fenwear.cycle.block import Block
@@ -38,14 +38,19 @@ def solved(system: Tribosystem, *, cycles: float = 30.0) -> ContactState:
         {"wear": {"punch": WEAR["punch"] | {"pressure_exponent": 1.5, "coefficient": "1e-7 1/MPa^1.5"}}},
         {"contact": {"layer": {"kind": "linear", "stiffness": "5e5 MPa/mm"}}},
         {"contact": {"layer": {"kind": "power", "reference": "1 um", "pressure": "300 MPa"}}},
+        {"contact": {"friction": {"expression": "0.4 + 0.3 * tanh(3 * x) * tanh(y + 0.5)"}}},
     ],
-    ids=["both", "strip", "power", "linear-layer", "layer"],
+    ids=["both", "strip", "power", "linear-layer", "layer", "friction of the place"],
 )
 def test_as_by_matrices(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Pressures and gaps of six phases that meet in their wear, node by node, and the loads carried exactly."""
     system = assemble(ball(FORCE, **more))
+    contact = system.phase_contact(range(len(system.motion.phases)))
+    assert isinstance(contact, CondensedContact)
+    assert contact.gridded
     ours = solved(system)
     monkeypatch.setattr(CondensedContact, "gridded", False)
+    monkeypatch.setattr(condensed, "Convolution", type(None))
     theirs = solved(assemble(ball(FORCE, **more)))
     touching = theirs.pressure > 0
     assert 0.1 < touching.mean() < 0.9

@@ -100,9 +100,10 @@ def known(comm: MPI.Comm, parts: Callable[[], Iterable[object]], *, fresh: bool 
         return Kept(comm)
     digest = hashlib.blake2b(_surroundings().encode(), digest_size=20)
     for part in parts():
-        array = isinstance(part, np.ndarray)
-        digest.update(f"{part.dtype.str}{part.shape}".encode() if array else f"|{part}|".encode())
-        digest.update(np.ascontiguousarray(part).tobytes() if array else b"")
+        if isinstance(part, np.ndarray):
+            digest.update(f"{part.dtype.str}{part.shape}".encode() + np.ascontiguousarray(part).tobytes())
+        else:
+            digest.update(f"|{part}|".encode())
     key = hashlib.blake2b("".join(comm.allgather(digest.hexdigest())).encode(), digest_size=20).hexdigest()
     path, arrays = folder() / f"{key}-{comm.rank}of{comm.size}.npz", None
     if not fresh:

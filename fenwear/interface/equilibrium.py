@@ -110,31 +110,14 @@ def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody)
     """Gather the rigid modes at the interface; collective."""
     return RigidEquilibrium(
         pair,
-        _relative(pair, punch.rigid_motion, strip.rigid_motion),
+        relative_motion(pair, punch.rigid_motion, strip.rigid_motion),
         np.concatenate([punch.rigid_resultant, strip.rigid_resultant]),
         (*punch.mode_names, *strip.mode_names),
         len(punch.mode_names),
     )
 
 
-def guided_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
-    """Gather in the same way the rotations that guides hold, whose couples balance what contact and loads do.
-
-    Collective.
-    """
-    motions = [
-        np.zeros((*body.surface.trace.shape, 0))
-        if body.guides is None
-        else body.on_surface(body.trace.pick(body.guides.rotations))
-        for body in (punch, strip)
-    ]
-    resultants = np.concatenate([punch.guided_resultant, strip.guided_resultant])
-    return RigidEquilibrium(
-        pair, _relative(pair, *motions), resultants, ("guided",) * len(resultants), motions[0].shape[2]
-    )
-
-
-def _relative(pair: ContactPair, of_punch: Array, of_strip: Array) -> Array:
+def relative_motion(pair: ContactPair, of_punch: Array, of_strip: Array) -> Array:
     """Return motions of the punch's surface against the strip's (n, d, m) from those of trace nodes (N, d, m)."""
     on_punch = _seen(pair.punch.spread.T, of_punch)
     there = [pair.transfer @ pair.placement.vectors(motion) for motion in np.moveaxis(of_strip, 2, 0)]

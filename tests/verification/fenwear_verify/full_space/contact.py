@@ -29,8 +29,8 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.contact.condensed import ContactState, SlidingContact, WearCompliance
 from fenwear.contact.inequality import check, configure
 from fenwear.contact.operators import whole
-from fenwear.interface import RigidEquilibrium
-from fenwear.interface.equilibrium import guided_equilibrium
+from fenwear.interface import ContactPair, RigidEquilibrium
+from fenwear.interface.equilibrium import relative_motion
 from fenwear.parallel import lasting
 
 # Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
@@ -446,3 +446,17 @@ def _normals(elastic: ElasticBody, patterns: csr_array, normal: Array) -> PETSc.
     here = comm.rank == 0
     sizes = ((count if here else 0, count), elastic.stiffness.getSizes()[1])
     return _matrix(every if here else csr_array((0, every.shape[1])), sizes, comm)
+
+
+def guided_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
+    """Return the rotations that guides hold, whose couples balance what contact and loads do; collective."""
+    motions = [
+        np.zeros((*body.surface.trace.shape, 0))
+        if body.guides is None
+        else body.on_surface(body.trace.pick(body.guides.rotations))
+        for body in (punch, strip)
+    ]
+    resultants = np.concatenate([punch.guided_resultant, strip.guided_resultant])
+    return RigidEquilibrium(
+        pair, relative_motion(pair, *motions), resultants, ("guided",) * len(resultants), motions[0].shape[2]
+    )

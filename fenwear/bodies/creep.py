@@ -121,8 +121,8 @@ class RetardedCycle:
     @cached_property
     def taken(self) -> Array:
         """Share of v that y takes in each phase, 1 - e where v stays (m, terms)."""
-        both = zip(self.durations, self.courses, strict=True)
-        return np.array([self.of.taken(duration, course) for duration, course in both])
+        phases = range(len(self.durations))
+        return np.array([self.of.taken(float(self.durations[k]), self.courses[k, :]) for k in phases])
 
     @cached_property
     def varies(self) -> NDArray[np.bool_]:
@@ -138,9 +138,10 @@ class RetardedCycle:
     @cached_property
     def seen_taken(self) -> Array:
         """Share of v in y as the contact of a phase sees it (m, terms)."""
-        middle = self.courses.shape[1] // 2 + 1
-        rows = zip(self.durations, self.courses, self.taken, self.varies, strict=True)
-        return np.array([self.of.taken(t / 2, own[:middle]) if varies else end for t, own, end, varies in rows])
+        middle, found = self.courses.shape[1] // 2 + 1, self.taken.copy()
+        for k in np.flatnonzero(self.varies):
+            found[k] = self.of.taken(float(self.durations[k]) / 2, self.courses[k, :middle])
+        return found
 
     @cached_property
     def factors(self) -> Array:

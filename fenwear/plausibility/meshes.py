@@ -157,7 +157,7 @@ def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float 
         for body in (system.bodies.punch, system.bodies.strip)
         if body.reading is None and (deep := _deepest(body, places, half)) is not None
     ]
-    return max(found, key=lambda deep: deep.excess, default=None)
+    return max(found, key=lambda one: one.excess, default=None)
 
 
 def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:
@@ -176,7 +176,7 @@ def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:
         k = int(excess.argmax())
         own = (float(excess[k]), float(depth[k]), float(allowed[k]), float(least[k]) if not at[k] else 0.0)
     worst = max(mesh.comm.allgather(own))
-    return Deep(*worst, body.body.name)
+    return Deep(worst[0], worst[1], worst[2], worst[3], body.body.name)
 
 
 def polygon(system: Tribosystem, pressure: Array) -> Fields:

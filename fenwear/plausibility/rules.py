@@ -265,7 +265,8 @@ def few_nodes(seen: Seen) -> Fields:
     """Return how few nodes lie across the contact; nothing where deep elements make it narrow; collective."""
     if deep_elements(seen):
         return {}
-    for pressure, when in zip(seen.pressure if seen.kind == "steady" else seen.pressure[:1], seen.when, strict=False):
+    rows: list[Array] = list(seen.pressure if seen.kind == "steady" else seen.pressure[:1])
+    for pressure, when in zip(rows, seen.when, strict=False):
         fields = meshes.few(seen.system.case, net_of(seen.system), pressure, _hertzian(seen, pressure))
         if fields:
             return {**fields, "when": when}

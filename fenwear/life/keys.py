@@ -10,6 +10,7 @@ from typing import Any
 from fenwear.case import Case, changed_case
 from fenwear.errors import CaseError, InputError
 
+BY_EXPONENTS = ("coefficient", "beta")  # whose units follow from the exponents
 EXPONENTS = ("pressure_exponent", "speed_exponent")
 BISECTIONS = 40
 
@@ -70,7 +71,7 @@ def find_key(case: Case, path: str, option: str = "") -> Key:
 
 
 def settings_of(case: Case, values: Mapping[str, float]) -> list[str]:
-    """Return overrides `key.path=value` that give keys these values, in their internal units.
+    """Return overrides `key.path=value` that give keys these values, in their internal units, which stand with them.
 
     A wear coefficient's unit follows from its exponents: where only an exponent changes, the
     coefficient keeps its number.
@@ -83,7 +84,11 @@ def settings_of(case: Case, values: Mapping[str, float]) -> list[str]:
             for coefficient in (f"{body}.coefficient", f"{body}.beta"):
                 if coefficient in keys:
                     filled.setdefault(coefficient, keys[coefficient].value)
-    return [f"{path}={float(value)!r}" for path, value in filled.items()]
+    units = {path: keys[path].unit for path in filled if path in keys and path.rpartition(".")[2] not in BY_EXPONENTS}
+    return [
+        f'{path}="{float(value)!r} {units[path]}"' if units.get(path) else f"{path}={float(value)!r}"
+        for path, value in filled.items()
+    ]
 
 
 def with_values(case: Case, values: Mapping[str, float], settings: Sequence[str] = ()) -> Case:

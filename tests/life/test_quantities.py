@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case
+from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case, make_case
 from fenwear.cycle import Block, critical_speed, follow
 from fenwear.cycle.state import RunState
 from fenwear.life import Model, evaluate, parse_quantity
@@ -153,3 +153,12 @@ def test_a_grid_that_grows() -> None:
     *_, found = Model(case).run({}, cycles)
     assert len(found.x) == len(last.system.pair.weights) > len(system.pair.weights)
     assert found.end.wear[-1] == pytest.approx(last.end.worn.punch, rel=1e-12)
+
+
+def test_a_hardness_varies_in_its_unit(small: Callable[..., Case]) -> None:
+    """V = K F s / H: a life goes by H; the number that a study sets is in MPa, though a case file needs the unit."""
+    tables = small("example2").resolved()
+    tables["wear"]["punch"] = {"archard": 1e-5, "hardness": "1.2 GPa"}
+    case, quantity = make_case(tables), parse_quantity("cycles until volume 3 mm^3")
+    lives = [evaluate(Model(case), quantity, {"wear.punch.hardness": hardness})[0] for hardness in (1200.0, 2400.0)]
+    assert lives[1] == pytest.approx(2 * lives[0], rel=1e-9)

@@ -309,7 +309,7 @@ def pressed_by(assembled: Assembled, load: float, amplitude: float) -> Tribosyst
 def test_elastic_way_against_stick(assembled: Assembled) -> None:
     """Reference: with stick the work of a cycle is 4 mu P (A - way), the way that the bodies follow friction.
 
-    It is an estimate: 18 % too far here, as a support at one node takes the load.
+    It is an estimate by the mean of a half-plane and a block.
     """
     load, amplitude = 120.0, 20.0
     settings = (f"motion.amplitude={amplitude} um", *FRETTING)

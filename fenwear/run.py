@@ -458,7 +458,7 @@ class _Run:
     def _until(self, level: RunLevel) -> dict[str, Any]:
         """Return when the level that ends the run is reached, and log it."""
         half_cycle = self.state.half_cycle
-        found = {
+        found: dict[str, Any] = {
             "level": self.case.run.until,
             "reached": level.reached,
             "value": level.value,

@@ -252,7 +252,7 @@ def _one_life(
     asked = [of_case(one, case, "--until") for one in quantities]
     folder = _folder(output, "life", name, comm)
     on_root(comm, lambda: write_case(folder, case))
-    values = everywhere(comm, lambda: lives(Model(case), asked, {}).tolist())
+    values = everywhere(comm, lambda: [float(life) for life in lives(Model(case), asked, {})])
     found = Lives(tuple(one.text for one in asked), tuple(one.unit for one in asked), tuple(values))
     on_root(comm, lambda: write_text(folder / "life.json", json.dumps(found.as_json(), indent=1)))
     return found, folder

@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TypeAlias
 
 import numpy as np
@@ -152,12 +153,9 @@ def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float 
     # What is coarse along the contact, too, needs more elements there, which are then less deep: see `few`.
     half = max(float(((zone.nodes - 1) * zone.spacing / ends).min()), width / 2, ALIKE * degree * zone.spacing.min())
     places = net.surface.x[net.piece(pressure)]
-    found = [
-        deep
-        for body in (system.bodies.punch, system.bodies.strip)
-        if body.reading is None and (deep := _deepest(body, places, half)) is not None
-    ]
-    return max(found, key=lambda one: one.excess, default=None)
+    bodies = [body for body in (system.bodies.punch, system.bodies.strip) if body.reading is None]
+    found: list[Deep] = [deep for body in bodies for deep in (_deepest(body, places, half),) if deep is not None]
+    return max(found, key=attrgetter("excess"), default=None)
 
 
 def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:

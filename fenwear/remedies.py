@@ -6,6 +6,7 @@ from collections import Counter
 
 FULL_START = "contact solved from full contact on"
 PIVOTS = "contact solved by pivots"
+SOFTER_START = "contact solved by way of softer bodies"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
 MARCHED = "cycle marched in place of a jump"

@@ -30,7 +30,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.interface.convolution import Convolution
 from fenwear.parallel import Team
-from fenwear.remedies import FULL_START, PIVOTS, Remedies
+from fenwear.remedies import FULL_START, PIVOTS, SOFTER_START, Remedies
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
@@ -40,6 +40,7 @@ SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where
 NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
 SETTLED, ROUNDS = 1e-10, 50  # change of gaps over those of the load that ends iterations of friction; the most of them
+STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
 PIVOTED = 3000  # unknowns up to which pivots are tried: their cost is the number's third power
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
@@ -489,30 +490,78 @@ class CondensedContact:
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
         """Return the solution: unknowns, residual and iterations.
 
-        SNES starts from a contact that is given, else from full contact. Where both fail Lemke's method finds the
-        solution, but for many unknowns, for a largest pressure, and where heat bulges the surfaces: there may be
-        solutions that time does not lead to.
+        SNES starts from a contact that is given, else from full contact. Where both fail a homotopy in the bodies'
+        compliance leads to the solution. Where that fails, too, Lemke's method does, but for many unknowns, for a
+        largest pressure, and where heat bulges the surfaces: there may be solutions that time does not lead to.
         """
         n, inequality = self.shape[1], self.inequality
-        begin = np.ones_like(self._offset)
-        begin[:, n:] = 0.0
         if start is not None:
-            warm = begin.copy()
+            warm = np.zeros_like(self._offset)
             warm[:, :n] = start.pressure / self._pressure_scale
             try:
                 return inequality.solve(warm.ravel(), near=True), inequality.residual, inequality.iterations
             except ConvergenceError:
                 pass
-        try:
-            x = inequality.solve(begin.ravel())
-            if start is not None:
-                self._remedies.note(FULL_START)
-        except ConvergenceError as error:
-            if self.size > PIVOTED or self._coupling is not None or self.most < np.inf:
-                raise
+        begin = np.zeros_like(self._offset)
+        begin[:, :n] = 1.0
+        failure: ConvergenceError | None = None
+        for remedy, found in (
+            (FULL_START if start is not None else "", inequality.solve),
+            (SOFTER_START, self._from_softer_bodies),
+            (PIVOTS, self._by_pivots),
+        ):
             try:
-                x = inequality.solve_by_pivots(begin.ravel())
-            except ConvergenceError:
-                raise error from None  # which says most
-            self._remedies.note(PIVOTS)
-        return x, inequality.residual, inequality.iterations
+                x = found(begin.ravel())
+            except ConvergenceError as error:
+                failure = failure or error  # the first says most
+                continue
+            if remedy:
+                self._remedies.note(remedy)
+            return x, inequality.residual, inequality.iterations
+        assert failure is not None
+        raise failure
+
+    def _by_pivots(self, begin: Array) -> Array:
+        """Return the solution by Lemke's method.
+
+        Raises:
+            ConvergenceError: it does not find one, or the contact is none for it.
+        """
+        if self.size > PIVOTED or self._coupling is not None or self.most < np.inf:
+            raise ConvergenceError(
+                f"{self.inequality.name} has too many unknowns for pivots, a largest pressure or heat"
+            )
+        return self.inequality.solve_by_pivots(begin)
+
+    def _from_softer_bodies(self, begin: Array) -> Array:  # noqa: ARG002 (its own start)
+        """Return the solution by way of softer bodies, whose contact is larger.
+
+        Bodies that are softer by a factor press alike on gaps that are as much smaller. So a contact shrinks to its
+        size, where sets of nodes that start from the few which touch first go round.
+
+        Raises:
+            ConvergenceError: one of them has no solution that is found.
+        """
+        n, gaps = self.shape[1], self._offset[:, : self.shape[1]].copy()
+        softer, stiffer = max(float(np.ptp(gaps, axis=1).max()), 1.0), STIFFER
+        known, x = softer, np.zeros_like(self._offset)  # how soft the last bodies were, and their contact
+        x[:, :n] = 1.0
+        try:
+            while True:
+                self._offset[:, :n] = gaps / softer
+                near = x.copy()
+                near[:, n:] *= known / softer
+                try:
+                    found = self.inequality.solve(near.ravel())
+                except ConvergenceError:
+                    stiffer = np.sqrt(stiffer)
+                    if softer == known or stiffer < LEAST:
+                        raise
+                    softer = max(known / stiffer, 1.0)
+                    continue
+                if softer == 1.0:
+                    return found
+                x, known = found.reshape(x.shape).copy(), softer
+                softer = max(softer / stiffer, 1.0)
+        finally:
+            self._offset[:, :n] = gaps

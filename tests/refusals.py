@@ -193,6 +193,12 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "sources that move as a whole": (MODEL, "`flash` where the strip turns about a point near to the contact"),
     },
     "heat/fitted.py": {"grow without heat": (MODEL, "a reduced basis whose temperatures grow of themselves")},
+    "layers/between.py": {
+        "A layer of asperities does not follow it": (
+            MODEL,
+            "`contact.lubrication` whose share changes during the cycle, with a layer that gives way by a law",
+        )
+    },
     "stick/coulomb.py": {
         "with a pressure_threshold": (
             PHYSICS,
@@ -238,7 +244,6 @@ OTHERS: dict[str, tuple[str, ...]] = {
         "belongs to a shape from CAD",
         "belongs to the mesh of another",
     ),
-    "bodies/topography.py": ("a file that ends with",),
     "case/bodies.py": ("expected pairs",),
     "case/creep.py": ("or per_decade with an onset", "only then"),
     "case/cycle_table.py": ("only then",),
@@ -275,18 +280,18 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "flash/settings.py": ("its temperatures in its history", "expected one material where"),
     "flash/temperatures.py": ("each instant of the long stroke",),
     "interface/pair.py": ("the punch lies below",),
-    "layers/between.py": ("missing, but required",),
+    "layers/between.py": ("missing, but required", "Plastic flow did not converge"),
     "layers/debris.py": ("the conditions of the phases",),
     "life/calibrate.py": ("where the fit begins",),
-    "life/commands.py": ("the folder of the sampling", "with --scatter"),
+    "life/commands.py": ("with --scatter",),
     "life/data.py": (
-        "each with its unit",
         "with one column",
         "together with a column",
         "belongs to one measured column",
     ),
     "life/least_squares.py": ("with profiles only", "gives no sigma"),
     "life/noise.py": ("expected a profile",),
+    "life/trials.py": ("belongs to another case",),
     "life/quantities.py": ("with a level", "a level with its unit"),
     "life/scatter.py": ("gives impossible values", "KEY=KIND"),
     "stick/cycle.py": ("did not come together",),

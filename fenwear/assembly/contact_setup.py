@@ -579,8 +579,8 @@ class ContactSetup:
         if self.sticks:
             message = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
             raise CaseError(InputError("contact.law", message))
-        slides = np.min([one.sum(axis=0) / one.max() for one in self.wear.sliding], axis=0)
-        if not (slides > ROUNDING).all():
+        sliding = [one.sum(axis=0) / one.max() for one in self.wear.sliding if one.max() > 0]  # none slide in a rest
+        if not all((one > ROUNDING).all() for one in sliding):
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
         found = self._optimum(direction, zone, None)

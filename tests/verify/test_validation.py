@@ -19,7 +19,7 @@ NUMBERS = {
     "disc-brake": 19,
     "fretting-cylinder": 6,
     "polyethylene": 12,
-    "sliding-metal": 16,
+    "sliding-metal": 8,
 }
 
 

@@ -147,7 +147,7 @@ def test_plot_command(folder: Path, fenwear: Callable[..., Any], tmp_path: Path)
     done = fenwear("plot", folder)
     assert done.returncode == 0, done.stderr
     files = [Path(line) for line in done.stdout.splitlines()]
-    assert {"history.gif", "report.html", "shape.png"} <= {path.name for path in files}
+    assert {"report.html", "shape.png"} <= {path.name for path in files}
     assert all(path.is_file() for path in files)
     for wrong in (tmp_path, tmp_path / "missing"):
         done = fenwear("plot", wrong)

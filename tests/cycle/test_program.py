@@ -111,10 +111,8 @@ def test_distance_where_the_strip_turns() -> None:
     small = ("geometry.parameters.across=2", "geometry.degree=2", "run.half_cycles=6")
     case = load_case("ring-on-ring", [*turning, *small, "program.radius=31", "program.steps=[{cycles=6}]"])
     (told,) = system_warnings(assemble(case))
-    assert told.startswith(
-        "program.radius: distances are those at 31 mm from the axis, but the contact lies between 20"
-    )
-    assert told.endswith(" and 30 mm, in the mean at 25.33 mm")  # 2/3 (30³ - 20³) / (30² - 20²)
+    assert told.startswith("program.radius: ")
+    assert all(number in told for number in ("31 mm", "20 and 30 mm", "25.33 mm"))  # 2/3 (30³ - 20³) / (30² - 20²)
 
 
 def test_jumps_meet_the_march_in_a_ramp(edited: Edited) -> None:

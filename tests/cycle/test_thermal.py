@@ -79,7 +79,7 @@ def test_split_tolerance(assembled: Assemble) -> None:
 def test_too_much_heat_names_the_half_cycle(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """Too much heat in a half-cycle, without smaller steps, ends with its number and all that came before."""
     monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
-    system = assembled("example1-heat", *COARSE, "motion.amplitude=20")
+    system = assembled("example1-heat", *COARSE, "motion.amplitude=14")
     done: list[int] = []
     blocks = march(system, 40)
     with pytest.raises(ConvergenceError, match=r"half-cycle \d+: .*did not converge") as failure:

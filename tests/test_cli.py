@@ -304,7 +304,7 @@ def test_two_ranks_refuse_whatever_is_wrong(run_python: Run, tmp_path: Path) -> 
 
 def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
     """Exit status 3 from all ranks."""
-    prefixes = ("fenwear_contact", "fenwear_contact_search", "fenwear_steady")
+    prefixes = ("fenwear_contact", "fenwear_steady")
     limits = [word for prefix in prefixes for word in (f"-{prefix}_snes_max_it", "0")]
     done = fenwear("steady", "example1", *options(), "--", *limits, ranks=2, cwd=tmp_path)
     assert done.returncode == 3, done.stderr

@@ -187,7 +187,7 @@ def test_friction_follows_the_pressure_of_many_nodes(
 @pytest.fixture
 def one_iteration() -> Iterator[None]:
     options = PETSc.Options()
-    names = [f"fenwear_{name}snes_max_it" for name in ("contact_", "contact_search_", "full_contact_")]
+    names = [f"fenwear_{name}snes_max_it" for name in ("contact_", "full_contact_")]
     for name in names:
         options[name] = 1
     yield

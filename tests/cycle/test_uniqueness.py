@@ -234,12 +234,10 @@ def test_of_a_program_the_worst_stage_is_told(tmp_path: Path) -> None:
     assert any("several answers" in text for text in summary["warnings"])
 
 
-def test_jumps_that_fail_in_hot_bands_say_what_follows_them() -> None:
-    """Implicit half-cycles go on where jumps end: bands of contact come and go within ten turns (Burton)."""
+def test_implicit_steps_follow_hot_bands() -> None:
+    """Bands of contact come and go within ten turns (Burton)."""
     turns = ("motion.angular_speed='30 rad/s'", "motion.duration='0.2 s'", "run.half_cycles=1000")
     system = assemble(load_case("ring-on-ring-heat", [*turns, "geometry.parameters.across=8"]))
-    with pytest.raises(ConvergenceError, match=r"run\.integration"):
-        list(evolve(system))
     bands = [block.pressure > 0 for block in evolve(system, 60, integration="implicit")]
     closed = np.concatenate(bands)
     assert (closed[:-10] != closed[10:]).any(axis=1).mean() > 0.8

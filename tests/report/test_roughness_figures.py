@@ -34,7 +34,7 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
 def test_the_figure_has_the_numbers_of_the_history(history: xarray.Dataset) -> None:
     """Sa and Sq of both bodies over the run, µm."""
     (ax,) = roughness_of(history)["roughness"].axes
-    names = [f"roughness_{kind}{end}" for end in ("", "_strip") for kind in ("mean", "rms")]
+    names = [f"roughness_{kind}{end}" for end in ("", "_strip") for kind in ("Sa", "Sq")]
     for line, name in zip(ax.lines, names, strict=True):
         np.testing.assert_allclose(line.get_ydata(), 1e3 * history[name])
 

@@ -15,7 +15,7 @@ COARSE = ("geometry.parameters.elements_along_contact=20", "stick.steps=6")
 
 
 @pytest.mark.parametrize(
-    ("amplitude", "regime"), [("0.01 um", "full stick"), ("3 um", "partial slip"), ("20 um", "gross sliding")]
+    ("amplitude", "regime"), [("0.01 um", "stick"), ("3 um", "partial slip"), ("20 um", "gross sliding")]
 )
 def test_check_names_the_regime(amplitude: str, regime: str) -> None:
     """Of the first cycle."""

@@ -102,7 +102,7 @@ def test_zip_and_tables(tmp_path: Path) -> None:
         ("motion.amplitude", ("1 cm",)),
     ]
     path.write_text("contact.friction,motion.amplitude\n0.1,10 mm\n0.1\n", "utf-8")
-    with pytest.raises(CaseError, match="row 3: expected 2 values as in the heading, with commas"):
+    with pytest.raises(CaseError, match="row 3: expected 2"):
         read_table(path)
     path.write_text("contact.friction\n0.1\n-3\n", "utf-8")
     with pytest.raises(CaseError, match="variant 2: expected greater"):

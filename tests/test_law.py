@@ -116,10 +116,10 @@ def test_a_slide_tells_its_law_and_goes_on(tmp_path: Path) -> None:
     ]
     out = tmp_path / "out"
     run_case(load_case("example1", settings), "auto", out, told.append, progress="none")
-    assert any("'gross-sliding' is taken: the bodies take up about 1" in text for text in told)
+    assert any("'gross-sliding' is taken: the bodies take up about " in text for text in told)
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["contact_law"] == "gross-sliding"
-    assert summary["elastic_share_of_stroke"] == pytest.approx(0.012, rel=0.2)
+    assert summary["elastic_share_of_stroke"] == pytest.approx(0.0045, rel=0.1)
     for case, half_cycles in (("example1", 4), (str(out / "case.toml"), 6)):
         farther = load_case(case, [*settings, f"run.half_cycles={half_cycles}"])
         done, _ = run_case(farther, "auto", out, told.append, resume=True, progress="none")

@@ -25,7 +25,7 @@ from fenwear.interface.overlap import ChartedSurface, node_triangles
 from fenwear.interface.placement import ZERO
 from fenwear.sliding.field import SlidingField
 
-AROUND = 3.0  # sizes of a node, within which the axis counts as passing through its area
+AROUND = 1.2  # sizes of a node, within which the axis passes through its area; beside the surface nothing is singular
 UPRIGHT = 0.1  # cosine between a node's normal and the mean one, below which a rigid motion hardly wears it
 NEAR = 4.0  # sizes of a triangle from the axis, beyond which v is smooth over it
 POINTS, SHARES = np.polynomial.legendre.leggauss(16)

@@ -187,7 +187,7 @@ def _temperatures(state: SteadyState) -> HeatState | None:
 
 def _of_these_bodies(system: Tribosystem) -> SteadyState:
     """Return the state of the bodies as they are, whatever its temperatures; collective."""
-    _check_exists(system)
+    system.team.lead(lambda: _check_exists(system))
     prepared = system.team.serve(with_reduced_heat(system))  # as which a state of one rank names its bodies
     _check_sinks(prepared)
     check_heat_memory(system)

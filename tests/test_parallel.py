@@ -176,7 +176,7 @@ def test_contacts_that_fail_on_one_rank(
                 assert found[1:] == (remedies, "")
                 np.testing.assert_array_equal(found[0], pressure)
             else:
-                assert (last > 26 and "on purpose on rank 0" in found[2]) or found[1] != remedies
+                assert (last > 26 and "on purpose on rank 0" in found[2]) or set(found[1]) - set(remedies)
 
 
 def told(run: Callable[[], Iterator[Block]]) -> tuple[Any, list[Any], str]:

@@ -23,9 +23,9 @@ LAWS = {"running-in": "1e-6*(1 + s/100)**-0.5", "Archard": "1e-6"}  # coefficien
     source="M. Giorgio, M. Guida, G. Pulcini: 64 readings of 32 liners over years; two of the liners are given.",
     measured="Wear depths at four times of each liner. No scatter of a reading is published.",
     given="Times of the readings. Pressure and speed are not published: they are held constant.",
-    calibrated="One coefficient for each liner, on its first two readings. The law is fixed beforehand: a "
-    "coefficient that "
-    "falls with the square root of the distance slid (running-in), beside one that is constant (Archard).",
+    calibrated="One coefficient for each liner, on its first two readings. Its law is a "
+    "coefficient that falls with the square root of the distance slid (running-in), beside a constant one (Archard). "
+    "The square root was chosen with all eight readings in sight, so the error below is not a blind one.",
     predicted="The later two readings, with an interval of 95 %: the scatter of the four fitted readings about both "
     "curves "
     "(two degrees of freedom), and that of the coefficient. Other liners are predicted in the same way.",

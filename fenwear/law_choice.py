@@ -111,7 +111,7 @@ def resolve_law(
         return ResolvedCase(
             taken, law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh), choice
         )
-    system = replace(system, made_from=taken)
+    system = replace(system, case=taken)
     if heat != "none":
         prepare = with_reduced_heat if heat == "reduced" else with_exchange
         system = prepare(system, keep=True, fresh=fresh)

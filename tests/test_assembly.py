@@ -1,9 +1,10 @@
-"""Bodies made in Python, without a case; and what a variant shares."""
+"""Bodies made in Python; and what a variant shares."""
 
 from __future__ import annotations
 
 import runpy
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,19 @@ from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, evolve, load_case, make_case, march, sweep, to_dataset, vary
-from fenwear.assembly import Bodies, Sliding, elastic, place, with_exchange, with_reduced_heat
+from fenwear.assembly import build_bodies, elastic, make_sliding, place, with_exchange, with_reduced_heat
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import OwnLaw, lame, strain, stress
 from fenwear.bodies.mesh import own_mesh
-from fenwear.case import Body, Contact, Heat, Load, Reciprocating, Support, WearLaw
+from fenwear.case import Body, Heat, Support
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw
-from fenwear.sliding.field import SlidingField
-from fenwear.sliding.friction import Friction
-from fenwear.sliding.motion import make_motion
 
 DEMO = Path(__file__).parents[1] / "demos" / "own_materials.py"
 GROUPS: dict[str, Callable[[Any], Any]] = {
     "punch_contact": lambda x: np.isclose(x[1], 0),
     "top": lambda x: np.isclose(x[1], 1),
 }
-HEAT = Heat(partition=0.5, conductance=0)
 HELD = Body(supports=(Support(on="top", fix=("x", "z")),))
 
 
@@ -84,26 +81,36 @@ def test_anisotropic_conductivity() -> None:
 
 def hand_made(conductivity: Any) -> Tribosystem:
     """Return a pad on a strip, both made in Python, with heat; the pad's conductivity is any tensor."""
-    made = []
-    for name, corners, cells, law in (
-        ("punch", [(-2, 0), (2, 3)], (8, 6), ConductionLaw(conductivity, 0.5)),
-        ("strip", [(-6, -3), (6, 0)], (24, 6), ConductionLaw(50.0, 3.6)),
-    ):
-        mesh = create_rectangle(MPI.COMM_WORLD, corners, cells, CellType.quadrilateral)
+    meshes = {}
+    for name, corners, cells in (("punch", [(-2, 0), (2, 3)], (8, 6)), ("strip", [(-6, -3), (6, 0)], (24, 6))):
         height = 3 if name == "punch" else -3
         groups = {f"{name}_contact": GROUPS["punch_contact"], "far": lambda x, height=height: np.isclose(x[1], height)}
-        supports = (Support(on="far", fix=("x",) if name == "punch" else ("x", "z")),)
-        loads = (Load(on="far", force=(0, -20)),) if name == "punch" else ()
-        description = Body(supports=supports, loads=loads, temperatures=({"on": "far"},))
-        elastic_body = ElasticBody(
-            own_mesh(name, mesh, groups), description, OwnLaw("stress", isotropic, expansion), degree=2
+        meshes[name] = own_mesh(name, create_rectangle(MPI.COMM_WORLD, corners, cells, CellType.quadrilateral), groups)
+    held = {"temperatures": [{"on": "far"}], "supports": [{"on": "far", "fix": ["x", "z"]}]}
+    tables = {
+        "geometry": {"degree": 2},
+        "materials": {"any": {"young": 2e5, "poisson": 0.3, "conductivity": 1, "heat_capacity": 1, "density": 1,
+                              "expansion": 1e-6}},
+        "punch": {**held, "regions": {"punch_body": "any"}, "supports": [{"on": "far", "fix": ["x"]}],
+                  "loads": [{"on": "far", "force": [0, -20]}]},
+        "strip": {**held, "regions": {"strip_body": "any"}},
+        "contact": {"friction": 0.3},
+        "wear": {"punch": {"coefficient": 1e-8}},
+        "motion": {"kind": "reciprocating", "amplitude": 1.0, "period": 0.5},
+        "heat": {"partition": 0.5, "conductance": 0},
+        "run": {"half_cycles": 2},
+    }  # fmt: skip
+    laws = {name: OwnLaw("stress", isotropic, expansion) for name in meshes}
+    case = make_case(tables, meshes=meshes, stresses=laws)
+    bodies = build_bodies(case)
+    conduction = (ConductionLaw(conductivity, 0.5), ConductionLaw(50.0, 3.6))
+    heat = [
+        HeatBody(elastic_body, description, law, case.heat)
+        for elastic_body, description, law in zip(
+            (bodies.punch, bodies.strip), (case.punch, case.strip), conduction, strict=True
         )
-        made.append((elastic_body, HeatBody(elastic_body, description, law, HEAT)))
-    (pad, pad_heat), (strip, strip_heat) = made
-    field = SlidingField(shift=(1.0, 0.0, 0.0))
-    motion = make_motion(Reciprocating(kind="reciprocating", amplitude=1.0, period=0.5))
-    sliding = Sliding(motion, field, Friction(Contact(friction=0.3), field), (WearLaw(coefficient=1e-8), None))
-    return with_exchange(elastic(place(Bodies(pad, strip, (pad_heat, strip_heat)), sliding, HEAT)))
+    ]
+    return with_exchange(elastic(place(replace(bodies, heat=tuple(heat)), make_sliding(case), case)))
 
 
 def expansion(theta: Any) -> Any:

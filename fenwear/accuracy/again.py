@@ -54,7 +54,7 @@ class Again:
         """
         case = changed(self.case, **tables)
         of_run = tables.keys() == {"run"}
-        return replace(self, system=replace(self.system, made_from=case) if of_run else with_case(self.system, case))
+        return replace(self, system=replace(self.system, case=case) if of_run else with_case(self.system, case))
 
     def values(self) -> Values:
         """Return the numbers of its end; collective.
@@ -193,11 +193,11 @@ def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:
     if by is not None and answers_anywhere(system):
         return relaid(system, case, by.grid)
     try:
-        return renewed(replace(system, made_from=case))
+        return renewed(replace(system, case=case))
     except CaseError as error:
         if case.geometry.order == 1:
             raise
         try:
-            return renewed(replace(system, made_from=changed(case, geometry={"order": 1})))
+            return renewed(replace(system, case=changed(case, geometry={"order": 1})))
         except CaseError:
             raise error from None

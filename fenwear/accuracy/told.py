@@ -224,7 +224,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     base = in_few_steps(case if below is None else below.case, system, until)
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles
-    one = replace(system, made_from=base) if below is None else set_up(base, system, below)
+    one = replace(system, case=base) if below is None else set_up(base, system, below)
     _, last, _ = Again(one, until, watch).ends()
     found = uncertainty(base, last, watch)
     if below is not None and "mesh" in found.contributions:

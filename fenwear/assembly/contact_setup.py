@@ -17,7 +17,7 @@ from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
-from fenwear.case.names import BY_ROLE, Names, told_by_name
+from fenwear.case.names import Names, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.passage import Passage
 from fenwear.interface import (
@@ -68,7 +68,7 @@ class ContactSetup:
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies; None without.
         law: Of the contact, by its name: see `laws`.
-        made_from: The case; None where it was made in Python.
+        case: The problem; of a stage that of the whole program.
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
@@ -82,7 +82,7 @@ class ContactSetup:
     sliding: Sliding
     heat: Heat | None
     law: str = "gross-sliding"
-    made_from: Case | None
+    case: Case
     loaded: tuple[Bodies, ...]
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
@@ -113,8 +113,8 @@ class ContactSetup:
 
     def __repr__(self) -> str:
         """Say in a line what it is."""
-        title = "made in Python" if self.made_from is None else repr(self.made_from.title)
-        return f"<{type(self).__name__} {title}: {len(self.pair.weights)} contact nodes, {len(self.pairs)} phases>"
+        sizes = f"{len(self.pair.weights)} contact nodes, {len(self.pairs)} phases"
+        return f"<{type(self).__name__} {self.case.title!r}: {sizes}>"
 
     @property
     def comm(self) -> MPI.Comm:
@@ -127,20 +127,9 @@ class ContactSetup:
         return Team.of(self.comm)
 
     @property
-    def case(self) -> Case:
-        """The case that it was made from.
-
-        Raises:
-            CaseError: it was made in Python, without one.
-        """
-        if self.made_from is None:
-            raise CaseError(InputError("", "expected bodies made from a case: those made in Python have none"))
-        return self.made_from
-
-    @property
     def names(self) -> Names:
         """What the bodies are called."""
-        return BY_ROLE if self.made_from is None else self.made_from.names
+        return self.case.names
 
     @property
     def motion(self) -> Motion:
@@ -269,8 +258,7 @@ class ContactSetup:
             CaseError: a value of it is not positive somewhere, the modulus of rough surfaces is missing, or the
                 hardness does not carry the load.
         """
-        case = self.made_from
-        modulus = None if case is None else common_modulus(case, self.bodies.regions, self.pair)
+        modulus = common_modulus(self.case, self.bodies.regions, self.pair)
         initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
         contact = self.friction.contact
         carries = self.strip_carries and self.passes  # else it lies where it is on either body
@@ -292,7 +280,7 @@ class ContactSetup:
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
         """Return h_c by the pressures (n,), where what lies between gives it; see `fenwear.layers.conductance`."""
-        return conductance_of(self.layers, self.made_from, self.bodies.regions, self.pair)
+        return conductance_of(self.layers, self.case, self.bodies.regions, self.pair)
 
     def passing(
         self,
@@ -372,7 +360,7 @@ class ContactSetup:
     @property
     def track_varies(self) -> bool:
         """Whether each position finds another track: the strip changes to and fro under the punch, or is uneven."""
-        return self.made_from is not None and self.case.strip_varies and self.sliding.to_and_fro
+        return self.case.strip_varies and self.sliding.to_and_fro
 
     @property
     def passing_laws(self) -> list[str]:
@@ -426,7 +414,7 @@ class ContactSetup:
 
     def wear_on_meshes(self, worn: WornDepths) -> float:
         """Return the largest wear since the meshes were moved over that from which on they follow; 0 where none do."""
-        limit = None if self.made_from is None else self.made_from.geometry.follow_wear
+        limit = self.case.geometry.follow_wear
         if limit is None or self.pair.punch.grid is not None:  # nothing of a grid's wear is the mesh's
             return 0.0
         followed, heights = self.bodies.followed, self.element_heights

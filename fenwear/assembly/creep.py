@@ -260,8 +260,8 @@ class Creep:
 
 def _courses(placed: ContactSetup) -> Array:
     """Return the loads over those of the middle, at even times of each phase (m, 2 k + 1); ones where they stay."""
-    phases, case, found = placed.motion.phases, placed.made_from, np.ones((len(placed.motion.phases), TIMES))
-    loads = [] if case is None else [load for body in case.bodies for load in case.loads_of(body)]
+    phases, case, found = placed.motion.phases, placed.case, np.ones((len(placed.motion.phases), TIMES))
+    loads = [load for body in case.bodies for load in case.loads_of(body)]
     if all(load.steady for load in loads):
         return found
     period = sum(phase.duration for phase in phases)

@@ -82,13 +82,13 @@ def relaid(system: Tribosystem, case: Case, grid: RegularGrid | None = None) -> 
     reach = system.bodies.punch.reach
     first = (grid or system.pair.punch.grid) if reach is None else reach.grid
     assert first is not None
-    return on_first_contact(regridded(replace(system, made_from=case, sliding=make_sliding(case)), first))
+    return on_first_contact(regridded(replace(system, case=case, sliding=make_sliding(case)), first))
 
 
 def answers_anywhere(system: Tribosystem) -> bool:
     """Return whether the bodies of a system answer on any grid, on meshes as they were made."""
-    case, bodies = system.made_from, system.bodies
-    if case is None or case.grid is None or bodies.followed is not None or bodies.warmed is not None:
+    case, bodies = system.case, system.bodies
+    if case.grid is None or bodies.followed is not None or bodies.warmed is not None:
         return False
     return CONDENSED not in (bodies.punch.operator, bodies.strip.operator)
 

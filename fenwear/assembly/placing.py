@@ -7,7 +7,7 @@ import numpy as np
 from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.strokes import Sliding, check_stays
-from fenwear.case import Case, Heat
+from fenwear.case import Case
 from fenwear.case.motions import Cycle
 from fenwear.case.names import told_by_name
 from fenwear.heat.passage import Passage
@@ -28,7 +28,7 @@ STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stay
 
 
 @told_by_name
-def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: Case | None = None) -> ContactSetup:
+def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
     """Bring the surfaces opposite each other in every phase of the motion; collective.
 
     Without heat the strip moves as a whole. With heat its elasticity is that of the middle position: then only its
@@ -37,8 +37,7 @@ def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: C
     Args:
         bodies: Both bodies.
         sliding: Motion, friction and wear.
-        heat: Settings of the heat between the bodies.
-        case: What they were made from: it gives the loads of each phase, and whether meshes follow the wear.
+        case: The problem: it gives the heat, the loads of each phase, and whether meshes follow the wear.
 
     Raises:
         CaseError: the surfaces do not face each other, the stroke runs off them, or no pressure balances the loads.
@@ -52,7 +51,7 @@ def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: C
         middle = on_closed_track(middle, sliding.field, sliding.track)
     sliding = sliding.measured_on(middle)
     # Round surfaces that slide along themselves stay; a whole strip is moved where it does not turn by a table.
-    whole = heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
+    whole = case.heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
     places = [sliding.placement(phase) for phase in sliding.motion.phases]
     pairs = {
         moved: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -78,16 +77,16 @@ def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: C
     placed = ContactSetup(
         bodies=bodies,
         sliding=sliding,
-        heat=heat,
-        made_from=case,
+        heat=case.heat,
+        case=case,
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
-        passage=None if heat is None else _passage(middle, sliding, rings=rings),
+        passage=None if case.heat is None else _passage(middle, sliding, rings=rings),
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         when, key = f"in {placed.direction_words[phase.direction]} sliding", "punch.loads"
-        if case is not None and isinstance(case.motion, Cycle):
+        if isinstance(case.motion, Cycle):
             row = int(np.searchsorted(case.motion.course.fraction, phase.fraction))
             when, key = f"from row {row} to row {row + 1}", "punch.loads" if case.motion.load is None else "motion.load"
         check_equilibrium(one, when, ratio, key)
@@ -96,7 +95,7 @@ def place(bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, case: C
 
 @told_by_name
 def place_at_rest(
-    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None, *, passes: bool = False
+    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case, *, passes: bool = False
 ) -> ContactSetup:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 
@@ -107,7 +106,7 @@ def place_at_rest(
         sliding: Motion, friction and wear; a phase for each half-cycle.
         middle: The surfaces there.
         law: Of the contact, by its name.
-        case: What they were made from.
+        case: The problem.
         passes: Whether the strip's material moves past the punch's.
     """
     loaded = _loaded(bodies, sliding.motion, case)
@@ -116,9 +115,9 @@ def place_at_rest(
     return ContactSetup(
         bodies=bodies,
         sliding=sliding,
-        heat=None if case is None else case.heat,
+        heat=case.heat,
         law=law,
-        made_from=case,
+        case=case,
         loaded=loaded,
         rigids=tuple(own),
         rigid=rigid,
@@ -142,8 +141,8 @@ def _passage(middle: ContactPair, sliding: Sliding, *, rings: bool) -> Passage |
     return Passage(middle, sliding.field, motion) if moved > STILL * middle.punch.spacing() else None
 
 
-def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:
+def _loaded(bodies: Bodies, motion: Motion, case: Case) -> tuple[Bodies, ...]:
     """Return the bodies under the loads of each phase; collective."""
-    if case is None or all(load.steady for body in ("punch", "strip") for load in case.loads_of(body)):
+    if all(load.steady for body in ("punch", "strip") for load in case.loads_of(body)):
         return (bodies,) * len(motion.phases)
     return tuple(bodies.under(case, phase.fraction) for phase in motion.phases)

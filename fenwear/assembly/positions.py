@@ -30,11 +30,11 @@ def place_case_bodies(case: Case, bodies: Bodies, sliding: Sliding | None = None
         sliding: How they slide; by default as the case has it, in as many positions as contact nodes ask for.
     """
     made = sliding or make_sliding(case)
-    placed = place(bodies, made, case.heat, case=case)
+    placed = place(bodies, made, case)
     wanted = _wanted(case, placed) if sliding is None else 0
     if wanted <= made.motion.positions:
         return placed
-    return place(bodies, make_sliding(case, positions=wanted), case.heat, case=case)
+    return place(bodies, make_sliding(case, positions=wanted), case)
 
 
 def _wanted(case: Case, placed: ContactSetup) -> int:

@@ -413,7 +413,7 @@ def with_exchange(
         system.bodies.punch.thickness,
         reduced=reduced,
         passage=system.passage,
-        others=[] if system.made_from is None else speeds_of(system.made_from),
+        others=speeds_of(system.case),
         keep=keep,
         fresh=fresh,
     )

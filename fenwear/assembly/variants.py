@@ -132,7 +132,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
 def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     """Return the system with each phase of the motion cut into parts of equal time; collective."""
     sliding = replace(system.sliding, motion=system.motion.in_parts(parts))
-    placed = place(system.bodies, sliding, system.heat, case=system.made_from)
+    placed = place(system.bodies, sliding, system.case)
     cut = joined(placed, system.condensed)
     return cut if system.exchange is None else with_exchange(cut, reduced=system.exchange.reduced)
 

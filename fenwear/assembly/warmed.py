@@ -49,8 +49,8 @@ def property_change(system: Tribosystem, state: HeatState | None) -> float:
     Raises:
         CaseError: a property is not positive at a temperature.
     """
-    case, conduction = system.made_from, system.bodies.heat
-    if case is None or case.heat is None or conduction is None or state is None or not case.warming:
+    case, conduction = system.case, system.bodies.heat
+    if case.heat is None or conduction is None or state is None or not case.warming:
         return 0.0
     before = taken_at(system)
     changed, problem = 0.0, None
@@ -78,8 +78,6 @@ def taken_at(system: Tribosystem) -> tuple[Array, Array]:
 
 def warming_key(system: Tribosystem) -> str:
     """Return the key of a property that depends on the temperature; "" where none does."""
-    if system.made_from is None:
-        return ""
     case = system.case
     used = sorted(case.used_materials)
     return next((f"materials.{name}.{key}" for name in used for key in case.materials[name].dependent), "")

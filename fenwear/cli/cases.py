@@ -146,7 +146,7 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
             stuck = law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False)
             _check_stick(loaded, stuck, accuracy=accuracy, full=full)
             return
-        system = replace(system, made_from=loaded)
+        system = replace(system, case=loaded)
     from fenwear.optimum import motion_words
 
     number = stability_number(system)

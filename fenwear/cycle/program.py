@@ -133,7 +133,7 @@ def _varied(system: Tribosystem, stage: Stage) -> Tribosystem:
 
 
 def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
-    return replace(staged, made_from=system.case, clock=Clock(stage.begin, stage.time, stage.slid))
+    return replace(staged, case=system.case, clock=Clock(stage.begin, stage.time, stage.slid))
 
 
 class Recurring:
@@ -207,9 +207,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str] | No
         CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
             contact carry the loads.
     """
-    if placed.made_from is None:
-        return None
-    found = held_at(placed.made_from, step)
+    found = held_at(placed.case, step)
     if found is None:
         return None
     factor = found.load_factor

@@ -352,7 +352,7 @@ def row_of_state(name: str) -> str:
 def layers_of(
     contact: Contact,
     pair: ContactPair,
-    modulus: float | Array | None = None,
+    modulus: float | Array,
     wear: Sequence[WearLaw | None] = (None, None),
     temperature: float = 0.0,
     *,
@@ -364,14 +364,14 @@ def layers_of(
     Args:
         contact: The table.
         pair: The surfaces.
-        modulus: E* of the materials at the contact, of all of it or at the nodes (n,), MPa; None where none is known.
+        modulus: E* of the materials at the contact, of all of it or at the nodes (n,), MPa.
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
         strip_carries: Whether debris lies on the strip's material.
         alike: Variables of laws (n,) that are the same in all phases: of the speed v and the temperature T.
 
     Raises:
-        CaseError: a value is not positive somewhere, or E* is missing.
+        CaseError: a value is not positive somewhere.
     """
     n, winkler, debris = len(pair.weights), None, None
     closure: Law | None = None
@@ -447,11 +447,8 @@ def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> 
     return lambda pressure: asperity_share(lubrication, {**known, "p": pressure}, pressure.shape, checked=False)
 
 
-def _rough(law: RoughLayer, modulus: float | Array | None, values: list[Array]) -> Law:
+def _rough(law: RoughLayer, modulus: float | Array, values: list[Array]) -> Law:
     young = modulus if law.modulus is None else law.modulus
-    if young is None:
-        message = "missing, but required where bodies are made without a case"
-        raise CaseError(InputError("contact.layer.modulus", message))
     roughness, radius, density = values
     height = RMS * roughness
     return RoughClosure(height, 4 / 3 * young * density * np.sqrt(radius) * height**1.5)

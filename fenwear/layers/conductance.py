@@ -26,7 +26,7 @@ from fenwear.layers.closure import SharedClosure
 Conductance = Callable[[Array], Array]
 
 
-def conductance_of(layers: Layers, case: Case | None, regions: Regions, pair: ContactPair) -> Conductance | None:
+def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPair) -> Conductance | None:
     """Return h_c of the nodes (n,), N/(mm s K), by their pressures (n,), MPa; None where the case gives it otherwise.
 
     Args:
@@ -35,7 +35,7 @@ def conductance_of(layers: Layers, case: Case | None, regions: Regions, pair: Co
         regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
         pair: The surfaces opposite each other.
     """
-    if case is None or case.heat is None or case.heat.conductance != "layer":
+    if case.heat is None or case.heat.conductance != "layer":
         return None
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None
     modulus = common_modulus(case, regions, pair) if given is None else given

@@ -125,7 +125,7 @@ class HeatMonitor:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)
             values |= {CHANGE: fineness.change, DIFFERENCE: fineness.difference}
         found = remarks(Seen.of_system(system), "heat")
-        jumps = system.made_from is not None and system.made_from.run.integration == "jump"
+        jumps = system.case.run.integration == "jump"
         for text in heat_warnings(gain, jumps=jumps):
             found["answers"] = text
         new = [text for kind, text in found.items() if kind not in self._texts]

@@ -370,7 +370,7 @@ def stroke_taken_up(seen: Seen) -> Fields:
 
 def beside_radius(seen: Seen) -> Fields:
     """Return the radius at which a program measures distances, where nothing touches there."""
-    program = (seen.system.made_from or seen.system.case).program
+    program = seen.system.case.program
     if program is None or program.radius is None:
         return {}
     radii, weights = seen.system.sliding_ratio[0], seen.system.pair.weights

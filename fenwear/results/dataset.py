@@ -21,7 +21,7 @@ def to_dataset(blocks: Block | Iterable[Block]) -> xarray.Dataset:
         blocks: One, or those that `march`, `jump` or `evolve` yield, in their order.
 
     Raises:
-        CaseError: there is no block, or they are of bodies without a case.
+        CaseError: there is no block.
     """
     found = [blocks] if isinstance(blocks, Block) else list(blocks)
     if not found:

@@ -296,7 +296,7 @@ def write_fields(
 
 def _in_degrees(data: dict[str, Any], system: Tribosystem) -> None:
     """Put temperatures on the scale of the case."""
-    degrees = KELVIN if system.made_from is None else degrees_of(system.case)
+    degrees = degrees_of(system.case)
     for body in ("punch", "strip"):
         name = f"{body}_temperature"
         if name in data and degrees is not KELVIN:

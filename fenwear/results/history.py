@@ -57,7 +57,7 @@ def variables_of(system: Tribosystem) -> dict[str, Variable]:
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
-    told, found = system.names.meant, {**_columns(system), **_of_program(system.made_from or system.case)}
+    told, found = system.names.meant, {**_columns(system), **_of_program(system.case)}
     return {name: one._replace(attributes=told(one.attributes)) for name, one in found.items()}
 
 

@@ -19,8 +19,8 @@ LINE, POINT = 4.0, 4.7  # p_0 / k
 
 def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
     """Return the limit, MPa, and the material that has it; None for conforming surfaces, or without a yield stress."""
-    case = placed.made_from
-    if case is None or conforming(placed.pair):
+    case = placed.case
+    if conforming(placed.pair):
         return None
     punch, strip = placed.bodies.regions
     used = case.punch.materials_at(punch) | case.strip.materials_at(strip)

@@ -87,7 +87,7 @@ class StickInterface(OppositeBodies):
     Args:
         bodies: Both, under the mean of their loads.
         sliding: What the strip does, friction and wear.
-        case: Where it was made from one: gives the loads of each time.
+        case: The problem: it gives the loads of each time.
         moves: Whether the strip's surface passes under the punch, which slides along it; otherwise the surfaces stay
             opposite each other, as for slip that is small against the contact, and have a common frame.
         far: Whether the strip goes so far that its own place says what gap there is, not what it is moved by.
@@ -103,7 +103,7 @@ class StickInterface(OppositeBodies):
         self,
         bodies: Bodies,
         sliding: Sliding,
-        case: Case | None = None,
+        case: Case,
         *,
         moves: bool = False,
         far: bool = False,
@@ -123,12 +123,10 @@ class StickInterface(OppositeBodies):
         self.whole_strip = middle.strip
         self.border = Border.of_swept([middle, *(pair(middle.punch, middle.strip, there) for there in places)])
         middle = self.border.on(middle, self.border.on_strip(middle.strip))
-        self.layers = Layers(len(middle.weights))
-        if case is not None:
-            modulus = common_modulus(case, bodies.regions, middle)
-            initial = 0.0 if case.heat is None else case.heat.initial
-            carries = moves and case.debris_on_strip  # else surfaces stay opposite each other: it lies where it is
-            self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial, strip_carries=carries)
+        modulus = common_modulus(case, bodies.regions, middle)
+        initial = 0.0 if case.heat is None else case.heat.initial
+        carries = moves and case.debris_on_strip  # else surfaces stay opposite each other: it lies where it is
+        self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial, strip_carries=carries)
         if bodies.followed is None:
             check_distance(middle)
         onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
@@ -152,14 +150,14 @@ class StickInterface(OppositeBodies):
             on_strip: What the strip is condensed onto.
         """
         d, both = self.dim, self.bodies
-        positions = 1 + (steps_of(self.case) if self.moves and self.case is not None else 0)
+        positions = 1 + (steps_of(self.case) if self.moves else 0)
         asked = (nodes, d * nodes), (on_strip, d * on_strip)
         return setup_resources(both, nodes, asked, positions * d**2 + 2 * d**2 + 1)
 
     def _creep(self) -> StickCreep | None:
         """Return what creeps; None where nothing does; collective."""
         bodies, operators = (self.bodies.punch, self.bodies.strip), (self.punch, self.strip)
-        layer = None if self.case is None else getattr(self.case.contact.layer, "creep", None)
+        layer = getattr(self.case.contact.layer, "creep", None)
         laws = [None if table is None else Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer)]
         if laws == [None, None, None]:
             return None
@@ -183,9 +181,8 @@ class StickInterface(OppositeBodies):
         found = np.zeros_like(x)
         found[:, 0] = x[:, 0]
         if self.dim == 3:
-            materials = {} if self.case is None else self.case.materials
-            names = set() if self.case is None else set(self.case.strip.regions.values())
-            found[:, 1] = -x[:, 1] * (materials[names.pop()].poisson if len(names) == 1 else 0.0)
+            names = set(self.case.strip.regions.values())
+            found[:, 1] = -x[:, 1] * (self.case.materials[names.pop()].poisson if len(names) == 1 else 0.0)
         return found
 
     def position(self, offset: float | Placement) -> Position:
@@ -210,7 +207,7 @@ class StickInterface(OppositeBodies):
 
     def loaded(self, fraction: float | None) -> LoadEffect:
         """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""
-        loads = [] if self.case is None else [load for body in ("punch", "strip") for load in self.case.loads_of(body)]
+        loads = [load for body in ("punch", "strip") for load in self.case.loads_of(body)]
         constant = fraction is None or all(load.steady for load in loads)
         key = None if constant or fraction is None else round(fraction, 12)
         if key not in self._loaded:
@@ -219,7 +216,7 @@ class StickInterface(OppositeBodies):
 
     def prepare_load(self, fraction: float | None) -> None:
         """Find what the loads do at a fraction of the cycle, or their mean; collective."""
-        bodies = self.bodies if fraction is None or self.case is None else self.bodies.under(self.case, fraction)
+        bodies = self.bodies if fraction is None else self.bodies.under(self.case, fraction)
         resultant = np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant])
         punch, strip = self.punch.under(bodies.punch).by_load, self.strip.under(bodies.strip).by_load
         forced = None if self.creep is None else (punch - self.creep.moved[0], strip - self.creep.moved[1])

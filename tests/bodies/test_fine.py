@@ -343,7 +343,7 @@ def on_layer(
         bodies.punch.surface = replace(bodies.punch.surface, profile=sphere)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(operators, "OPERATORS", {**OPERATORS, "fine": make})
-            system = elastic(place(bodies, make_sliding(case), case=case))
+            system = elastic(place(bodies, make_sliding(case), case))
         contact = system.phase_contact([0]).solve(system.gap(0, system.unworn()))
         found.append((contact.pressure[0], float(contact.rigid[0, 0])))
     return found[0], found[1], x

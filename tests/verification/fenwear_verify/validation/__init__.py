@@ -6,6 +6,8 @@ from fenwear_verify.validation import (
     cylinder_liners,
     disc_brake,
     fretting_cylinder,
+    hip_in_patients,
+    hip_simulator,
     polyethylene,
     sliding_metal,
 )
@@ -21,6 +23,8 @@ __all__ = [
     "disc_brake",
     "experiments",
     "fretting_cylinder",
+    "hip_in_patients",
+    "hip_simulator",
     "polyethylene",
     "sliding_metal",
 ]

@@ -74,9 +74,19 @@ class Creep:
         return [member.retardation.over(self.durations, self.courses) for member in self.members]
 
     @cached_property
-    def _cuts(self) -> list[int]:
-        sizes = [len(member.retardation.times) * member.size for member in self.members]
-        return [int(cut) for cut in np.cumsum(sizes)]
+    def _ends(self) -> list[int]:
+        """Where the states of the members end."""
+        return [int(end) for end in np.cumsum([len(one.retardation.times) * one.size for one in self.members])]
+
+    @property
+    def creeps(self) -> bool:
+        """Whether a body or a layer does."""
+        return bool(self.members)
+
+    @property
+    def size(self) -> int:
+        """Of the state."""
+        return self._ends[-1] if self.members else 0
 
     @property
     def endless(self) -> str:
@@ -85,22 +95,23 @@ class Creep:
 
     def beginning(self) -> Array:
         """Return the state at the start: nothing has crept."""
-        return np.zeros(self._cuts[-1])
+        return np.zeros(self.size)
 
     def parted(self, crept: Array) -> list[Array]:
-        """Return the y of each member (terms, size) of a state."""
-        parts = np.split(crept, self._cuts[:-1])
-        return [part.reshape(-1, member.size) for part, member in zip(parts, self.members, strict=True)]
+        """Return the y of each member (terms, size), or (terms, size, k) of k states (size, k)."""
+        parts = np.split(crept, self._ends)  # behind the last of them nothing is left
+        return [
+            part.reshape(-1, member.size, *crept.shape[1:]) for part, member in zip(parts, self.members, strict=False)
+        ]
 
     def depth(self, crept: Array) -> Array:
         """Return the gap that has crept open (n,), mm, in the middle of a half-cycle."""
-        return np.asarray(sum(self.depths(crept).values()))
+        return sum(self.depths(crept).values(), np.zeros(self._nodes))
 
     def depths(self, crept: Array) -> dict[str, Array]:
         """Return how far punch, strip and layer have crept (n,), or of states (size, k) each, (n, k), mm, by name."""
         found = {}
-        for member, part in zip(self.members, np.split(crept, self._cuts[:-1]), strict=True):
-            y = part.reshape(-1, member.size, *crept.shape[1:])
+        for member, y in self._each(crept):
             found[member.name] = member.opened(
                 self.middle, np.asarray(np.tensordot(member.retardation.compliances, y, 1))
             )
@@ -112,7 +123,7 @@ class Creep:
     def from_other(self, other: Creep, crept: Array, nodes: NDArray[np.int64]) -> Array:
         """Return a state of those on another contact grid, whose `nodes` (n,) those here were, or none."""
         of_each = zip(self.members, other.members, other.parted(crept), strict=True)
-        return np.concatenate([member.from_other(before, y, nodes).ravel() for member, before, y in of_each])
+        return _joined([member.from_other(before, y, nodes).ravel() for member, before, y in of_each])
 
     @property
     def _nodes(self) -> int:
@@ -123,6 +134,8 @@ class Creep:
     @cached_property
     def grown(self) -> tuple[Interface, ...]:
         """What the surfaces answer in each phase of a march, creep within it and all."""
+        if not self.creeps:
+            return self.interfaces
         known: dict[tuple[float, ...], Interface] = {}
         found = []
         for phase, own in enumerate(self.interfaces):
@@ -169,13 +182,14 @@ class Creep:
             - (1 - cycle.decays[phase])[:, None] * y
             for (member, y), cycle in zip(self._each(crept), self.cycles, strict=True)
         ]
-        return np.concatenate([one.ravel() for one in found])
+        return _joined([one.ravel() for one in found])
 
     def tangent(self, phase: int, ratio: Array) -> CreepTangent:
         """Return what changes of state and pressure do in a phase."""
-        gaps: list[Array] = []
-        by_pressure: tuple[list[Array], list[Array]] = [], []
-        stay: tuple[list[Array], list[Array]] = [], []
+        n = self._nodes
+        gaps: list[Array] = [np.zeros((n, 0))]
+        by_pressure: tuple[list[Array], list[Array]] = [np.zeros((0, n))], [np.zeros((0, n))]
+        stay: tuple[list[Array], list[Array]] = [np.zeros(0)], [np.zeros(0)]
         for member, cycle in zip(self.members, self.cycles, strict=True):
             opened, matrix = member.opened(phase, np.eye(member.size)), member.matrix(phase, ratio)
             for k, compliance in enumerate(member.retardation.compliances):
@@ -208,13 +222,13 @@ class Creep:
         for (member, y), (_, by_state) in zip(self._each(crept), shares, strict=True):
             for phase, own in enumerate(by_state):
                 gap[phase] += member.opened(phase, own @ y)
-        return CreepStage(self, gap, self.coupling([by for by, _ in shares], ratios), crept, cycles, list(ratios), load)
+        return CreepStage(self, gap, [by for by, _ in shares], crept, cycles, list(ratios), load)
 
     def end(self, ratios: Sequence[Array]) -> CreepStage:
         """Return what cycles that repeat do in the end; arguments as of `stage`."""
         shares = [cycle.repeating for cycle in self.cycles]
         gap = self._by_loads(shares, ratios, 1.0)
-        return CreepStage(self, gap, self.coupling(shares, ratios), self.beginning(), np.inf, list(ratios), 1.0)
+        return CreepStage(self, gap, shares, self.beginning(), np.inf, list(ratios), 1.0)
 
     def lasting(self, pressure: Array, ratios: Sequence[Array], load: float) -> list[Array]:
         """Return the v_i of each member in all phases (m, size), mm, at pressures (m, n)."""
@@ -226,8 +240,7 @@ class Creep:
     def _by_loads(self, shares: Sequence[Array], ratios: Sequence[Array], load: float) -> Array:
         """Return the gap (m, n) that the loads alone creep open."""
         m = len(self.durations)
-        none = np.zeros((m, self._nodes))
-        gap = np.zeros((m, self._nodes))
+        none, gap = np.zeros((m, self._nodes)), np.zeros((m, self._nodes))
         for member, own, v in zip(self.members, shares, self.lasting(none, ratios, load), strict=True):
             for phase in range(m):
                 gap[phase] += member.opened(phase, own[phase] @ v)
@@ -278,6 +291,11 @@ def _courses(placed: ContactSetup) -> Array:
     return found
 
 
+def _joined(parts: Sequence[Array]) -> Array:
+    """Return the parts of a state as one vector; of none an empty one."""
+    return np.concatenate([np.zeros(0), *parts])
+
+
 def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
     return all(a is b or np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
@@ -289,7 +307,7 @@ class CreepStage:
     Attributes:
         creep: All that creeps.
         gap: That state and loads open (m, n), mm.
-        coupling: Gaps of each phase by the pressures of each phase (m, n, m, n), mm/MPa.
+        shares: Of the elastic displacement of each phase in each phase (phases, i), of each member.
         crept: State at the start.
         cycles: Length of the step; infinite for the end.
         ratios: tau of each phase.
@@ -298,11 +316,18 @@ class CreepStage:
 
     creep: Creep
     gap: Array
-    coupling: Array
+    shares: Sequence[Array]
     crept: Array
     cycles: float
     ratios: list[Array]
     load: float
+
+    def opening(self, gap: Array, coupling: Array | None) -> tuple[Array, Array | None]:
+        """Return gaps (m, n), mm, and a coupling (m, n, m, n), mm/MPa, with what creeps; None for no coupling."""
+        if not self.creep.creeps:
+            return gap, coupling
+        own = self.creep.coupling(self.shares, self.ratios)
+        return gap + self.gap, own if coupling is None else own + coupling
 
     def rate(self, pressure: Array) -> Array:
         """Return what each cycle of the step adds to the state, at pressures (m, n)."""
@@ -311,14 +336,12 @@ class CreepStage:
         for cycle, y, v in zip(creep.cycles, creep.parted(self.crept), displaced, strict=True):
             by_v, by_y = cycle.rate(self.cycles)
             found.append((by_v @ v + by_y[:, None] * y).ravel())
-        return np.concatenate(found)
+        return _joined(found)
 
     def end(self, pressure: Array) -> Array:
         """Return the state that cycles at pressures (m, n) come to in the end."""
         displaced = self.creep.lasting(pressure, self.ratios, self.load)
-        return np.concatenate(
-            [(cycle.lasting.T @ v).ravel() for cycle, v in zip(self.creep.cycles, displaced, strict=True)]
-        )
+        return _joined([(cycle.lasting.T @ v).ravel() for cycle, v in zip(self.creep.cycles, displaced, strict=True)])
 
 
 def creep_of(
@@ -326,8 +349,8 @@ def creep_of(
     operators: tuple[SurfaceOperator, SurfaceOperator],
     interfaces: tuple[Interface, ...],
     on_material: Callable[[int], Interface],
-) -> Creep | None:
-    """Return what creeps; None where nothing does; collective.
+) -> Creep:
+    """Return what creeps; collective.
 
     Args:
         placed: The bodies.
@@ -336,13 +359,11 @@ def creep_of(
         on_material: Returns them joined in a phase with what the strip's own material answers, wherever it is.
     """
     bodies, given = (placed.bodies.punch, placed.bodies.strip), getattr(placed.friction.contact.layer, "creep", None)
-    laws = [None if body.creep is None else Retardation.of(body.creep) for body in bodies]
-    if given is None and laws == [None, None]:
-        return None
+    laws = [Retardation.of(body.creep) for body in bodies]
 
     def by_supports(which: int, operator: SurfaceOperator) -> Array:
         body = bodies[which]
-        creeps = laws[which] is not None and body.moved
+        creeps = laws[which].creeps and body.moved
         return operator.under(body.with_loads(())).by_load if creeps else 0.0 * operator.by_load
 
     moved = by_supports(0, operators[0]), by_supports(1, operators[1])
@@ -350,7 +371,7 @@ def creep_of(
     members: list[Member] = [
         (CreepingBody if bodies[which].reach is None else CreepingForces)(which, law, faces, moved[which])
         for which, law in enumerate(laws)
-        if law is not None
+        if law.creeps
     ]
     if given is not None and placed.layers.winkler is not None:
         members.append(CreepingLayer(Retardation.of(given), placed.layers.winkler))

@@ -149,10 +149,9 @@ def at_rim(system: ContactSetup, touched: Mask) -> bool:
 def carried(worn: WornDepths, before: Tribosystem, after: Tribosystem) -> WornDepths:
     """Return depths and states on another grid: where it has the same nodes theirs, elsewhere those of the start."""
     (on_punch, on_strip), start = node_maps(before, after), after.unworn()
-    if after.creep is not None and before.creep is not None:
-        start = replace(start, crept=after.creep.from_other(before.creep, worn.crept, on_punch))
     return replace(
         start,
+        crept=after.creep.from_other(before.creep, worn.crept, on_punch),
         punch=kept_volume(worn.punch, on_punch, before.pair.weights, after.pair.weights),
         strip=kept_volume(worn.strip, on_strip, before.pair.strip.weights, after.pair.strip.weights),
         between=on_nodes(worn.between, on_punch, start.between),

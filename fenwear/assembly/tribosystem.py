@@ -87,15 +87,15 @@ class Tribosystem(ContactSetup):
         interfaces: The same in each phase.
         exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
         law_state: What the law of contact has prepared of it, where it needs more.
-        creep: What bodies and layer creep; None where nothing does.
+        creep: What bodies and layer creep.
     """
 
     condensed: Condensed
     interface: Interface
     interfaces: tuple[Interface, ...]
+    creep: Creep
     exchange: HeatExchange | None = None
     law_state: Any = None
-    creep: Creep | None = None
 
     @property
     def elastic_length(self) -> float:
@@ -141,9 +141,8 @@ class Tribosystem(ContactSetup):
 
         Friction may be `following` the pressure (see `CondensedContact.follow`).
         """
-        interface = self.interfaces[phase] if self.creep is None else self.creep.grown[phase]
         return self._contact(
-            [SlidingContact(interface, self.friction_ratios()[phase])],
+            [SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])],
             self.layers.hardness if capped else np.inf,
             following=following,
         )
@@ -157,12 +156,11 @@ class Tribosystem(ContactSetup):
             passing: Whether what has crept goes on over the phase, in a march; else it is left out.
         """
         found = super().gap(phase, worn)
-        return found + self.creep.offset(phase, worn.crept) if passing and self.creep is not None else found
+        return found + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else found
 
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, what lies between then, and that nothing has crept."""
-        found = super().unworn()
-        return found if self.creep is None else replace(found, crept=self.creep.beginning())
+        return replace(super().unworn(), crept=self.creep.beginning())
 
     def _contact(
         self,

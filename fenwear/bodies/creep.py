@@ -62,8 +62,10 @@ class Retardation:
     endless: bool = False
 
     @classmethod
-    def of(cls, creep: Creep) -> Retardation:
-        """Return what a table of a case describes."""
+    def of(cls, creep: Creep | None) -> Retardation:
+        """Return the law of a case's table; without one that of no terms, which does not creep."""
+        if creep is None:
+            return cls(np.zeros(0), np.zeros(0))
         compliances = [term.compliance for term in creep.terms]
         times = [term.time for term in creep.terms]
         if creep.per_decade is not None and creep.onset is not None:
@@ -72,6 +74,11 @@ class Retardation:
             compliances += list(creep.per_decade / np.log(10) * step * np.exp(-(10.0**-decades)))
             times += list(creep.onset * 10.0**decades)
         return cls(np.array(compliances), np.array(times), creep.per_decade is not None)
+
+    @property
+    def creeps(self) -> bool:
+        """Whether it has terms."""
+        return len(self.times) > 0
 
     def growth(self, time: Array | float) -> Array:
         """Return J(t) / J(0) at times (...), s."""

@@ -75,8 +75,6 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
 def _creep_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, end: WornDepths) -> float:
     """Return the difference of what has crept over what the jump creeps; near the end of creep over a part of all."""
     creep, weights = system.creep, system.pair.weights
-    if creep is None:
-        return 0.0
     wrong, moved, there = (float(weights @ np.abs(creep.depth(one.crept))) for one in (apart, step, end))
     return wrong / max(moved, REST * there, 1e-300)
 

@@ -392,9 +392,7 @@ class Stepper:
             flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
-        creep = self._creep(before.worn, cycles)
-        if creep is not None:
-            worn = replace(worn, crept=creep.rate(contact.pressure))
+        worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
         return _Stage(contact, heated, worn, adds, solved.conductances, self._through_coatings(contact.pressure))
 
     def _of_first_phase(self, gap: Array) -> ContactState | None:
@@ -430,9 +428,7 @@ class Stepper:
         worn, cycles = begin
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         step, near = passing.step(worn, cycles), start
-        creep = self._creep(worn, cycles)
-        if creep is not None:
-            gap, coupling = gap + creep.gap, creep.coupling if coupling is None else coupling + creep.coupling
+        gap, coupling = self._creep(worn, cycles).opening(gap, coupling)
 
         def solve(flowed: Array) -> ContactState:
             nonlocal near
@@ -442,10 +438,9 @@ class Stepper:
         found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
         return found
 
-    def _creep(self, worn: WornDepths, cycles: float) -> CreepStage | None:
-        """Return what creeps in a stage; None where nothing does."""
-        creep = self.system.creep
-        return None if creep is None else creep.stage(worn.crept, cycles, self.ratios, self._load)
+    def _creep(self, worn: WornDepths, cycles: float) -> CreepStage:
+        """Return what creeps in a stage."""
+        return self.system.creep.stage(worn.crept, cycles, self.ratios, self._load)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None) -> None:
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""

@@ -379,8 +379,9 @@ class PhaseStep:
 
         def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]
-            lost, creep = passing.worn(contact.pressure, worn, flowed=self._flowed), self.system.creep
-            if creep is not None:
+            lost = passing.worn(contact.pressure, worn, flowed=self._flowed)
+            creep = self.system.creep
+            if creep.creeps:
                 crept = creep.change(self.phase, worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)
             return with_coated(self.system, meter(pressure), lost), lost

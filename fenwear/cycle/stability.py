@@ -115,7 +115,7 @@ def _factors(
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
-    dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
+    dim = (0 if heat is None else heat.dim) + system.creep.size
     dim += 0 if system.layers.debris is None else len(system.pair.strip.weights) if system.layers.strip_carries else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):

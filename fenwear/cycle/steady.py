@@ -50,6 +50,7 @@ from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.layers.memory import Held
+from fenwear.sliding.wear import STIFF
 
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
 ZERO = 1e-12  # of the largest: a velocity that is rounding
@@ -100,7 +101,7 @@ class SteadyState:
         wear_per_cycle: Depth worn off both bodies in a cycle (n,), mm.
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         debris: Thickness of the third body (n,), mm: what a cycle feeds, times its life; None without.
-        crept: Depth that has crept (n,), mm, at the end of a cycle; None where nothing creeps.
+        crept: Depth that has crept (n,), mm, at the end of a cycle.
         states: What laws remember, at rest, at the start of a cycle, by their names (n,); those of the strip's
             material by `NAME_strip` (n_strip,).
         iterations: Newton iterations.
@@ -130,7 +131,7 @@ class SteadyState:
     passes: int = field(default=0, kw_only=True)
     conductances: Array | None = field(default=None, kw_only=True)
     debris: Array | None = field(default=None, kw_only=True)
-    crept: Array | None = field(default=None, kw_only=True)
+    crept: Array = field(default_factory=lambda: STIFF, kw_only=True)
     states: dict[str, Array] = field(default_factory=dict, kw_only=True)
 
     @property
@@ -232,7 +233,7 @@ def _check_exists(system: Tribosystem) -> None:
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
-    if system.creep is not None and system.creep.endless:
+    if system.creep.endless:
         raise ConvergenceError(
             f"no cyclic steady state exists: {system.creep.endless} grows with the logarithm of time, for ever. Follow "
             "it by `run`, or give it terms alone"
@@ -365,7 +366,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
         system=system,
         conductances=None if heat is None else solved.conductances,
         debris=system.passing(problem.wear, conditions=problem.conditions).resting(contact.pressure),
-        crept=None if system.creep is None or crept is None else system.creep.depth(crept),
+        crept=system.creep.depth(crept),
         states={} if held is None or system.layers.memory is None else system.layers.memory.by_name(held),
     )
 

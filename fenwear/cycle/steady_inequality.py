@@ -66,7 +66,7 @@ class SteadyInequality:
         self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
         self.omega = slice(m * n, m * n + n)
         self._slide(system.friction_ratios())
-        self._creep = None if system.creep is None else system.creep.end(system.friction_ratios())
+        self._creep = system.creep.end(system.friction_ratios())
         size = self.equations.size
         self._cold: Array = np.zeros(size)  # what the rows have besides the unknowns, without heat
         for k, own in enumerate(system.interfaces):
@@ -94,7 +94,7 @@ class SteadyInequality:
         modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
         self.equations: ShapeEquations | GridShape
-        linear = self.system.heat is None and self.closure is None and self.system.creep is None
+        linear = self.system.heat is None and self.closure is None and not self.system.creep.creeps
         linear = linear and not self.system.track_changes
         grid = self._grid(ratios, scale, modes, balances) if linear and self.n >= GRIDDED else None
         if grid is not None:
@@ -128,7 +128,7 @@ class SteadyInequality:
         if not self.system.friction.constant:
             ratios = self.system.friction_ratios(conditions)
             self._slide(ratios)
-            self._creep = None if self.system.creep is None else self.system.creep.end(ratios)
+            self._creep = self.system.creep.end(ratios)
 
     def _residual(self, x: Array) -> Array:
         m, n = self.m, self.n
@@ -199,13 +199,9 @@ class SteadyInequality:
             coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
         """
         m, n = self.m, self.n
-        self.offset = self._cold
-        if self._creep is not None:
-            thermal = self._creep.gap if thermal is None else thermal + self._creep.gap
-            coupling = self._creep.coupling if coupling is None else coupling + self._creep.coupling
-        if thermal is not None:
-            self.offset = self._cold.copy()
-            self.offset[: m * n] += thermal.ravel() / self.gap_scale
+        thermal, coupling = self._creep.opening(np.zeros((m, n)) if thermal is None else thermal, coupling)
+        self.offset = self._cold.copy()
+        self.offset[: m * n] += thermal.ravel() / self.gap_scale
         if isinstance(self.equations, ShapeEquations) and (coupling is not None or self.equations.coupling is not None):
             scale = self.p_scale / self.gap_scale
             by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
@@ -292,9 +288,9 @@ class SteadyInequality:
         pressure = contact.pressure / self.p_scale
         return np.concatenate([pressure.ravel(), shape, (rigid[1:] - rigid[0]).ravel(), velocity])
 
-    def crept(self, pressure: Array) -> Array | None:
-        """Return the state of what creeps in the end (size,), at pressures (m, n); None where nothing does."""
-        return None if self._creep is None else self._creep.end(pressure)
+    def crept(self, pressure: Array) -> Array:
+        """Return the state of what creeps in the end (size,), at pressures (m, n)."""
+        return self._creep.end(pressure)
 
     def _newton(self, x: Array, most: int | None, *, near: bool) -> Array:
         """Return the solution from a start, within so many iterations.

@@ -65,15 +65,14 @@ def phase_tangent(
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
     gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)
     gap_by_p, gap_by_s = gap_rows @ state_p, gap_rows @ state_s
-    if creep is not None:
-        crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
-        none: Array = np.zeros((n, len(crept.stays)))
-        laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
-        traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
-        gap_by_p = gap_by_p + crept.gap_by_pressure
-        gap_by_s = np.hstack([gap_by_s + crept.gap_by_heat, crept.gap_by_state])
-        state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
-        state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
+    crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
+    none: Array = np.zeros((n, len(crept.stays)))
+    laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
+    traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
+    gap_by_p = gap_by_p + crept.gap_by_pressure
+    gap_by_s = np.hstack([gap_by_s + crept.gap_by_heat, crept.gap_by_state])
+    state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
+    state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p

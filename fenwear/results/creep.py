@@ -29,15 +29,12 @@ def of_member(name: str) -> dict[str, Variable]:
 
 def variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of what creeps."""
-    members = () if system.creep is None else system.creep.members
-    return {name: one for member in members for name, one in of_member(member.name).items()}
+    return {name: one for member in system.creep.members for name, one in of_member(member.name).items()}
 
 
 def values(block: Block) -> dict[str, Array]:
     """Return them for each half-cycle of a block by name: (k,), and (k, n) along the contact."""
     system, found = block.system, dict[str, Array]()
-    if system.creep is None:
-        return found
     areas = system.bodies.punch.thickness * system.pair.weights
     for name, depth in system.creep.depths(block.crept.T).items():
         found[f"creep_depth{ENDS[name]}"] = depth.T

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.bodies.creep import Retardation, RetardedCycle
+from fenwear.bodies.creep import Retardation
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
 from fenwear.stick.position import Position
@@ -31,7 +31,7 @@ class StickCreep:
     """What creeps, of `PARTS` in this order; its state is one vector, of each its y (terms, ...) in turn.
 
     Attributes:
-        laws: Of each part; None where it does not creep.
+        laws: Of each part; without terms where it does not creep.
         shapes: Of the displacement of each.
         behind: Operators of punch and strip below a grid that grows, whose states are forces and what loads displace,
             as those of `fenwear.assembly.creeping.CreepingForces`; None where they are displacements.
@@ -39,7 +39,7 @@ class StickCreep:
         closure: Of the layer by unit pressures at once (n,), mm/MPa.
     """
 
-    laws: tuple[Retardation | None, Retardation | None, Retardation | None]
+    laws: tuple[Retardation, Retardation, Retardation]
     shapes: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
     moved: tuple[Array, Array]
     closure: Array
@@ -49,10 +49,15 @@ class StickCreep:
         object.__setattr__(self, "_kept", {})
 
     @property
+    def creeps(self) -> bool:
+        """Whether a part does."""
+        return any(law.creeps for law in self.laws)
+
+    @property
     def endless(self) -> str:
         """The key of what creeps without an end; "" where nothing does."""
         keys = ("punch.creep", "strip.creep", "contact.layer.creep")
-        return next((key for key, law in zip(keys, self.laws, strict=True) if law is not None and law.endless), "")
+        return next((key for key, law in zip(keys, self.laws, strict=True) if law.endless), "")
 
     def beginning(self) -> Array:
         """Return the state at the start: nothing has crept."""
@@ -65,9 +70,7 @@ class StickCreep:
         return [punch, strip, layer] if self.behind is None else [2 * punch, 2 * strip, layer]
 
     def _sizes(self) -> list[int]:
-        return [
-            0 if law is None else len(law.times) * count for law, count in zip(self.laws, self._numbers, strict=True)
-        ]
+        return [len(law.times) * count for law, count in zip(self.laws, self._numbers, strict=True)]
 
     def parted(self, state: Array) -> list[Array]:
         """Return the y of each part (terms, size); without terms where it does not creep."""
@@ -98,22 +101,21 @@ class StickCreep:
         """Return what a state moves, at the end of a step of this duration that it is the beginning of."""
         found = []
         for part, (law, y) in enumerate(zip(self.laws, self.parted(state), strict=True)):
-            left = np.zeros(0) if law is None else law.compliances * np.exp(-duration / law.times)
-            moved = np.zeros(self.shapes[part]) if law is None else self.displacement(part, left @ y)
-            found.append(np.asarray(moved, dtype=np.float64))
+            left = law.compliances * np.exp(-duration / law.times)
+            found.append(self.displacement(part, left @ y) if law.creeps else np.zeros(self.shapes[part]))
         return found[0], found[1], found[2]
 
     def after(self, state: Array, elastic: Sequence[Array], duration: float) -> Array:
         """Return the state after a step, in which each part has v (size,)."""
         found = []
         for law, y, v in zip(self.laws, self.parted(state), elastic, strict=True):
-            taken = np.zeros(0) if law is None else -np.expm1(-duration / law.times)
+            taken = -np.expm1(-duration / law.times)
             found.append((y + taken[:, None] * (v - y)).ravel())
         return np.concatenate(found)
 
     def factors(self, duration: float) -> list[float]:
         """Return the compliance of each part in a step, over that at once; in the end for an infinite duration."""
-        return [1.0 if law is None else float(law.growth(duration)) for law in self.laws]
+        return [float(law.growth(duration)) for law in self.laws]
 
     def grown(self, position: Position, duration: float) -> Position:
         """Return a place of the strip with compliances as they are at the end of a step; the last ones are kept."""
@@ -133,25 +135,17 @@ class StickCreep:
                 kept[key] = position, replace(position, interface=other)
         return kept[key][1]
 
-    def cycle(self, durations: Sequence[float] | Array) -> list[RetardedCycle | None]:
-        """Return what a cycle of time steps does to each part."""
-        return [None if law is None else law.over(np.asarray(durations)) for law in self.laws]
-
     def lasting(self, begin: Array, end: Array, period: float) -> Array:
         """Return the state that cycles end with which repeat, if each does to its state what one cycle did: E y + g."""
         found = []
         for law, one, other in zip(self.laws, self.parted(begin), self.parted(end), strict=True):
-            x = np.zeros((0, 1)) if law is None else period / law.times[:, None]
+            x = period / law.times[:, None]
             found.append((one + (other - one) / -np.expm1(-x)).ravel())
         return np.concatenate(found)
 
     def rate(self, begin: Array, end: Array, period: float) -> Array:
         """Return the rate by which the state changes with the cycles, from what one cycle did to it."""
-        paces = [
-            np.repeat(period / law.times, count)
-            for law, count in zip(self.laws, self._numbers, strict=True)
-            if law is not None
-        ]
+        paces = [np.repeat(period / law.times, count) for law, count in zip(self.laws, self._numbers, strict=True)]
         return np.concatenate(paces) * (self.lasting(begin, end, period) - begin)
 
     def at(self, contact: StickState, state: Array) -> StickState:
@@ -162,6 +156,13 @@ class StickCreep:
             for own, one, other in zip((contact.on_punch, contact.on_strip), before, now, strict=False)
         )
         return replace(contact, on_punch=on_punch, on_strip=on_strip, crept=state)
+
+
+def stiff(punch: SurfaceOperator, strip: SurfaceOperator) -> StickCreep:
+    """Return what creeps of bodies and a layer of which none does."""
+    law, moved = Retardation.of(None), (np.zeros_like(punch.by_load), np.zeros_like(strip.by_load))
+    n = len(punch.by_load)
+    return StickCreep((law, law, law), (moved[0].shape, moved[1].shape, (n,)), moved, np.zeros(n))
 
 
 def opened_by_creep(position: Position, creep: StickCreep, state: Array) -> Array:
@@ -191,7 +192,7 @@ class CreepStep:
 
     def __init__(self, creep: StickCreep, position: Position, period: float, cycles: float) -> None:
         self._creep, self._position = creep, position
-        self._paces = [np.zeros(0) if law is None else cycles * period / law.times for law in creep.laws]
+        self._paces = [cycles * period / law.times for law in creep.laws]
         self._normals = self._position.frame[:, 0], _normals_of_strip(self._position)
         self._answer: Array | None = None
 
@@ -200,17 +201,17 @@ class CreepStep:
         n = len(answer)
         closed = np.zeros_like(answer)
         for part, shares in enumerate(self._shares):
-            if shares is not None:
+            if shares:
                 opened = [self._opened(part, self._displaced(part, unit)) for unit in np.eye(n)]
                 closed += shares * np.array(opened).T
         self._answer = answer
         self._factor = scipy.linalg.lu_factor(np.eye(n) + closed @ answer)
 
     @property
-    def _shares(self) -> list[float | None]:
-        """Return a of each part that creeps."""
+    def _shares(self) -> list[float]:
+        """Return a of each part."""
         return [
-            None if law is None else float(law.compliances @ (ACCURATE * pace / (1 + ACCURATE * pace)))
+            float(law.compliances @ (ACCURATE * pace / (1 + ACCURATE * pace)))
             for law, pace in zip(self._creep.laws, self._paces, strict=True)
         ]
 
@@ -238,9 +239,6 @@ class CreepStep:
         """Return y."""
         creep, first, q = self._creep, [], np.zeros(len(self._normals[0]))
         for part, (law, r, pace) in enumerate(zip(creep.laws, creep.parted(right), self._paces, strict=True)):
-            if law is None:
-                first.append(r)
-                continue
             along = r if part == BODIES else self._along(part, r)
             grown = 1 + law.compliances.sum()
             y = along / (1 + ACCURATE * pace)[:, None] + (r - along) / (1 + ROBUST * grown * pace)[:, None]
@@ -250,7 +248,7 @@ class CreepStep:
             return np.concatenate([y.ravel() for y in first])
         taken = self._answer @ scipy.linalg.lu_solve(self._factor, q)
         for part, (law, pace) in enumerate(zip(creep.laws, self._paces, strict=True)):
-            if law is not None:
+            if law.creeps:
                 share = ACCURATE * pace / (1 + ACCURATE * pace)
                 first[part] = first[part] - share[:, None] * self._displaced(part, taken)
         return np.concatenate([y.ravel() for y in first])

@@ -128,12 +128,12 @@ class PartialSlipProblem:
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, and what lies between then."""
         found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
-        return found if self.interface.creep is None else replace(found, crept=self.interface.creep.beginning())
+        return replace(found, crept=self.interface.creep.beginning())
 
     def shaped(self, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
         """Return a state on another shape, whose bodies have crept as it says; what sticks stays where it stuck."""
         creep, contact = self.interface.creep, at.contact
-        if creep is not None and contact.crept is not worn.crept:
+        if creep.creeps and contact.crept is not worn.crept:
             contact = creep.at(contact, worn.crept)
         return replace(at, worn=worn, held=None, contact=contact)
 
@@ -183,7 +183,7 @@ class PartialSlipProblem:
                 opening=self.opening(interface.middle, worn),
                 closure=interface.layers.closure_at(interface.middle.pair, worn),
             )
-            if interface.creep is not None and len(worn.crept):  # creep comes with the loads
+            if interface.creep.creeps:  # creep comes with the loads
                 state = interface.creep.at(state, k / program.pressing * worn.crept)
             state, before = advance(interface, state, before, imposed, self.friction), imposed
             worn = interface.layers.flown(worn, state.flowed)

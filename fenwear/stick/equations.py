@@ -96,8 +96,7 @@ class Step:
         self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
     ) -> None:
         creep = interface.creep
-        if creep is not None:
-            position = creep.grown(position, imposed.duration)
+        position = creep.grown(position, imposed.duration)
         self.interface, self.position, self.before, self.imposed = interface, position, before, imposed
         self.mu, self.creep = friction, creep
         self.n, self.d = position.pair.normal.shape
@@ -112,7 +111,7 @@ class Step:
         now, old = apart(self.free_punch, self.free_strip), apart(before.on_punch, before.on_strip)
         self.closure, self.hardness = imposed.closure or interface.layers.closure, interface.layers.hardness
         closed = interface.layers.given(before.pressure, self.closure)
-        if creep is not None:
+        if creep.creeps:
             (*crept, layer), (*had, closed_before) = self._crept(creep)
             now, old = now + apart(crept[0], crept[1]), old + apart(had[0], had[1])
             now[: self.n] += layer
@@ -153,10 +152,8 @@ class Step:
         """
         duration, state = self.imposed.duration, self.before.crept
         punch, strip, layer = creep.displaced(state, duration)
-        if self.imposed.loaded.by_force is not None:
-            grown = [factor - 1 for factor in creep.factors(duration)]
-            punch = punch + grown[0] * self.imposed.loaded.by_force[0]
-            strip = strip + grown[1] * self.imposed.loaded.by_force[1]
+        forced, factors = self.imposed.loaded.by_force, creep.factors(duration)
+        punch, strip = punch + (factors[0] - 1) * forced[0], strip + (factors[1] - 1) * forced[1]
         return (punch, strip, layer), creep.displaced(state)
 
     def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
@@ -275,7 +272,7 @@ class Step:
         f = np.concatenate([pressure, traction.T.ravel()])
         moved = found.moved or self._moved(f, found.jump)
         crept = self.before.crept
-        if self.creep is not None and self.imposed.loaded.by_force is not None:
+        if self.creep.creeps:
             (punch, strip), (push, back) = self.imposed.loaded.by_force, self.position.forces(f)
             elastic = (
                 self.creep.elastic(push, moved.on_punch, punch),

@@ -133,7 +133,7 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
         ConvergenceError: something creeps without an end, or cycle and creep do not come together.
     """
     creep = problem.interface.creep
-    if creep is None:
+    if not creep.creeps:
         return shape
     if creep.endless:
         raise ConvergenceError(
@@ -354,9 +354,7 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
     edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
     """
-    position, creep = problem.interface.middle, problem.interface.creep
-    if creep is not None:
-        position = creep.grown(position, np.inf)
+    position = problem.interface.creep.grown(problem.interface.middle, np.inf)
     x, n, zone = position.pair.x, len(problem.weights), np.arange(first, last + 1)
     places = (last if side > 0 else first) + side * np.array([2, 3])
     if places.min() < 0 or places.max() >= n:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -25,8 +26,8 @@ from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.track import Border
-from fenwear.sliding.wear import STIFF, WornDepths
-from fenwear.stick.creep import StickCreep
+from fenwear.sliding.wear import WornDepths
+from fenwear.stick.creep import StickCreep, stiff
 from fenwear.stick.position import LoadEffect, Position, along_tangents, position_of
 from fenwear.stick.program import steps_of
 from fenwear.stick.state import StickState
@@ -45,13 +46,13 @@ class OppositeBodies:
     moves = False
     team = ALONE  # the ranks that have them, of which one leads
     moved: WornDepths | None = None  # depths that the meshes have followed
-    creep: StickCreep | None = None  # what creeps
 
     def __init__(
         self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
     ) -> None:
         self.punch, self.strip, self.field = punch, strip, field
-        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load)
+        self.creep = stiff(punch, strip)
+        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, (punch.by_load, strip.by_load))
         self._positions: dict[float | Placement, Position] = {0.0: position_of(rigid, punch, strip, field)}
         self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
 
@@ -154,21 +155,21 @@ class StickInterface(OppositeBodies):
         asked = (nodes, d * nodes), (on_strip, d * on_strip)
         return setup_resources(both, nodes, asked, positions * d**2 + 2 * d**2 + 1)
 
-    def _creep(self) -> StickCreep | None:
-        """Return what creeps; None where nothing does; collective."""
+    def _creep(self) -> StickCreep:
+        """Return what creeps; collective."""
         bodies, operators = (self.bodies.punch, self.bodies.strip), (self.punch, self.strip)
         layer = getattr(self.case.contact.layer, "creep", None)
-        laws = [None if table is None else Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer)]
-        if laws == [None, None, None]:
-            return None
+        punch, strip, between = (Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer))
+        found = replace(stiff(*operators), laws=(punch, strip, between))
+        if not found.creeps:
+            return found
         moved = [
             operator.under(body.with_loads(())).by_load if body.moved else np.zeros_like(operator.by_load)
             for operator, body in zip(operators, bodies, strict=True)
         ]
-        closure = np.zeros(len(operators[0].by_load)) if self.layers.winkler is None else self.layers.winkler
-        shapes = moved[0].shape, moved[1].shape, closure.shape
+        closure = found.closure if self.layers.winkler is None else self.layers.winkler
         behind = None if bodies[0].reach is None else operators
-        return StickCreep((laws[0], laws[1], laws[2]), shapes, (moved[0], moved[1]), closure, behind)
+        return replace(found, moved=(moved[0], moved[1]), closure=closure, behind=behind)
 
     @cached_property
     def bulk(self) -> Array:
@@ -219,7 +220,7 @@ class StickInterface(OppositeBodies):
         bodies = self.bodies if fraction is None else self.bodies.under(self.case, fraction)
         resultant = np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant])
         punch, strip = self.punch.under(bodies.punch).by_load, self.strip.under(bodies.strip).by_load
-        forced = None if self.creep is None else (punch - self.creep.moved[0], strip - self.creep.moved[1])
+        forced = punch - self.creep.moved[0], strip - self.creep.moved[1]
         self._loaded[fraction] = LoadEffect(resultant, punch, strip, forced)
 
     def _position(self, pair: ContactPair) -> Position:
@@ -257,5 +258,5 @@ def untouched(interface: OppositeBodies) -> StickState:
         np.zeros((n, d)),
         np.zeros(interface.strip.by_load.shape),
         none,
-        crept=STIFF if interface.creep is None else interface.creep.beginning(),
+        crept=interface.creep.beginning(),
     )

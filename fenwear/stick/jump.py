@@ -125,11 +125,12 @@ def _rate(
     Raises:
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
-    program, heat, own = problem.program, problem.heat, (problem.interface.layers.memory, problem.interface.creep)
+    program, heat, own = problem.program, problem.heat, problem.interface
     worn = problem.interface.layers.flown_as(worn, at.worn)
     at = problem.shaped(at, worn)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    settled = heat is None and own == (None, None) and not problem.conditions.asks_cycle
+    constant = own.layers.memory is None and not own.creep.creeps and not problem.conditions.asks_cycle
+    settled = heat is None and constant
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = problem.half_cycle(at)
     if heat is not None and before is None:
@@ -159,8 +160,7 @@ def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepth
     first, warm, begin = at.next_step, at.temperature, at
     at, parts = problem.cycle(at)
     rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
-    if creep is not None:
-        rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
+    rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
     bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
     return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, at, warm=warm)
 
@@ -285,8 +285,6 @@ def _debris_error(problem: PartialSlipProblem, missing: Array, begin: Array, end
 def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end: Array) -> float:
     """Return the error of what has crept over what a jump creeps; near the end of creep over a part of all."""
     creep, middle = problem.interface.creep, problem.interface.middle
-    if creep is None:
-        return 0.0
     wrong, done, there = (
         float(problem.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
     )
@@ -316,14 +314,12 @@ class _Implicit:
         self.groups, itself = derivative(problem, now)
         creep = problem.interface.creep
         self._solve: Callable[[Array], Array]
-        if creep is None and all(group.position.compliance.on_grid is not None for group in self.groups):
+        if not creep.creeps and all(group.position.compliance.on_grid is not None for group in self.groups):
             self._solve = GridJump(self.groups, itself, GAMMA * cycles).solve
         else:
             self._solve = self._factored(itself)
-        self._creep = (
-            None if creep is None else CreepStep(creep, problem.interface.middle, problem.program.period, cycles)
-        )
-        if self._creep is not None:
+        self._creep = CreepStep(creep, problem.interface.middle, problem.program.period, cycles)
+        if creep.creeps:
             self._creep.answering(self._answer())
 
     def _factored(self, itself: csr_array) -> Callable[[Array], Array]:
@@ -357,7 +353,7 @@ class _Implicit:
     def solve(self, right: Array) -> Array:
         """Return z."""
         rest = right[: self._size]
-        if self._creep is None:
+        if not self.problem.interface.creep.creeps:
             return self._solve(rest)
         crept = self._creep.solve(right[self._size :])
         rest = rest + ACCURATE * self.cycles * self._by_creep(crept)
@@ -366,8 +362,6 @@ class _Implicit:
     def _by_creep(self, crept: Array) -> Array:
         """Return how a cycle's wear, and what lies between, change by what creeps (n + n_s + rows n)."""
         creep, found = self.problem.interface.creep, np.zeros(self._size)
-        if creep is None:
-            return found
         for group in self.groups:
             opened = opened_by_creep(group.position, creep, crept)[group.closed]
             found -= group.left @ (self._answer_of(group) @ opened)

@@ -36,26 +36,24 @@ class LoadEffect:
         resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
         on_punch: Displacement of the punch's contact nodes (n, d), mm.
         on_strip: Of the strip at the nodes of its operator (q, d), mm.
-        by_force: Of both of these what forces do, and so creeps; None where nothing creeps.
+        by_force: Of both of these what forces do, and so creeps.
     """
 
     resultant: Array
     on_punch: Array
     on_strip: Array
-    by_force: tuple[Array, Array] | None = None
+    by_force: tuple[Array, Array]
 
     def times(self, factor: float) -> LoadEffect:
         """Return the same of loads times a factor."""
         if factor == 1:
             return self
-        forced = None if self.by_force is None else (factor * self.by_force[0], factor * self.by_force[1])
+        forced = factor * self.by_force[0], factor * self.by_force[1]
         return LoadEffect(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
 
     def plus(self, other: LoadEffect) -> LoadEffect:
         """Return what both loads do."""
-        forced = None
-        if self.by_force is not None and other.by_force is not None:
-            forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
+        forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
         return LoadEffect(
             self.resultant + other.resultant, self.on_punch + other.on_punch, self.on_strip + other.on_strip, forced
         )

@@ -152,7 +152,7 @@ class GridStep(Step):
         if position.interface.layer is not None:
             bodies[: self.n] -= position.interface.layer * f[: self.n]
         on_punch = self.interface.punch.apply(position.in_space(f * position.weights))
-        punch, strip, _ = (1.0, 1.0, 1.0) if self.creep is None else self.creep.factors(self.imposed.duration)
+        punch, strip, _ = self.creep.factors(self.imposed.duration)
         on_strip = (punch * on_punch - position.in_space(bodies)) / strip  # the jump is that of bodies that creep
         return SurfaceDisplacement(np.zeros(0), on_punch, np.asarray(on_strip))
 

@@ -182,7 +182,7 @@ def record(
     on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
     layers, closure = interface.layers, interface.layers.closure_at(position.pair, at.worn)
     closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)
-    if interface.creep is not None:
+    if interface.creep.creeps:
         crept = zip(*map(interface.creep.displaced, (state.crept, before.crept)), strict=True)
         on_punch, on_strip, closed = (
             own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)

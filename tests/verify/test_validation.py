@@ -16,8 +16,10 @@ NUMBERS = {
     "ball-on-disc": 1,
     "block-on-ring": 5,
     "cylinder-liners": 13,
-    "disc-brake": 19,
+    "disc-brake": 17,
     "fretting-cylinder": 6,
+    "hip-in-patients": 83,
+    "hip-simulator": 11,
     "polyethylene": 12,
     "sliding-metal": 8,
 }

@@ -26,7 +26,9 @@ SHORT = ("geometry.parameters.across=4", "geometry.parameters.around=3", "run.ju
     "rocking by 23° about two axes and 0.1 mm are assumptions, which are the same for both heads.",
     calibrated="One wear coefficient, on the volume of the head of 22 mm.",
     predicted="The volume of the head of 28 mm, and the wear that each mm of diameter adds.",
-    verdict="To be written after the first comparison.",
+    verdict="Archard's law makes wear grow with the path, which grows with the diameter. Measured wear grows faster, "
+    "between the diameter and its square. Wear that falls with the pressure would give that: a coefficient of the mean "
+    "pressure (pm), or wear by the area of contact (per_area).",
 )
 def compare(scope: Scope) -> Finding:
     """Return the comparison of both heads."""

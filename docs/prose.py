@@ -44,7 +44,7 @@ class Paragraph:
 
 def paragraphs(text: str) -> Iterator[Paragraph]:
     """Yield the paragraphs of a page without code, tables, headings, comments, directives and formulas on their own."""
-    text = re.sub(r"^(`{3,}|\$\$).*?^\1|<!--.*?-->|\A---\n.*?^---$", _blank, text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^(`{3,}).*?^\1|^\$\$.*?\$\$$|^## Sources$.*?(?=^#|\Z)|<!--.*?-->|\A---\n.*?^---$", _blank, text, flags=re.MULTILINE | re.DOTALL)
     gathered: list[tuple[int, str]] = []
     for number, line in enumerate([*text.split("\n"), ""], 1):
         prose = line.strip() and not re.match(r"\s*(#|\||!\[|\(\w+\)=|:::)", line)

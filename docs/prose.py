@@ -1,7 +1,7 @@
-"""The check of the pages' prose in `docker/fenwear lint`: length of sentences, banned turns of phrase, proselint.
+"""Checks the prose of the pages for `docker/fenwear lint`: sentences that are too long, turns of phrase, proselint.
 
-Prints file:line, the finding and what to write instead, and exits with 1 where there is one. `--count` prints the
-sentences of each page and how many of them are long. docs/prose.toml has the settings.
+Prints file:line with the finding and what to write instead, and exits with 1 where there is one. `--count` prints the
+number of sentences of each page, and how many of them are too long. docs/prose.toml has the settings.
 """
 
 from __future__ import annotations
@@ -21,62 +21,64 @@ from textstat import textstat
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = tomllib.loads((ROOT / "docs" / "prose.toml").read_text("utf-8"))
 
-# Ends of sentences: a dot behind a single capital letter or an abbreviation is none.
-END = re.compile(r"(?<!\b[A-Z]\.)(?<!\bNo\.)(?<!\bvol\.)(?<!\bpp\.)(?<=[.!?])[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
-ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+")
+# A dot behind a single capital letter, as of an initial, ends no sentence.
+END = re.compile(r"(?<!\b[A-Z]\.)(?<=[.!?])[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
+ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
+# Code, formulas that stand by themselves, comments, lists of sources, the head of a file.
+NO_PROSE = re.compile(
+    r"^(`{3,}).*?^\1|^\$\$.*?\$\$$|^## Sources$.*?(?=^#|\Z)|<!--.*?-->|\A---\n.*?^---$", re.MULTILINE | re.DOTALL
+)
+NO_LINE = re.compile(r"\s*(#|\||!\[|\(\w+\)=|\+\+\+)")
+FORMULA = re.compile(r"\$\$.+?\$\$|\$[^$]+\$", re.DOTALL)
+# These become one word; of a link its text stays.
+WORDS = (re.compile(r"(`+)[^`]+?\1"), re.compile(r"\$[^$]+\$"), re.compile(r"\[\]\([^)]*\)"))
+TARGET = re.compile(r"\]\([^)]*\)")
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph or an item of a list: its text, and the page's line of each of its characters."""
+    """A paragraph or an item of a list, with the page's line of each of its characters."""
 
     text: str
     lines: tuple[int, ...]
 
     def sentences(self) -> Iterator[tuple[int, str]]:
         """Yield the line at which each sentence begins, and the sentence."""
-        at = 0
-        for end in [*(match.end() for match in END.finditer(self.text)), len(self.text)]:
-            if self.text[at:end].strip():
-                yield self.lines[at], self.text[at:end].strip()
-            at = end
+        begin = 0
+        for end in (*(match.end() for match in END.finditer(self.text)), len(self.text)):
+            if sentence := self.text[begin:end].strip():
+                yield self.lines[begin], sentence
+            begin = end
 
 
 def paragraphs(text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a page without code, tables, headings, comments, directives and formulas on their own."""
-    text = re.sub(r"^(`{3,}).*?^\1|^\$\$.*?\$\$$|^## Sources$.*?(?=^#|\Z)|<!--.*?-->|\A---\n.*?^---$", _blank, text, flags=re.MULTILINE | re.DOTALL)
+    """Yield the paragraphs of a page without code, tables, headings, comments and displayed formulas."""
+    text = NO_PROSE.sub(lambda match: "\n" * match[0].count("\n"), text)
     gathered: list[tuple[int, str]] = []
     for number, line in enumerate([*text.split("\n"), ""], 1):
-        prose = line.strip() and not re.match(r"\s*(#|\||!\[|\(\w+\)=|:::)", line)
-        if (not prose or ITEM.match(line)) and gathered:
+        prose = bool(line.strip()) and not NO_LINE.match(line)
+        item = ITEM.match(line)
+        if gathered and (item or not prose):
             yield _joined(gathered)
             gathered = []
         if prose:
-            gathered.append((number, ITEM.sub("", line, count=1).strip()))
-
-
-def _blank(match: re.Match[str]) -> str:
-    return "\n" * match[0].count("\n")
+            gathered.append((number, line[item.end() if item else 0 :].strip()))
 
 
 def _joined(gathered: list[tuple[int, str]]) -> Paragraph:
-    """Return a paragraph in which code and formulas are one word each, and links are their text."""
-    text, lines = "", []
-    for number, line in gathered:
-        text += line + " "
-        lines += [number] * (len(line) + 1)
-    for pattern in (r"(`+)[^`]+?\1", r"\$[^$]+\$", r"\]\([^)]*\)"):
-        for match in reversed([*re.finditer(pattern, text)]):
-            word = "" if match[0][0] == "]" and text[match.start() - 1] != "[" else "Code"
+    """Return the paragraph of some lines with code, formulas and references as one word each."""
+    text = "".join(f"{line} " for _, line in gathered)
+    lines = [number for number, line in gathered for _ in range(len(line) + 1)]
+    for pattern, word in (*((pattern, "Code") for pattern in WORDS), (TARGET, "")):
+        for match in reversed([*pattern.finditer(text)]):
             text = text[: match.start()] + word + text[match.end() :]
-            lines[match.start() : match.end()] = lines[match.start() : match.start() + len(word)]
+            lines[match.start() : match.end()] = [lines[match.start()]] * len(word)
     return Paragraph(text, tuple(lines))
 
 
 def pages() -> list[Path]:
     """Return the pages that the check reads."""
-    found = {path for pattern in SETTINGS["pages"] for path in ROOT.glob(pattern)}
-    return sorted(found - {path for pattern in SETTINGS["except"] for path in ROOT.glob(pattern)})
+    return sorted({path for pattern in SETTINGS["pages"] for path in ROOT.glob(pattern)})
 
 
 def words(sentence: str) -> int:
@@ -84,44 +86,46 @@ def words(sentence: str) -> int:
     return int(textstat.lexicon_count(sentence, removepunct=True))
 
 
-def findings(page: Path) -> Iterator[tuple[int, str]]:
-    """Yield the line and the text of each finding on a page."""
-    longest = SETTINGS["longest"]
-    for paragraph in paragraphs(page.read_text("utf-8")):
+def findings(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the description of each finding on a page."""
+    checks = {"max_errors": 99, "checks": dict.fromkeys(SETTINGS["proselint"], True)}
+    for paragraph in paragraphs(text):
         for line, sentence in paragraph.sentences():
-            if (length := words(sentence)) > longest:
-                yield line, f"{length} words; write sentences of at most {longest}: {sentence[:60]}..."
-        for pattern, advice in SETTINGS["banned"].items():
-            for match in re.finditer(pattern, paragraph.text):
-                yield paragraph.lines[match.start()], f'"{match[0].strip()}": {advice}'
-        for found in LintFile("page", paragraph.text).lint({"max_errors": 99, "checks": CHECKS}):
-            result = found.check_result
-            at = min(max(result.span[0] - 1, 0), len(paragraph.lines) - 1)
-            yield paragraph.lines[at], f"{result.message} ({result.check_path})"
+            if (length := words(sentence)) > SETTINGS["longest"]:
+                yield line, f"{length} words; write at most {SETTINGS['longest']} in a sentence: {sentence[:60]}..."
+            for pattern, advice in SETTINGS["banned"].items():
+                for match in re.finditer(pattern, sentence):
+                    yield line, f'"{match[0]}": {advice}'
+        for found in LintFile("page", paragraph.text).lint(checks):
+            at = min(max(found.check_result.span[0] - 1, 0), len(paragraph.lines) - 1)
+            yield paragraph.lines[at], f"{found.check_result.message} ({found.check_result.check_path})"
+    for formula in FORMULA.finditer(re.sub(r"^```.*?^```", lambda m: "\n" * m[0].count("\n"), text, flags=re.M | re.S)):
+        for pattern, advice in SETTINGS["formulas"].items():
+            if match := re.search(pattern, formula[0]):
+                yield text[: text.index(formula[0])].count("\n") + 1, f"{match[0]}: {advice}"
 
 
-CHECKS = dict.fromkeys(SETTINGS["proselint"], True)
+def count() -> None:
+    """Print the number of sentences of each page and how many of them are too long."""
+    total = long = 0
+    for page in pages():
+        lengths = [words(s) for paragraph in paragraphs(page.read_text("utf-8")) for _, s in paragraph.sentences()]
+        over = sum(length > SETTINGS["longest"] for length in lengths)
+        total, long = total + len(lengths), long + over
+        print(f"{page.relative_to(ROOT)}: {len(lengths)} sentences, {over} long")
+    print(f"in all: {total} sentences, {long} of more than {SETTINGS['longest']} words")
 
 
-def main() -> int:
-    """Check the pages, or count their sentences."""
+def check() -> int:
+    """Print the findings on all pages, and return the exit status."""
     CheckRegistry().register_many(all_checks)
     status = 0
-    if "--count" in sys.argv:
-        total = long = 0
-        for page in pages():
-            lengths = [words(s) for p in paragraphs(page.read_text("utf-8")) for _, s in p.sentences()]
-            over = sum(length > SETTINGS["longest"] for length in lengths)
-            total, long = total + len(lengths), long + over
-            print(f"{page.relative_to(ROOT)}: {len(lengths)} sentences, {over} long, at most {max(lengths, default=0)} words")
-        print(f"in all: {total} sentences, {long} of more than {SETTINGS['longest']} words")
-        return 0
     for page in pages():
-        for line, text in findings(page):
-            print(f"{page.relative_to(ROOT)}:{line}: {text}")
+        for line, finding in findings(page.read_text("utf-8")):
+            print(f"{page.relative_to(ROOT)}:{line}: {finding}")
             status = 1
     return status
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(count() if "--count" in sys.argv else check())

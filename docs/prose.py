@@ -21,8 +21,8 @@ from textstat import textstat
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = tomllib.loads((ROOT / "docs" / "prose.toml").read_text("utf-8"))
 
-# A dot behind a single capital letter, as of an initial, ends no sentence.
-END = re.compile(r"(?<!\b[A-Z]\.)(?<=[.!?])[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
+# A dot behind a single capital letter ends no sentence where it is an initial, but does behind a unit, as in "3 K.".
+END = re.compile(r"(?:(?<=\d [A-Z]\.)|(?<!\b[A-Z]\.)(?<=[.!?]))[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
 ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
 # Code, formulas that stand by themselves, comments, lists of sources, the head of a file.
 NO_PROSE = re.compile(

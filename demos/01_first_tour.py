@@ -12,9 +12,9 @@
 # # 1. A first tour
 #
 # A punch is pressed on a strip that slides back and forth under it. Friction tilts the punch a little, one way and
-# then the other. So the pressure sits at one edge in one half-cycle and at the other edge in the next. Wear takes
-# away material where pressure is high, and slowly changes the shape of the punch. After many cycles the shape no
-# longer changes the pressures: they repeat from cycle to cycle.
+# then the other. So the pressure sits at one edge in one half-cycle and at the other edge in the next. Wear removes
+# material where pressure is high, and slowly changes the shape of the punch. After many cycles the shape is final:
+# the pressures repeat from cycle to cycle.
 #
 # In this notebook you run this problem, Example 1 of Páczelt and Mróz without heat, and look at its results. It takes
 # about ten seconds to compute.
@@ -120,10 +120,10 @@ print(f"width in contact {float(last.contact_width):.1f} {last.contact_width.uni
 # %% [markdown]
 # ## Pressure
 #
-# Look at the edges first. A flat punch on an elastic strip has a high pressure there, and it is the first to go: wear
-# rounds the edges off. Then compare the two directions. While the strip moves rightward, friction pulls the lower end
-# of the punch to the right and so turns the punch about the hinge: the pressure moves to the left edge. Leftward it is
-# the other way round.
+# Look at the edges first. A flat punch on an elastic strip has a high pressure there, and wear rounds the edges off.
+# Then compare the two directions. While the strip moves rightward, friction pulls the lower end of the punch to the
+# right. This turns the punch about the hinge, and the pressure moves to the left edge. Leftward it is the other way
+# round.
 
 # %%
 shown = [1, 10, 50, 200] if COARSE else [1, 20, 200, 800, 2600]
@@ -151,8 +151,8 @@ peak_figure(history)
 # %% [markdown]
 # ## Stress in the bodies
 #
-# The folder `fields` has displacement and stress in both bodies at the last half-cycle: as a series for ParaView, and as
-# plain NetCDF of nodes and values, which any plotting library can draw.
+# The folder `fields` has displacement and stress in both bodies at the last half-cycle. They are a series for
+# ParaView, and plain NetCDF of nodes and values, which any plotting library can draw.
 
 # %%
 fields = xarray.open_dataset(next((folder / "fields").glob("*.nc")), engine="h5netcdf").load()
@@ -172,14 +172,15 @@ figure.colorbar(drawn, label="von Mises stress (MPa)")
 plt.show()
 
 # %% [markdown]
-# The white line is the contact. In this direction the right half carries most of the load. The bright spot above it is
-# the hinge, at x = 30 mm and z = 120 mm: it holds a single point, where the stress has no finite value. The number there
-# depends on the mesh and means nothing.
+# The white line is the contact. In this direction the right half carries most of the load. The bright spot above it
+# is the hinge, at x = 30 mm and z = 120 mm. It holds a single point, where the stress has no finite value. The number
+# there depends on the mesh and means nothing.
 #
 # ## The key numbers
 #
-# `summary.json` has them, each with its unit in its name. Two are checks: the balance of forces and moments, relative
-# to the load, and the periodicity, the change of pressure against one cycle ago over the pressure scale.
+# `summary.json` has them, each with its unit in its name. Two are checks. The first is the balance of forces and
+# moments, relative to the load. The second is the periodicity, the change of pressure against one cycle ago over the
+# pressure scale.
 
 # %%
 keys = ("half_cycles", "stop", "nominal_pressure_MPa", "wear_mm", "rightward", "leftward", "periodicity")
@@ -192,7 +193,7 @@ print(json.dumps({key: summary[key] for key in (*keys, "largest_equilibrium_erro
 # - Move the hinge up: `"geometry.parameters.pin_height_1=40"`. The punch tilts more.
 # - Take plane strain instead of plane stress: `"model.plane=strain"`.
 #
-# On: notebook 2 (the steady state), 3 (heat), 4 (several processes, and going on with a run), 5 (your own material and
+# Next: notebook 2 (the steady state), 3 (heat), 4 (several processes, and resuming a run), 5 (your own material and
 # geometry).
 
 # %%

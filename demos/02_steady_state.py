@@ -12,8 +12,8 @@
 # # 2. The steady state and its parameters
 #
 # A reciprocating punch wears until its shape fits both sliding directions. From then on every cycle is like the last:
-# the **cyclic steady state**. fenwear solves for it directly, in some milliseconds. Here you see what it looks like, why
-# its largest pressure is twice the mean, and what changes it: friction, load, the wear law, and the height of the hinge.
+# the **cyclic steady state**. fenwear solves for it directly, in some milliseconds. This notebook shows it, and why
+# its largest pressure is twice the mean. Then it changes friction, load, the wear law, and the height of the hinge.
 
 # %%
 # %matplotlib inline
@@ -157,10 +157,10 @@ show(*friction)
 show(*force)
 
 # %% [markdown]
-# **Wear law**: the exponent $b$ does change the largest pressure. Now $p_+^b + p_-^b$ is the same everywhere (but for a
-# small slope), so a large $b$ wears high pressures off harder and the steady state is more even. The wear coefficient
-# itself and the exponent $a$ of the speed change nothing in the steady state; they only set how soon it is reached, as
-# the last table shows.
+# **Wear law**: the exponent $b$ does change the largest pressure. Now $p_+^b + p_-^b$ is the same everywhere, but for
+# a small slope. A large $b$ wears high pressures off harder, and the steady state is more even. The wear coefficient
+# itself and the exponent $a$ of the speed do not change the steady state. They only set its time, as the last table
+# shows.
 
 # %%
 show(*law)
@@ -231,6 +231,6 @@ except ImportError:
 # ## What stays open
 #
 # - The steady state is what wear tends to without heat. With heat it may be unstable (notebook 3).
-# - Only the punch wears here. Where the strip wears too, its worn track moves with it: `run` follows that, and a steady
-#   state exists where the track keeps its shape (the page Two worn bodies).
+# - Only the punch wears here. Where the strip wears too, its worn track moves with it, and `run` follows that. A steady
+#   state exists where the track keeps its shape (the page Let both bodies wear).
 # - The heights of the hinges of Example 2 are not in the paper. They do not matter there: that punch cannot tilt.

@@ -11,10 +11,10 @@
 # %% [markdown]
 # # 3. Heat and its instability
 #
-# Friction makes heat, heat makes the punch bulge, and the bulge draws more pressure and so more heat to the same place.
-# Wear works against it: it takes the bulge away. Which of the two wins decides whether the contact settles or runs away
-# into a hot spot. Here you look at both outcomes and at the parameter that tells them apart: the share $\kappa$ of the
-# friction heat that goes into the punch.
+# Friction makes heat, heat makes the punch bulge, and the bulge draws more pressure and so more heat to the same
+# place. Wear works against it and removes the bulge. Which of the two wins decides whether the contact settles or
+# runs away into a hot spot. Here you look at both outcomes. One parameter decides between them: the share $\kappa$ of
+# the friction heat that enters the punch.
 #
 # Per area of contact the friction power is $q = \mu p v$, with $\kappa q$ into the punch and $(1 - \kappa) q$ into the
 # strip. Temperatures are above the surroundings, in K.
@@ -40,10 +40,11 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 
 # %% [markdown]
-# The case is Example 1 of Páczelt and Mróz with heat, as `example1-heat-unstable` reads it: the two faces of the thin
-# punch lose heat to the air, and all friction heat goes into the bodies. (`example1-heat`, with insulated faces and half
-# of the heat in the debris, is the calm one; notebook 6 compares the readings.) `assemble` factors the bodies and prepares
-# the steps of heat conduction: some seconds. Everything after it shares that work, because $\kappa$ leaves it as it is.
+# The case is Example 1 of Páczelt and Mróz with heat, as `example1-heat-unstable` reads it. The two faces of the thin
+# punch lose heat to the air, and all friction heat enters the bodies. (`example1-heat`, with insulated faces and half
+# of the heat in the debris, is the calm case; notebook 6 compares the readings.) `assemble` factors the bodies and
+# prepares the steps of heat conduction: some seconds. Everything after it shares that work, because it does not
+# depend on $\kappa$.
 
 # %%
 system = assemble(load_case("example1-heat-unstable", settings))
@@ -59,7 +60,7 @@ print(f"mean friction power {0.001 * system.case.contact.friction * 10_000 * spe
 #
 # - the **cyclic steady state**, with periodic temperatures;
 # - the **growth rate** of the least stable small disturbance of this state, wear included. Negative: it dies out.
-#   Positive: a run moves away from the steady state, even from a start very near to it;
+#   Positive: a run moves away from the steady state, even from a start close to it;
 # - the **critical speed** without wear: above it the full contact is unstable (Burton's thermo-elastic instability).
 
 # %%
@@ -99,14 +100,14 @@ s_ax.legend(frameon=False)
 plt.show()
 
 # %% [markdown]
-# What to look at:
+# Look at these:
 #
 # - The steady **pressure** does not depend on $\kappa$. Balance and the wear law set it (notebook 2); the shape takes up
 #   whatever the heat does.
 # - The **temperature** is nearly proportional to $\kappa$ and almost uniform along the contact.
 # - The **growth rate** changes its sign between $\kappa = 0.2$ and $0.3$. The critical speed falls below the speed of
-#   the motion near $\kappa = 0.28$. It is close to proportional to $1/\kappa$, so the heat in the punch is what counts:
-#   its composite expands three times as much as steel and conducts a tenth of the heat.
+#   the motion near $\kappa = 0.28$. It is close to proportional to $1/\kappa$, so the heat in the punch is what counts.
+#   The punch's composite expands three times as much as steel and conducts a tenth of the heat.
 
 # %%
 for (lower, low), (upper, high) in pairwise(zip(shares, rates, strict=True)):
@@ -118,9 +119,10 @@ for (lower, low), (upper, high) in pairwise(zip(shares, rates, strict=True)):
 # %% [markdown]
 # ## Why faces that lose heat make it worse
 #
-# It sounds odd that cooling destabilises. But what bulges the punch is the heat that flows through its foot. At the same
-# temperature a punch that loses heat all over takes in twice as much of it, and the layer above the contact bends twice
-# as far. Insulate the faces and see for yourself: the same temperature at about half of $\kappa$, and stable.
+# It sounds odd that cooling destabilises. But the heat that flows through the foot of the punch makes it bulge. At
+# the same temperature a punch that loses heat all over takes in twice as much of it. The layer above the contact then
+# bends twice as far. Insulate the faces and see for yourself: the same temperature at about half of $\kappa$, and
+# stable.
 
 # %%
 insulated = vary(system, "heat.convecting_faces=false", "heat.partition=0.2")
@@ -210,32 +212,32 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# What happens with $\kappa = 0.5$:
+# With $\kappa = 0.5$ this happens:
 #
 # 1. The cold flat punch starts with high pressures at its edges.
 # 2. Within some hundred half-cycles the punch bulges and lifts its own edges off. The contact narrows to less than half
-#    of its width, and pressure and temperature gather in the middle, at twice the temperature of the steady state.
+#    of its width. Pressure and temperature gather in the middle, at twice the temperature of the steady state.
 # 3. There the punch wears faster. Slowly the contact widens again, and the worn middle carries less and less.
 # 4. At about half-cycle 1850 the middle opens. Without friction heat it cools and shrinks, which opens it more: the
 #    contact has split in two, and each part bulges for itself.
 #
-# With $\kappa = 0.2$ the same bulge forms at first, but wear takes it away: the contact widens towards the steady state.
+# With $\kappa = 0.2$ the same bulge forms at first, but wear removes it: the contact widens towards the steady state.
 # It is slow, for the growth rate is close to zero; the run has not arrived yet.
 #
 # ## What stays open
 #
-# - The paper describes a bell-shaped punch, a contact that narrows while the peak grows, and a peak that falls again
-#   after $n = 1800$; nothing in it splits. It does not say which share of the heat goes where, nor whether the faces lose
-#   any. Notebook 6 shows which of the ways to read it come near to its numbers; this one does not.
-# - What follows an instability depends on small things. On a mesh twice as fine the later peaks are within 3 %; at the
-#   end, where contact opens and closes, pressures at single points are less certain. Check the mesh before you rely on
-#   a number there.
+# - The paper describes a bell-shaped punch, and a contact that narrows while the peak grows. The peak falls again after
+#   $n = 1800$; nothing splits. The paper gives neither the shares of the heat nor whether the faces lose any. Notebook 6
+#   shows which readings come near to its numbers; this one does not.
+# - The course after an instability depends on small things. On a mesh twice as fine the later peaks are within 3 %. At
+#   the end, where contact opens and closes, pressures at single points are less certain. Check the mesh before you rely
+#   on a number there.
 # - Material values are constants here, and only the punch wears. Both may be otherwise: properties that depend on the
 #   temperature, and wear of the strip, have their pages in the documentation.
 #
 # ## Your turn
 #
 # - `vary(system, "heat.partition=0.5", "wear.punch.coefficient=4e-7")`: ten times the wear. Is it stable?
-# - `vary(system, "motion.angular_frequency=5")`: half the speed. (The steps of heat are prepared anew: some seconds.)
+# - `vary(system, "motion.angular_frequency=5")`: half the speed. (fenwear prepares the steps of heat again: some seconds.)
 # - `"heat.conductance='perfect'"`: no jump of temperature between punch and strip. Then the two share the heat by
 #   themselves, whatever $\kappa$ is.

@@ -9,11 +9,11 @@
 # ---
 
 # %% [markdown]
-# # 4. Several processes, and going on with a run
+# # 4. Several processes, and resuming a run
 #
 # Long runs are started from the command line, often on several processes (MPI ranks), and they get interrupted. Here
-# you start fenwear on two processes, stop half way, go on from the checkpoint, and check that the numbers are those of
-# one uninterrupted run on one process.
+# you start fenwear on two processes, stop half way, and resume from the checkpoint. Then you check that the numbers
+# are those of one uninterrupted run on one process.
 #
 # The case is Example 1 with heat and $\kappa = 0.2$ on a small mesh: the checkpoint then holds temperatures too.
 
@@ -50,9 +50,9 @@ folder = Path(temporary.name)
 # mpirun -n 2 python3 -m fenwear run example1-heat -o results/two --set run.half_cycles=300
 # ```
 #
-# The function below does the same from Python. Each process uses one thread. So that the notebook works on any machine,
-# more processes than processor cores are allowed, and a process that waits leaves its core to the others. For speed,
-# start as many processes as there are cores, or fewer.
+# The function below does the same from Python. Each process uses one thread. The function allows more processes than
+# processor cores, so that the notebook works on any machine. A process that waits leaves its core to the others. For
+# speed, start as many processes as there are cores, or fewer.
 
 # %%
 environment = {
@@ -93,13 +93,13 @@ show(run(folder / "two", half, ranks=2))
 print("checkpoint:", ", ".join(sorted(path.name for path in (folder / "two" / "checkpoint").iterdir())))
 
 # %% [markdown]
-# ## Going on
+# ## Resume
 #
-# `--resume` with the same case and the same folder goes on from the checkpoint, here to twice as many half-cycles. The
-# number of processes may change from one start to the next: now it is one.
+# `--resume` with the same case and the same folder continues from the checkpoint, here to twice as many half-cycles.
+# The number of processes may change from one start to the next: now it is one.
 #
-# A run writes a checkpoint every minute (`output.checkpoint`), at its end, and when it gets an interrupt (Ctrl-C, or the
-# signal TERM of a batch system). So a run that is killed loses little more than a minute.
+# A run writes a checkpoint every minute (`output.checkpoint`) and at its end. It also writes one when it gets an
+# interrupt (Ctrl-C, or the signal TERM of a batch system). So a run that is killed loses little more than a minute.
 
 # %%
 show(run(folder / "two", whole, "--resume"))
@@ -151,7 +151,7 @@ plt.show()
 #
 # ## A checkpoint of another case
 #
-# `--resume` goes on with the same problem only. If something that matters was changed, it says what and stops.
+# `--resume` continues the same problem only. If something that matters was changed, it names the change and stops.
 
 # %%
 refused = run(folder / "two", 2 * whole, "--resume", extra=("contact.friction=0.3",))

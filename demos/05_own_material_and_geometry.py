@@ -11,9 +11,9 @@
 # %% [markdown]
 # # 5. Your own material and geometry
 #
-# A friction pad on a cast-iron rail that slides back and forth: a soft lining with slanted sides below a steel back, held
-# by a guide at its right side. Nothing of it is built in. You write the geometry for gmsh, the materials and the case,
-# all from Python, and run it.
+# A friction pad slides back and forth on a cast-iron rail. It has a soft lining with slanted sides below a steel
+# back, and a guide at its right side holds it. Nothing of it is built in. You write the geometry for gmsh, the
+# materials and the case, all from Python, and run it.
 
 # %%
 # %matplotlib inline
@@ -40,8 +40,8 @@ folder = Path(temporary.name)
 # %% [markdown]
 # ## The geometry
 #
-# fenwear reads a gmsh `.geo` (or a ready `.msh`). What connects it with the case are the names of its **physical groups**.
-# Each starts with the body it belongs to, `punch_` or `strip_`:
+# fenwear reads a gmsh `.geo` (or a ready `.msh`). The names of its **physical groups** connect it with the case. Each
+# starts with the body it belongs to, `punch_` or `strip_`:
 #
 # | group | kind | here |
 # | --- | --- | --- |
@@ -109,8 +109,8 @@ print(f"{len(GEOMETRY.splitlines())} lines written")
 # %% [markdown]
 # ## The materials
 #
-# With heat a material needs six values. Numbers may carry any fitting unit. Those of the lining are made up, in the
-# range of organic friction materials; take measured ones for your work.
+# With heat a material needs six values. Numbers may carry any fitting unit. The lining's values are made up, in the
+# range of organic friction materials; take measured values for your work.
 
 # %%
 materials = {
@@ -184,7 +184,7 @@ tables = {
 case = make_case(tables, folder)
 
 # %% [markdown]
-# What a mistake looks like:
+# A mistake looks like this:
 
 # %%
 wrong = {**tables, "contact": {"friktion": 0.35}, "model": {"plane": "strain", "thickness": "50 kg"}}
@@ -217,7 +217,7 @@ print(f"{len(system.pair.x)} contact nodes, mean pressure {system.rigid.mean_pre
 # %% [markdown]
 # ## Steady state first
 #
-# It takes a moment and tells what to expect: pressures, temperatures, and whether a run will settle there.
+# It takes a moment and shows what to expect: pressures, temperatures, and whether a run will settle there.
 
 # %%
 state = steady(system)
@@ -229,8 +229,8 @@ print(f"growth rate {rate:+.2g} 1/s: {'stable' if rate < 0 else 'unstable'}")
 # %% [markdown]
 # ## The run
 #
-# A soft lining and fast wear: here `run.integration = "implicit"` is the safe choice, for it is stable with any wear in
-# one half-cycle. `fenwear check` and `run` tell when explicit steps would be too long.
+# The lining is soft and wears fast. Here `run.integration = "implicit"` is the safe choice, for it is stable with any
+# wear in one half-cycle. `fenwear check` and `run` report when explicit steps would be too long.
 
 # %%
 summary, run_folder = run_case(case, "pad", folder / "run", print)
@@ -291,8 +291,8 @@ print(case.to_toml()[:600], "...")
 #
 # ## What to mind
 #
-# - The contact may be curved, but its smallest gap at the start is at most 1 % of its length, and the punch's contact
-#   must lie within the strip's; with heat wherever the stroke takes it.
+# - The contact may be curved, but its smallest gap at the start is at most 1 % of its length. The punch's contact must
+#   lie within the strip's; with heat wherever the stroke takes it.
 # - Wear is an offset of the gap until it reaches `geometry.follow_wear` of the elements' height; then the meshes follow it.
 # - One region may have several surfaces, but all of one element type: triangles or quadrilaterals.
 # - A corner of the lining at the contact makes the first pressures depend on the mesh. They wear off.

@@ -12,16 +12,19 @@
 # # 6. Beside the paper
 #
 # Both examples come from a paper: I. Páczelt and Z. Mróz, "Numerical Analysis of Thermo-Mechanical Wear Problems for
-# Reciprocal Punch Sliding". This notebook computes every number that it prints anew, under several readings of what the
-# paper leaves open, and gives a verdict on each.
+# Reciprocal Punch Sliding". This notebook computes every number of the paper again, under several readings of its
+# open data, and gives a verdict on each.
 #
-# What is open: the share $\kappa$ of the friction heat that goes to the punch, the debris' share $\gamma_d$, whether the
-# faces of the punch lose heat (the words can be read either way), whether the conductance grows with pressure, plane
-# stress or strain, the strip's supports, the heights of the hinges of Example 2, and the relaxation between heat and
-# contact.
+# The paper leaves open
 #
-# Some 60 readings were tried, against seven numbers and descriptions. So keep apart what is **fitted** and what is
-# **predicted**: that a reading meets a number it was fitted to says nothing, and that one of sixty comes close to some
+# - the share $\kappa$ of the friction heat that enters the punch, and the debris' share $\gamma_d$;
+# - whether the faces of the punch lose heat (the words can be read either way);
+# - whether the conductance grows with pressure;
+# - plane stress or strain, the strip's supports, and the heights of the hinges of Example 2;
+# - the relaxation between heat and contact.
+#
+# Some 60 readings were tried, against seven numbers and descriptions. So keep apart the **fitted** and the
+# **predicted**. A reading that meets a number it was fitted to says nothing. One of sixty that comes close to some
 # number by chance says little.
 #
 # The computations live in `fenwear_verify.paper`; they take some minutes altogether. `python3 -m fenwear verify --only paper`
@@ -54,9 +57,9 @@ for reading in scope.readings:
 # %% [markdown]
 # ## Row by row
 #
-# A number is **reproduced** where ours agrees to one unit of the last digit printed under every reading, and
-# **reproduced under an assumption** where it does under one that keeps to all that the paper gives. The verdicts are
-# computed from the numbers; the reason says who was fitted to what.
+# A number is **reproduced** where ours agrees to one unit of the last digit printed under every reading. It is
+# **reproduced under an assumption** where it agrees under one reading that keeps all of the paper's data. The
+# verdicts are computed from the numbers; the reason names the fits.
 
 # %%
 rows = paper_rows(scope)
@@ -65,40 +68,41 @@ show.display(show.Markdown(markdown(rows)))
 # %% [markdown]
 # ## Readings side by side
 #
-# Beside the paper's 47.16 K (one-way), 50.11 K (at $n = 2200$), a largest pressure that falls after $n = 1800$, and
+# The paper has 47.16 K (one-way) and 50.11 K (at $n = 2200$). Its largest pressure falls after $n = 1800$, and it has
 # 33.33 MPa at the centre of Example 2.
 
 # %%
 show.display(show.Markdown(readings_markdown(heat_runs(scope), central_runs(scope))))
 
 # %% [markdown]
-# What to look at:
+# Look at these:
 #
 # - **Round values** are the built-in cases: insulated faces, $\kappa = \gamma_d = 1/2$, everything else as printed, nothing
 #   fitted. The two temperatures come out within 4 % and 1.5 %, the contact narrows and widens as described, and nothing
 #   splits. The peak comes by $n = 250$, and Example 2 draws 51 MPa to its centre: these two do not fit.
-# - **Fitted** to both temperatures are three: by $\kappa$ and $\gamma_d$ at the printed conductance, by $\kappa$ and the
-#   conductance without debris, by $\kappa$ and $\gamma_d$ with a conductance that grows with pressure and is the printed
-#   one at the mean pressure. Two free values for two numbers: look at the other columns.
+# - **Fitted** to both temperatures are three. The first fits $\kappa$ and $\gamma_d$ at the printed conductance, the
+#   second $\kappa$ and the conductance without debris. The third fits $\kappa$ and $\gamma_d$ with a conductance that
+#   grows with pressure and is the printed one at the mean pressure. Two free values for two numbers: look at the other
+#   columns.
 # - **Text literal** loses heat through the faces. The punch then needs twice the heat for the same 47.16 K, the bulge runs
 #   away, and the contact splits (notebook 3).
 # - **Small face loss** without conductance: a ninth of the printed loss meets both temperatures. So insulated faces
 #   are not the only way; small against the printed loss they must be.
 # - **Literal sum** takes 47.16 K as the sum of both directions and the conductance as proportional to pressure. It gives
 #   that number with nothing fitted, 47.42 K; but then the run stays at 34 K.
-# - A late peak, or 33 MPa in Example 2, needs something that departs from the paper's data: a thermo-elastic response
+# - A late peak, or 33 MPa in Example 2, needs a departure from the paper's data. Such are a thermo-elastic response
 #   **times 0.65**, a **friction arm** of 30 mm, $n$ counted in **steps of heat**; or the next one.
 # - **Relaxed** takes the relaxation (29) from the pressure of the half-cycle before, by 0.001. The rule (30) ends the
-#   iterations after two, because the gap hardly moves in them, and the pressure that heats and wears lags some 500
-#   half-cycles behind the contact. The peak then comes near $n = 1800$, to which the factor was chosen, and Example 2
-#   sees 38 MPa instead of 51. With all three values fitted it is the reading nearest to all numbers. But its pressures are
-#   not those of the contact at that time: it would mean that the course of the bulge shows the iteration, not the
-#   physics. Nothing in the text says that the factor was so small.
+#   iterations after two, because the gap hardly moves in them. The pressure that heats and wears then lags some 500
+#   half-cycles behind the contact. The peak comes near $n = 1800$, to which the factor was chosen, and Example 2 has
+#   38 MPa in place of 51. With all three values fitted it is the reading nearest to all numbers. But its pressures are
+#   not those of the contact at that time. The course of the bulge would show the iteration, not the physics. Nothing in
+#   the text says that the factor was so small.
 #
 # ## The map
 #
 # One figure explains the temperatures. Each is linear in the punch's share of the heat, so each is a line over the
-# conductance; where the two lines meet, both fit. What a run does there depends on the side of neutral stability.
+# conductance; where the two lines meet, both fit. The course of a run there depends on the side of neutral stability.
 
 # %%
 for picture in paper_figures(scope):
@@ -107,10 +111,10 @@ for picture in paper_figures(scope):
 print(map_text(stability_maps(scope)))
 
 # %% [markdown]
-# The one-way temperature fixes $\kappa (1 - \gamma_d)$, the ratio of the two temperatures then fixes the conductance or
-# $\gamma_d$. With insulated faces the lines meet right at neutral stability, near a share of 0.2: a run takes thousands of
-# half-cycles to forget its start, as in the paper. With faces that convect they lie where disturbances grow
-# a hundredfold in a minute: that state exists, and no run stays in it.
+# The one-way temperature fixes $\kappa (1 - \gamma_d)$, the ratio of the two temperatures then fixes the conductance
+# or $\gamma_d$. With insulated faces the lines meet right at neutral stability, near a share of 0.2. A run then takes
+# thousands of half-cycles to forget its start, as in the paper. With faces that convect they lie where disturbances
+# grow a hundredfold in a minute: that state exists, and no run stays in it.
 #
 # ## How exact are our own numbers?
 #
@@ -127,12 +131,12 @@ for variant in (*discretisations, *choices):
           f"{variant.peak:6.1f} MPa")  # fmt: skip
 
 # %% [markdown]
-# What to look at:
+# Look at these:
 #
 # - **Strip supports** change nothing that the table shows.
 # - **Hinge heights** change the pressure in the middle of Example 2 by some MPa.
-# - **Debris and share**: $\gamma_d$ up or $\kappa$ down by 0.1 do nearly the same. The two cannot be told apart by one
-#   temperature.
+# - **Debris and share**: $\gamma_d$ up or $\kappa$ down by 0.1 do nearly the same. One temperature cannot separate the
+#   two.
 # - **Plane strain** makes the state less stable: the thermal strain out of the plane is held, which bulges the punch more.
 # - A strip that **moves** under the punch, in five positions of its stroke of 3 mm, changes pressures by 2 % at most.
 # - **Splitting** heat and contact as in the paper, from the contact one cycle ago, gives the same.
@@ -163,10 +167,10 @@ plt.show()
 #
 # - Everything that follows from equilibrium and the wear rule is reproduced: wear velocities, the pressure without heat,
 #   equal mean fluxes.
-# - Both temperatures and the described course come together where the faces lose little heat or none. Round values for what
-#   is open give them within 4 % with nothing fitted, two fitted values give them exactly.
-# - The half-cycle at which the peak falls and the 33.33 MPa of Example 2 are not reproduced by any reading that keeps to the
-#   paper's data and solves heat and contact together. A relaxation that lags moves the first, and comes near the second.
+# - Both temperatures and the described course agree where the faces lose little heat or none. Round values for the open
+#   data give them within 4 % with nothing fitted, two fitted values give them exactly.
+# - No reading that keeps the paper's data and solves heat and contact together reproduces the fall of the peak. None
+#   reproduces the 33.33 MPa of Example 2. A relaxation that lags moves the first, and comes near the second.
 #
 # ## Your turn
 #

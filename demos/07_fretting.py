@@ -11,10 +11,10 @@
 # %% [markdown]
 # # 7. Fretting: two bodies that wear
 #
-# A steel cylinder is pressed on a steel flat, which moves under it by ±25 µm. Both wear. Here the strip's wear belongs
-# to the strip's own material, and the stroke carries that to and fro under the cylinder: each half-cycle is cut into
-# several **positions** of the flat, each with a contact of its own. You see the line contact of Hertz turn into a
-# worn one, and how sure its numbers are.
+# A steel cylinder is pressed on a steel flat, which moves under it by ±25 µm. Both wear. The strip's wear belongs to
+# the strip's own material, and the stroke carries it to and fro under the cylinder. Each half-cycle has several
+# **positions** of the flat, each with a contact of its own. You see the line contact of Hertz turn into a worn one,
+# and how sure its numbers are.
 
 # %%
 # %matplotlib inline
@@ -55,8 +55,8 @@ print(f"fenwear: half-width {1e3 * closed / 2:.1f} µm, largest pressure {start.
 # %% [markdown]
 # ## Thousands of cycles by jumps
 #
-# `jump` takes many cycles in one implicit step and chooses how many by an error estimate. What both bodies lose is
-# known beforehand, $k F s$ with the sliding distance $s$, and holds to rounding whatever the length of the jumps.
+# `jump` takes many cycles in one implicit step and chooses how many by an error estimate. The loss of both bodies is
+# known beforehand, $k F s$ with the sliding distance $s$. It holds to rounding for any length of the jumps.
 
 # %%
 begin = time.perf_counter()
@@ -95,8 +95,8 @@ axes[1].set_title("What is worn off: the flat's scar is wider by the stroke", lo
 plt.show()
 
 # %% [markdown]
-# In mid-stroke the contact is narrower than both scars: the flanks of the cylinder's scar meet those of the flat's
-# towards the ends of the stroke only. A model with one position cannot know that.
+# In mid-stroke the contact is narrower than both scars. The flanks of the cylinder's scar meet those of the flat's
+# only towards the ends of the stroke. A model with one position cannot know that.
 
 # %% [markdown]
 # ## How sure are these numbers?
@@ -121,8 +121,8 @@ for text, tolerance, varied in (
 # %% [markdown]
 # ## No steady state, and a stroke that is too long
 #
-# The track of a flat that wears deepens for ever: asked for a steady state fenwear says so. And what the flat's mesh
-# does not reach it does not guess.
+# The track of a flat that wears deepens without end: fenwear reports that it has no steady state. It also reports a
+# stroke that leaves the flat's mesh.
 
 # %%
 try:

@@ -11,9 +11,9 @@
 # %% [markdown]
 # # 8. From a measurement to a life
 #
-# Wear coefficients scatter from test to test by more than any model errs. So the questions of a designer are: which
-# coefficient do my scars give, how sure is it, what would change the answer most, and how long do parts live? Here
-# three measured scars of a block that was worn by a ring are **calibrated**, the result is **checked** on another
+# Wear coefficients scatter from test to test by more than any model errs. A designer asks four questions. Which
+# coefficient do my scars give, and how sure is it? What would change the answer most, and how long do parts live?
+# Here three measured scars of a block that a ring has worn are **calibrated**. The result is **checked** on another
 # condition, and turned into a **life with scatter**.
 #
 # The measurements: A. Cruzado, A. Zabala, M. A. Urchegui and X. Gómez, *Revista de Metalurgia* 46 (2010) 106-114, Fig.
@@ -68,7 +68,7 @@ print((DATA / "block_on_ring_1.csv").read_text()[:620])
 # %% [markdown]
 # ## Is the model right? Depths that others have computed
 #
-# A published level-set model of this test with $K = 2 \cdot 10^{-9}$ mm²/N has a scar of 16.155 µm after 800 m and of
+# A published level-set model of this test has $K = 2 \cdot 10^{-9}$ mm²/N. Its scar is 16.155 µm deep after 800 m and
 # 25.709 µm after 1,600 m. The worn area is $K P' s$ whatever the pressure, and a rigid ring would make the depth
 # $(1.5\,R A)^{2/3} / (2 R)$.
 
@@ -84,7 +84,8 @@ for distance, published in ((800, 16.155), (1600, 25.709)):
 # ## Calibrate each scar
 #
 # The unknowns are the coefficient and the offset of the trace. Neighbouring residuals are alike, since grooves are
-# wider than the distance between two points: the files say so in the line `# scatter`, and the standard errors are wider.
+# wider than the distance between two points. The files state this in the line `# scatter`, and the standard errors
+# are wider.
 
 # %%
 found = [calibrate(case, [test], ["wear.punch.coefficient"], baseline=["offset"]) for test in tests]
@@ -116,8 +117,9 @@ print(*scatter.text)
 # %% [markdown]
 # ## What the data cannot tell
 #
-# With the exponent $b$ of the pressure as a second unknown: all points of a scar are worn under one load, and so $K$ and
-# $b$ cannot both be known. The program says so before anything is fitted; after a fit it gives no distribution of them.
+# Take the exponent $b$ of the pressure as a second unknown. All points of a scar are worn under one load, and so $K$
+# and $b$ cannot both be known. The program reports this before anything is fitted; after a fit it gives no
+# distribution of them.
 
 # %%
 both = [Unknown("wear.punch.coefficient"), Unknown("wear.punch.pressure_exponent")]
@@ -126,9 +128,9 @@ print(*LeastSquares(case, [tests[2]], both, baseline=["offset"]).cannot_tell())
 # %% [markdown]
 # ## Check on another condition
 #
-# There is no measurement at another load here, so **this one is made up**: the depth after 1,600 m at 130 N, from the
-# model itself with a coefficient drawn from the scatter, plus a reading error of 1 µm. The check is what one would do
-# with a real one: is it where the calibration expects it?
+# There is no measurement at another load here, so **this one is made up**. It is the depth after 1,600 m at 130 N,
+# from the model itself. The coefficient is drawn from the scatter, and a reading error of 1 µm is added. Check it as
+# a real one: is it where the calibration expects it?
 
 # %%
 generator = np.random.default_rng(1)
@@ -154,13 +156,13 @@ print(depths[0].text())
 tornado(depths)
 
 # %% [markdown]
-# Of a scar between rigid bodies the depth goes with $K^{2/3}$, $P'^{2/3}$ and $R^{-1/3}$, and not with the modulus. The
-# radius is rounded by the mesh generator's steps, and its error is larger.
+# For a scar between rigid bodies the depth is proportional to $K^{2/3}$, $P'^{2/3}$ and $R^{-1/3}$, and does not
+# depend on the modulus. The radius is rounded by the mesh generator's steps, and its error is larger.
 #
 # ## Life with scatter
 #
-# How far do blocks slide until the scar is 0.03 mm deep, where the coefficient scatters as between the three tests, and
-# the load by 10 %? Quantiles with the interval that holds them with 95 %.
+# Blocks slide until the scar is 0.03 mm deep. The coefficient scatters as between the three tests, and the load by 10
+# %. Quantiles have the interval that holds them with 95 %.
 
 # %%
 inputs = scatter.and_also(parse_scatter(case, "punch.loads.0.force.1=normal(-65 N, 10 %)"))
@@ -185,7 +187,7 @@ held = np.abs(deviations[:, 0]) < 1.96 * errors[:, 0]
 print(f"{held.sum()} of {len(held)} intervals hold the truth; the coefficient is known to {100 * errors.mean():.2f} %")
 
 # %% [markdown]
-# On the command line, in the folder that `measured_folder()` names, the same is
+# On the command line, in the folder that `measured_folder()` names, the same is:
 #
 #     fenwear calibrate block_on_ring.toml block_on_ring_*.csv --unknown wear.punch.coefficient --baseline offset \
 #         --each -o rings

@@ -128,8 +128,8 @@ print(f"scars: {float(history.scar_length[-1]):.3f} mm on the ball, {float(histo
 # %% [markdown]
 # ## A brake pad
 #
-# A sector of a ring on a disc, guided so that it cannot tilt, wears until p r is uniform, too, whatever the heat:
-# 1.989 MPa at the inner radius of 60 mm and 1.194 MPa at the outer one of 100 mm.
+# A sector of a ring on a disc is guided so that it cannot tilt. It wears until p r is uniform, too, whatever the
+# heat. The pressure is then 1.989 MPa at the inner radius of 60 mm and 1.194 MPa at the outer radius of 100 mm.
 #
 # `fenwear run brake-pad` follows it, with the temperatures on the same maps, and `fenwear plot` draws both bodies near
 # the contact.

@@ -11,10 +11,10 @@
 # %% [markdown]
 # # 10. From full stick to gross sliding
 #
-# A steel cylinder is pressed on a steel flat, whose bottom moves to and fro by a few micrometres. With
-# `contact.law = "coulomb"` each contact node sticks or slips. A stroke of half a micrometre is taken up elastically; a
-# longer one makes the edges of the contact slip; a still longer one all of it. Then partial slip wears, to a shape that
-# wears no more.
+# A steel cylinder is pressed on a steel flat, whose bottom moves to and fro by a few micrometres. With `contact.law =
+# "coulomb"` each contact node sticks or slips. The bodies take up a stroke of half a micrometre elastically. A longer
+# stroke makes the edges of the contact slip, and a still longer stroke all of it. Then partial slip wears, to a shape
+# that wears no more.
 
 # %%
 # %matplotlib inline
@@ -75,9 +75,9 @@ for amplitude, records in cycles.items():
 # %% [markdown]
 # ## Fretting loops
 #
-# Full stick is a line. At the edges of the contact the pressure vanishes, so that a little always slips there; with
+# Full stick is a line. At the edges of the contact the pressure vanishes, so that a little always slips there. With
 # ±0.2 µm it is no more than a node or two. Partial slip is a thin loop, gross sliding a parallelogram whose height is
-# twice $\mu P$. Its width is the slip; the slope of its sides is what the bodies give way elastically.
+# twice $\mu P$. Its width is the slip, and the slope of its sides is the elastic compliance of the bodies.
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained", sharey=True)
@@ -140,13 +140,13 @@ plt.show()
 # %% [markdown]
 # ## Work of friction
 #
-# Every branch of a loop is the first loading, twice as large (Mindlin and Deresiewicz). Beyond what full stick gives way,
-# half-planes move by $\mu P / (\pi E^*)\, g(q)$ with $q = Q / (\mu P)$ and $g = q + (1 - q) \ln(1 - q)$, which follows
-# from Hertz's approach between the loads $P - Q / \mu$ and $P$. A loop then encloses
+# Every branch of a loop is the first loading, twice as large (Mindlin and Deresiewicz). Beyond the displacement of
+# full stick, half-planes move by $\mu P / (\pi E^*)\, g(q)$ with $q = Q / (\mu P)$ and $g = q + (1 - q) \ln(1 - q)$.
+# This follows from Hertz's approach between the loads $P - Q / \mu$ and $P$. A loop then encloses
 #
 # $$ W = \frac{8 (\mu P)^2}{\pi E^*} \left( \frac{q\,g(q)}{2} - \int_0^q g \right) . $$
 #
-# The work of gross sliding goes on beyond, by $4 \mu P$ times the amplitude that is left.
+# The work of gross sliding continues beyond, by $4 \mu P$ times the remaining amplitude.
 
 
 # %%
@@ -213,9 +213,10 @@ print(
 # %% [markdown]
 # ## Partial slip wears a scar beside the stick zone
 #
-# `jump` takes many cycles in one step of controlled error, with the stroke of ±3 µm of the case. `steady` finds the shape
-# to which it leads without the cycles before: in the end the stick zone alone carries the load, and beside it the bodies
-# are worn until no pressure is left. It takes the stick zone of the second cycle; `final_shape` can be given another one.
+# `jump` takes many cycles in one step of controlled error, with the stroke of ±3 µm of the case. `steady` finds the
+# final shape without the cycles before. In the end the stick zone alone carries the load, and beside it the bodies
+# are worn until no pressure is left. `steady` takes the stick zone of the second cycle; `final_shape` can be given
+# another one.
 
 # %%
 rows = [
@@ -266,10 +267,10 @@ axes[1].invert_yaxis()
 plt.show()
 
 # %% [markdown]
-# A mesh knows the stick zone to a node at each side, and a zone that is narrower by that has a scar larger by a fifth
-# here. On some meshes the outermost node begins to slip as the scar beside it deepens; then the zone of the last cycle
-# is the one to give to `final_shape`. The pressure at the edges of the stick zone has no bound: it is as high as nodes
-# are near to them.
+# A mesh resolves the stick zone to a node at each side. A zone that is narrower by that has a scar larger by a fifth
+# here. On some meshes the outermost node begins to slip as the scar beside it deepens. Then give the zone of the last
+# cycle to `final_shape`. The pressure at the edges of the stick zone has no bound: it grows as the node spacing
+# falls.
 #
 # `fenwear run fretting-partial-slip` writes all of this to `history.nc` and draws it in a report, and `fenwear steady
 # fretting-partial-slip` prints the final shape. With a stroke as long as to slip as a whole there is none.
@@ -277,9 +278,9 @@ plt.show()
 # %% [markdown]
 # ## A sphere
 #
-# In solids traction and slip have two components. A sphere of 10 mm on a flat, `fretting-sphere`, sticks in a circle of the radius
-# $c = a\,(1 - Q / (\mu P))^{1/3}$ (Mindlin), around which it slips along the stroke; the traction is that of gross sliding
-# less that of a smaller contact, as in the plane.
+# In solids traction and slip have two components. A sphere of 10 mm on a flat, `fretting-sphere`, sticks in a circle
+# of the radius $c = a\,(1 - Q / (\mu P))^{1/3}$ (Mindlin). Around it the sphere slips along the stroke. The traction
+# is that of gross sliding less that of a smaller contact, as in the plane.
 
 # %%
 across = 6 if COARSE else 8

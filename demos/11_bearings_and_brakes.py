@@ -11,8 +11,9 @@
 # %% [markdown]
 # # 11. Bearings and brakes
 #
-# Contacts that wrap around the other body, or touch it at several places: a bushing that wears from a line contact to half
-# of its bore, a load that tilts it, a drum brake, and a ball that walks in its cup. All are built-in cases; the answers on paper stand beside them.
+# Some contacts wrap around the other body, or touch it at several places. Here are a bushing that wears from a line
+# contact to half of its bore, and a load that tilts it. A drum brake and a ball that walks in its cup follow. All are
+# built-in cases; the answers on paper stand beside them.
 
 # %%
 # %matplotlib inline
@@ -67,9 +68,10 @@ ax.legend(loc="lower center", frameon=False)
 plt.show()
 
 # %% [markdown]
-# Of rigid bodies the worn arc has a half angle $\psi_0$ by $k P s / (R D) = \psi_0 / \cos\psi_0 - \sin\psi_0$, and the
-# bore is $D (\cos\psi / \cos\psi_0 - 1)$ deep, with D the radial play, P the load per length, and s what is slid; friction
-# turns it all by atan mu. The elastic bushing comes to it as soon as it has worn by more than it gives.
+# For rigid bodies the worn arc has a half angle $\psi_0$ by $k P s / (R D) = \psi_0 / \cos\psi_0 - \sin\psi_0$. The
+# bore is $D (\cos\psi / \cos\psi_0 - 1)$ deep. D is the radial play, P the load per length, and s the sliding
+# distance. Friction turns it all by atan mu. The elastic bushing reaches this when its wear exceeds its elastic
+# deflection.
 
 # %%
 load, clearance, wear = 1000 / 20, 0.05, 1e-9
@@ -95,8 +97,8 @@ print(f"worn volume over k F s {float(history.worn_volume[-1] / (wear * 1000 * h
 #
 # ## A load off the middle
 #
-# The same as a solid, with the load 3 mm beside the middle of a bushing of 20 mm: it tilts on its shaft, until the contact
-# carries the load where it acts. The bore is unrolled, its top in the middle.
+# The solid has the load 3 mm beside the middle of a bushing of 20 mm. The bushing tilts on its shaft, until the
+# contact carries the load where it acts. The bore is unrolled, its top in the middle.
 
 # %%
 small = ["geometry.parameters.fine_elements=12", "geometry.parameters.along=4"] if COARSE else []
@@ -115,9 +117,9 @@ plt.show()
 # %% [markdown]
 # ## A drum brake
 #
-# Two shoes, hinged below, are pressed apart by the same force above. Worn in, the pressure of a rigid shoe is
-# $p_a \sin\theta$, $\theta$ the angle from its hinge (Shigley): friction presses the leading shoe on and takes the trailing
-# one off.
+# Two shoes, hinged below, are pressed apart by the same force above. Worn in, the pressure of a rigid shoe is $p_a
+# \sin\theta$ with $\theta$ the angle from its hinge (Shigley). Friction presses the leading shoe on and the trailing
+# shoe off.
 
 # %%
 along = f"geometry.parameters.elements_along_lining={24 if COARSE else 48}"
@@ -142,9 +144,9 @@ print({name: f"{volume:.0f} mm³" for name, volume in shoes.items()})
 # %% [markdown]
 # ## A ball in a cup
 #
-# A made cycle of walking: three turns and a load whose direction changes, in 32 steps. Each place of the cup is rubbed along
-# a track of its own, most of it forwards and backwards; where tracks are wide, molecules that were drawn out along the main
-# direction are rubbed across it, and polyethylene wears faster.
+# A made cycle of walking has three turns and a load whose direction changes, in 32 steps. Each place of the cup is
+# rubbed along a track of its own, most of it forwards and backwards. Where tracks are wide, rubbing also acts across
+# the main direction, along which the molecules were drawn out. Polyethylene wears faster there.
 
 # %%
 small = ["geometry.parameters.across=4", "geometry.parameters.around=3"] if COARSE else []

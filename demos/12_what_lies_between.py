@@ -11,9 +11,9 @@
 # %% [markdown]
 # # 12. What lies between
 #
-# One contact, with each term in turn: a third body, a compliant layer, a coating, a hardness, creep, mixed lubrication. What
-# does each change in the depth, in the pressure, and in the life? The contact is a steel cylinder of 6 mm radius that slides
-# 0.1 mm to and fro on a flat under 120 N/mm, with its wear as the only loss; its life ends when it is worn by 1 µm.
+# One contact has each term in turn: a third body, a compliant layer, a coating, a hardness, creep, mixed lubrication.
+# What does each change in the depth, in the pressure, and in the life? The contact is a steel cylinder of 6 mm radius
+# that slides 0.1 mm to and fro on a flat under 120 N/mm. It wears alone, and its life ends when it is worn by 1 µm.
 
 # %%
 # %matplotlib inline
@@ -72,9 +72,9 @@ runs = {name: run(name.replace(" ", "-"), settings) for name, settings in TERMS.
 # %% [markdown]
 # ## Depth, pressure, life
 #
-# The depth is what the cylinder has lost, the pressure the largest at the start and at the end, the life the cycles until
-# 1 µm. Wear as such goes by load times path, so that only the coating and the lubricant change the volume worn in the
-# end. The others change where it is worn: what makes the contact wider makes the scar shallower.
+# The table has the depth that the cylinder has lost, and the largest pressure at the start and at the end. The life
+# is the cycles until 1 µm. Wear is proportional to load times path, so that only the coating and the lubricant change
+# the final volume. The others change where it is worn: a wider contact makes the scar shallower.
 
 
 # %%
@@ -92,8 +92,9 @@ for name, (history, summary) in runs.items():
     )
 
 # %% [markdown]
-# The pressure at the end is drawn as its mean over the last 50 cycles. At an instant a node at the edge, which the scar has just
-# come to, carries more or less than those beside it, on any mesh: it is worn down to them before the next one touches.
+# The pressure at the end is drawn as its mean over the last 50 cycles. A node at the edge, which the scar has just
+# reached, carries more or less than its neighbours at an instant, on any mesh. It is worn down to them before the
+# next one touches.
 
 
 # %%
@@ -123,9 +124,9 @@ plt.show()
 # %% [markdown]
 # ## What is there besides wear
 #
-# Debris that stays is as good as material: the surfaces are held apart by it, and worn = stored + ejected. What has flown
-# or crept looks like wear to a profilometer, and is none: it is metered apart. Of the coating the sheet says where and when
-# it was worn through first.
+# Debris that stays acts as material: it holds the surfaces apart, and worn = stored + ejected. Flow and creep look
+# like wear to a profilometer, but are none: fenwear meters them apart. The sheet has the place and time at which the
+# coating was first worn through.
 
 # %%
 print(f"debris stored  {1e6 * runs['third body'][1]['debris_volume_mm3']:8.1f} µm² over 1 mm")

@@ -23,8 +23,7 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
         last: The last half-cycles.
         values: Their numbers.
     """
-    exchange = last.system.exchange
-    fineness = None if exchange is None else exchange.fineness
+    fineness = last.system.exchange.fineness
     if fineness is None or last.heat is None:
         return {}
     known = {"heat_steps": fineness.change, "heat_basis": fineness.difference}
@@ -34,9 +33,9 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
 def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contribution]:
     """Return the same of a steady state: relative, of pressures too, which the thermal gap makes at most as much of."""
     exchange = with_reduced_heat(system).exchange
-    if exchange is None or exchange.fineness is None or system.heat is None:
+    if exchange.fineness is None:
         return {}
-    start = {"largest_temperature": system.heat.initial}
+    start = {"largest_temperature": system.initial_temperature}
     return {
         source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
         for source, share in (("heat_steps", exchange.fineness.change), ("heat_basis", exchange.fineness.difference))
@@ -47,8 +46,7 @@ def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contributio
 def _of(last: Block, values: Values, share: float) -> Contribution:
     assert last.heat is not None
     system = last.system
-    begin = 0.0 if system.heat is None else system.heat.initial
-    rise = float(last.heat.largest_temperature[-1]) - begin
+    rise = float(last.heat.largest_temperature[-1]) - system.initial_temperature
     pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
     found: Contribution = {}
     for quantity, value in values.items():
@@ -64,10 +62,8 @@ def _of(last: Block, values: Values, share: float) -> Contribution:
 def _felt(last: Block, share: float) -> tuple[float, float]:
     """Return the relative change of the largest pressure by a share more of the thermal gap, and that gap's range."""
     system, exchange, temperature = last.system, last.system.exchange, last.end.temperature
-    if exchange is None or temperature is None:
-        return share, np.inf
     phase = (int(last.half_cycle[-1]) * system.motion.positions - 1) % len(system.motion.phases)
-    thermal = exchange.gap(temperature, phase)
+    thermal = exchange.gap(exchange.own(temperature), phase)
     gap: Array = system.gap(phase, last.end.worn) + thermal
     contact = system.phase_contact((phase,))
     try:

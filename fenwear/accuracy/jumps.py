@@ -54,11 +54,11 @@ def _with_pressures(last: Block, finer: RunState) -> Block:
 
 def _with_heat(last: Block, finer: RunState) -> Block:
     """Return a block with the temperatures of another state at its end; collective."""
-    exchange, heat, own = last.system.exchange, last.heat, last.end.temperature
-    if exchange is None or heat is None or own is None or finer.temperature is None:
+    exchange, heat = last.system.exchange, last.heat
+    if heat is None:
         return last
-    pairs = zip(exchange.contact_temperatures(own), exchange.contact_temperatures(finer.temperature), strict=True)
-    punch, strip = (one - other for one, other in pairs)
+    own, other = (exchange.contact_temperatures(exchange.own(one.temperature)) for one in (last.end, finer))
+    punch, strip = own[0] - other[0], own[1] - other[1]
     heat = replace(
         heat,
         temperature_punch=_last_less(heat.temperature_punch, punch),

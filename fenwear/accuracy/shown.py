@@ -68,7 +68,7 @@ def remedies(system: Tribosystem, found: Uncertainty) -> dict[str, str]:
 def _remedy(system: Tribosystem, source: str) -> str:
     case, positions = system.case, system.motion.positions
     follow = case.geometry.follow_wear or 0.0
-    fineness = None if system.exchange is None else system.exchange.fineness
+    fineness = system.exchange.fineness
     jumps = case.run.integration == "jump"
     steps = 0 if fineness is None else 2 * fineness.steps
     tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"

@@ -19,6 +19,7 @@ from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
 from fenwear.case.names import Names, told_by_name
 from fenwear.errors import CaseError, InputError
+from fenwear.heat.exchange import Isothermal
 from fenwear.heat.passage import Passage
 from fenwear.interface import (
     ContactPair,
@@ -152,6 +153,16 @@ class ContactSetup:
         return tuple(rigid.pair for rigid in self.rigids)
 
     @property
+    def initial_temperature(self) -> float:
+        """The temperature at which bodies fit, K; 0 without heat."""
+        return 0.0 if self.heat is None else self.heat.initial
+
+    @property
+    def isothermal(self) -> Isothermal:
+        """The exchange of bodies that stay at their initial temperature."""
+        return Isothermal(len(self.pairs), len(self.pair.weights), self.initial_temperature)
+
+    @property
     def direction_words(self) -> dict[int, str]:
         """The words for the two directions d of the sliding, 1 first; a table has one, through all of its steps."""
         if self.motion.steps:
@@ -259,7 +270,7 @@ class ContactSetup:
                 hardness does not carry the load.
         """
         modulus = common_modulus(self.case, self.bodies.regions, self.pair)
-        initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
+        initial, mean = self.initial_temperature, self.rigid.mean_pressure
         contact = self.friction.contact
         carries = self.strip_carries and self.passes  # else it lies where it is on either body
         found = layers_of(
@@ -452,7 +463,7 @@ class ContactSetup:
     @cached_property
     def _initial(self) -> Array:
         """The initial temperature at the nodes (n,), K."""
-        return np.full(len(self.pair.weights), 0.0 if self.heat is None else self.heat.initial)
+        return np.full(len(self.pair.weights), self.initial_temperature)
 
     @cached_property
     def _regions(self) -> tuple[Regions, Regions]:

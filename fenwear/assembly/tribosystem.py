@@ -85,7 +85,7 @@ class Tribosystem(ContactSetup):
         condensed: Both bodies' answers to forces on the contact.
         interface: The condensed interface in the middle position, under the mean loads.
         interfaces: The same in each phase.
-        exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
+        exchange: The bodies' temperatures over the phases; isothermal without heat, or where it was not asked for.
         law_state: What the law of contact has prepared of it, where it needs more.
         creep: What bodies and layer creep.
     """
@@ -94,7 +94,7 @@ class Tribosystem(ContactSetup):
     interface: Interface
     interfaces: tuple[Interface, ...]
     creep: Creep
-    exchange: HeatExchange | None = None
+    exchange: HeatExchange
     law_state: Any = None
 
     @property
@@ -304,7 +304,12 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
 
     creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
     return Tribosystem(
-        **parts, condensed=condensed, interface=interface, interfaces=interfaces, exchange=exchange, creep=creep
+        **parts,
+        condensed=condensed,
+        interface=interface,
+        interfaces=interfaces,
+        exchange=exchange or placed.isothermal,
+        creep=creep,
     )
 
 
@@ -420,7 +425,7 @@ def with_exchange(
 
 def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = False) -> Tribosystem:
     """Return the system with its heat on a small basis, whatever the settings say; see `with_exchange`; collective."""
-    if system.heat is None or (system.exchange is not None and system.exchange.reduced):
+    if system.heat is None or (system.exchange.conducts and system.exchange.reduced):
         return system
     return with_exchange(system, reduced=True, keep=keep, fresh=fresh)
 
@@ -429,7 +434,7 @@ def preparation(system: Tribosystem) -> Preparation:
     """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
     if system.heat is None:
         return "as set"
-    if system.exchange is None:
+    if not system.exchange.conducts:
         return "none"
     return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
 

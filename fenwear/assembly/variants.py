@@ -134,7 +134,7 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     sliding = replace(system.sliding, motion=system.motion.in_parts(parts))
     placed = place(system.bodies, sliding, system.case)
     cut = joined(placed, system.condensed)
-    return cut if system.exchange is None else with_exchange(cut, reduced=system.exchange.reduced)
+    return with_exchange(cut, reduced=system.exchange.reduced) if system.exchange.conducts else cut
 
 
 def set_up_by(case: Case) -> tuple[object, ...]:

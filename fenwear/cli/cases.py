@@ -164,7 +164,7 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
         log(f"{WARNING}{warning}")
     if full:
         print_case(loaded)
-    if warm.exchange is not None:
+    if warm.exchange.conducts:
         log(fineness_text(warm))
         if loaded.run.integration == "jump":
             log(f"heat: jumps keep what its steps in a cycle do, about {memory_size(cycle_memory(warm.exchange))}")

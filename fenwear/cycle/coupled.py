@@ -15,7 +15,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import ConvergenceError
-from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory
+from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory, cycles_of
 from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
 from fenwear.memory import check_memory
@@ -33,16 +33,15 @@ DISAGREE = (
     "conduct or the coefficients, did not come together"
 )
 
-# Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None without heat, from a start.
-SolveContact = Callable[[Array | None, Array | None, ContactState], ContactState]
+# Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None for none, from a start.
+SolveContact = Callable[[Array, Array | None, ContactState], ContactState]
 # Takes friction and wear at the conditions of the phases, and what these do to the states that laws remember.
 Take = Callable[[Sequence[ContactConditions], Evolution | None], None]
 
 
-def cycle_heat(system: Tribosystem) -> CycleHeat | None:
-    """Return the heat of whole cycles; None without heat."""
-    exchange = with_reduced_heat(system).exchange
-    return None if exchange is None else CycleHeat(exchange)
+def cycle_heat(system: Tribosystem) -> CycleHeat:
+    """Return the heat of whole cycles."""
+    return cycles_of(with_reduced_heat(system).exchange)
 
 
 def check_cycle_memory(system: Tribosystem) -> None:
@@ -52,10 +51,9 @@ def check_cycle_memory(system: Tribosystem) -> None:
         CaseError: they do not.
     """
     exchange = with_reduced_heat(system).exchange
-    if exchange is not None:
-        what = "what jumps and steady states keep of each step of the heat in a cycle"
-        advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
-        check_memory(system.comm, cycle_memory(exchange), "heat", what, advice)
+    what = "what jumps and steady states keep of each step of the heat in a cycle"
+    advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
+    check_memory(system.comm, cycle_memory(exchange), "heat", what, advice)
 
 
 @dataclass(frozen=True)
@@ -86,14 +84,14 @@ class Solved:
 
     Attributes:
         contact: Of all phases.
-        temperature: At the start of their cycle (dim,); None without heat.
+        temperature: At the start of their cycle (dim,).
         conductances: By which these temperatures have come about (m, n), to be used wherever heat is followed through
             the cycle: pressures that are nothing but for rounding do not say which of their nodes conduct.
     """
 
     contact: ContactState
-    temperature: Array | None = None
-    conductances: Array | None = None
+    temperature: Array
+    conductances: Array
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ class Coupled:
         take: Takes friction and wear at the conditions of the phases, before contact is solved.
 
     Attributes:
-        heat: Of whole cycles; None without heat. Linear in mu p: where mu is not constant its own mu is 1.
+        heat: Of whole cycles. Linear in mu p: where mu is not constant its own mu is 1.
         mu: What the pressures are to be multiplied by for `heat` (m, n): what friction heats.
         held: States that laws remember, at the end of a step or at rest; None without, and before.
     """
@@ -169,12 +167,12 @@ class Coupled:
         self._passing: LayerEvolution | None = None  # at the conditions last taken, where debris is felt by them
         self.heat = cycle_heat(system)
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
-        if self.heat is not None and not system.friction.constant:
-            self.heat = CycleHeat(self.heat.exchange.with_friction(self.mu))
+        if not system.friction.constant:
+            self.heat = cycles_of(self.heat.exchange.with_friction(self.mu))
 
     def solve(
         self,
-        temperature: Array | None,
+        temperature: Array,
         cycles: float,
         start: ContactState,
         solve: SolveContact,
@@ -188,7 +186,7 @@ class Coupled:
         phase and the worn depths. Without such coefficients the solution is exact once the same nodes conduct.
 
         Args:
-            temperature: Before (dim,); None without heat.
+            temperature: Before (dim,).
             cycles: How many; infinitely many give the periodic temperature.
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
@@ -213,7 +211,7 @@ class Coupled:
 
     def _at_edges(
         self,
-        temperature: Array | None,
+        temperature: Array,
         cycles: float,
         start: ContactState,
         solve: SolveContact,
@@ -225,7 +223,7 @@ class Coupled:
         try:
             return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
         except ConvergenceError:
-            if self.heat is None or temperature is None:
+            if not self.heat.dim:
                 raise
         found = self._solve(temperature, cycles, start, solve, passing, _grazing, lagged=lagged)
         self.system.remedies.note(GRAZING)
@@ -233,7 +231,7 @@ class Coupled:
 
     def _solve(
         self,
-        temperature: Array | None,
+        temperature: Array,
         cycles: float,
         start: ContactState,
         solve: SolveContact,
@@ -246,10 +244,10 @@ class Coupled:
         system, heat, constant = self.system, self.heat, self.system.constant_coefficients
         shape, contact = start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
-        warm = heat is not None and temperature is not None and not constant
+        warm = heat.dim > 0 and not constant
         parts: list[Array] = [start.pressure.ravel()]
-        if temperature is not None and warm:
-            first = None if heat is None else heat.conductances(start.pressure)
+        if warm:
+            first = heat.conductances(start.pressure)
             parts.append(self.surfaces(temperature, start.pressure, first).ravel())
         if passing is not None:
             # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
@@ -269,23 +267,17 @@ class Coupled:
                 worn = None if passing is None else replace(passing.before, punch=depths[-2], strip=depths[-1])
                 self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing, now[-1] if felt else None)
             found: list[Array] = []
-            if heat is None or temperature is None:
-                contact = solve(None, None, contact)
-                solved, same = Solved(contact), True
-            else:
-                conductances = heat.conductances(conducting(pressure))
-                key = conductances.tobytes()
-                if known is None or known[0] != key:
-                    known = (key, heat.jump(temperature, cycles, conductances))
-                end = known[1]
-                contact = (
-                    self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling * self.mu, contact)
-                )
-                state = end.state(self.mu * contact.pressure)
-                solved = Solved(contact, state, conductances)
-                same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
-                if warm:
-                    found.append(self.surfaces(state, contact.pressure, conductances).ravel())
+            conductances = heat.conductances(conducting(pressure))
+            key = conductances.tobytes()
+            if known is None or known[0] != key:
+                known = (key, heat.jump(temperature, cycles, conductances))
+            end = known[1]
+            contact = self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling(self.mu), contact)
+            state = end.state(self.mu * contact.pressure)
+            solved = Solved(contact, state, conductances)
+            same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
+            if warm:
+                found.append(self.surfaces(state, contact.pressure, conductances).ravel())
             if passing is not None:
                 found.extend(passing.depths(contact.pressure))
             if felt:
@@ -297,8 +289,9 @@ class Coupled:
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
         """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""
         shape = start.pressure.shape
-        if shape[1] <= MANY and shape[0] * shape[1] <= LARGE:
-            return solve(end.gap, end.coupling * self.mu, start)
+        few = shape[1] <= MANY and shape[0] * shape[1] <= LARGE
+        if few or not self.heat.dim:
+            return solve(end.gap, end.coupling(self.mu), start)
         contact = start
 
         def advance(x: Array) -> tuple[Array, ContactState, bool]:
@@ -312,34 +305,24 @@ class Coupled:
         try:
             return fixed_point(advance, start.pressure.ravel(), close, DISAGREE, depth=SMOOTH, team=self.system.team)
         except ConvergenceError:  # heat that is no small part
-            return solve(end.gap, end.coupling * self.mu, start)
+            return solve(end.gap, end.coupling(self.mu), start)
 
-    def at_friction(self) -> CycleHeat | None:
+    def at_friction(self) -> CycleHeat:
         """Return the heat of whole cycles at the friction last taken."""
-        if self.heat is None or self.system.friction.constant:
+        if self.system.friction.constant:
             return self.heat
-        return CycleHeat(self.heat.exchange.with_friction(self.mu))
+        return cycles_of(self.heat.exchange.with_friction(self.mu))
 
-    def surfaces(self, state: Array, pressure: Array, conductances: Array | None) -> Array:
+    def surfaces(self, state: Array, pressure: Array, conductances: Array) -> Array:
         """Return the contact temperatures of both bodies at the start of each phase (m, 2, n), K."""
-        heat = self.heat
-        if heat is None:
-            return np.zeros((0, 2, pressure.shape[1]))
-        starts = self.through(state, pressure, conductances)[:-1]
-        temperatures = heat.exchange.contact_temperatures
-        return np.array([temperatures(heat.exchange.at(one), phase - 1) for phase, one in enumerate(starts)])
+        exchange, starts = self.heat.exchange, self.through(state, pressure, conductances)[:-1]
+        return np.array(
+            [exchange.contact_temperatures(exchange.at(one), phase - 1) for phase, one in enumerate(starts)]
+        )
 
-    def through(self, state: Array, pressure: Array, conductances: Array | None) -> list[Array]:
-        """Return the temperatures (dim,) before, between and after the phases of a cycle.
-
-        Args:
-            state: Before.
-            pressure: Of the phases (m, n).
-            conductances: Of the phases (m, n), such as those of `Solved`.
-        """
-        if self.heat is None or conductances is None:
-            return [state]
-        return [state, *self.heat.cycle(conductances).states(state, self.mu * pressure)]
+    def through(self, state: Array, pressure: Array, conductances: Array) -> list[Array]:
+        """Return the temperatures (dim,) before, between and after the phases; arguments as of `CycleHeat.states`."""
+        return self.heat.states(state, self.mu * pressure, conductances)
 
     def _first_debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
         """Return the thickness of the debris that is looked for from: what there was before, or would be in the end."""

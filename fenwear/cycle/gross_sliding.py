@@ -113,10 +113,6 @@ class Jumps:
         self._half_cycles: HalfCycles | None = None
         stepper.system.team.serve(self)
 
-    def beginning(self) -> RunState:
-        """Return the unworn bodies at their initial temperature."""
-        return self.stepper.beginning()
-
     def prepare(self) -> None:
         """Make the steps of half-cycles; collective."""
         self._half_cycles = HalfCycles(self.system, self.stepper.watch, self.stepper.loading, implicit=True)
@@ -228,7 +224,7 @@ class GrossSliding:
             condensed = condense_bodies(placed)
         elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
             condensed = condensed.under_loads(bodies)
-        if system.exchange is None or case.heat is None:
+        if not system.exchange.conducts or case.heat is None:
             return joined(placed, condensed)
         if not conducts_alike or placed.motion != system.motion:
             return _with_heat_as(system, joined(placed, condensed))
@@ -241,7 +237,7 @@ class GrossSliding:
 
     def replicated(self, system: Tribosystem) -> bool:
         """Return whether every rank could go on alone."""
-        return system.exchange is None or system.exchange.reduced
+        return system.exchange.reduced
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""

@@ -16,7 +16,7 @@ from math import ceil
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block, HalfCycle
 from fenwear.cycle.driver import BLOCK, Jumps, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
-from fenwear.cycle.state import RunState
+from fenwear.cycle.state import RunState, beginning, on_exchange
 from fenwear.errors import CaseError, InputError
 
 LATE = 1.5  # times the wear from which on meshes follow, at most at the end of a jump of several cycles
@@ -60,13 +60,8 @@ def jump(
         raise CaseError(InputError("run.integration", message))
     watching = Watching(system.team, watch)
     step: Jumps = system.contact_law.jumps(system, tolerance, watching, loading)
-    exchange, state = step.system.exchange, start or step.beginning()
-    if exchange is not None and state.temperature is not None:
-        state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
-    if state.finer is not None and exchange is not None and state.finer.temperature is not None:
-        own = replace(state.finer, temperature=exchange.own(state.finer.temperature))
-        state = replace(state, finer=own)
-    elif finer and state.finer is None:
+    state = on_exchange(start or beginning(step.system), step.system.exchange)  # before rank 0 leads
+    if finer and state.finer is None:
         state = replace(state, finer=state)
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
     course = RunLimits(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)

@@ -136,10 +136,8 @@ def force_difference(system: Tribosystem, first: Array, second: Array) -> float:
 def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> float:
     """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
     exchange = system.exchange
-    if exchange is None or one.temperature is None or other.temperature is None:
-        return 0.0
     first, second, initial = (
-        np.array(exchange.contact_temperatures(t)) for t in (one.temperature, other.temperature, exchange.initial())
+        np.array(exchange.contact_temperatures(exchange.own(t))) for t in (one.temperature, other.temperature, None)
     )
     weights = system.pair.weights
     apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))

@@ -44,9 +44,10 @@ from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import ORDER, Estimate, area, estimated
-from fenwear.cycle.state import RunState, beginning, joined, parted, present
+from fenwear.cycle.state import RunState, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
+from fenwear.heat.field import HeatState
 from fenwear.layers import Evolution
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import NOTHING, WornDepths
@@ -64,7 +65,7 @@ ThroughCoatings = Callable[[WornDepths, float, Totals], tuple[WornDepths, Totals
 class _Stage:
     """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals.
 
-    Its conductances (m, n) are those by which it is heated; None without heat. What is worn through
+    Its conductances (m, n) are those by which it is heated. What is worn through
     coatings depends on where a step begins and how long it is: `coated` has that; None without.
     """
 
@@ -72,21 +73,21 @@ class _Stage:
     heated: Array
     worn: WornDepths
     adds: Totals
-    conductances: Array | None
+    conductances: Array
     coated: ThroughCoatings | None = None
 
 
 @dataclass(frozen=True)
 class _Moment:
-    """Depths, temperatures (dim,), None without heat, and totals."""
+    """Depths, temperatures (dim,) and totals."""
 
     worn: WornDepths
-    temperature: Array | None
+    temperature: Array
     totals: Totals
 
     def after(self, stage: _Stage, cycles: float) -> _Moment:
         """Return the moment so many cycles as that of a stage later."""
-        temperature = None if self.temperature is None else self.temperature + cycles * stage.heated
+        temperature = self.temperature + cycles * stage.heated
         lost, adds = stage.worn.times(cycles), stage.adds.times(cycles)
         if stage.coated is not None:
             own, adds = stage.coated(self.worn, cycles, adds)
@@ -171,10 +172,6 @@ class Stepper:
         laws = [law for law in system.sliding.wear if law is not None]
         self._wear_follows = follows or (self._follows and any(law.beta or law.energy for law in laws))
 
-    def beginning(self) -> RunState:
-        """Return the unworn bodies at their initial temperature."""
-        return beginning(self.system, None if self.coupled.heat is None else self.coupled.heat.exchange.initial())
-
     def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate, list[HalfCycle]]:
         """Return the state `cycles` cycles later, by two steps, an estimate of its error, and the last cycle.
 
@@ -239,12 +236,8 @@ class Stepper:
 
     def _apart(self, state: RunState, one: RunState, other: RunState, share: float) -> RunState:
         """Return a state, and a share of the difference of two others."""
-        heat, temperature = self.coupled.heat, state.temperature
-        if heat is not None and temperature and one.temperature and other.temperature:
-            base, first, second = (
-                heat.exchange.own(t).values for t in (temperature, one.temperature, other.temperature)
-            )
-            temperature = heat.exchange.at(base + share * (first - second))
+        exchange = self.coupled.heat.exchange
+        base, first, second = (exchange.own(own.temperature).values for own in (state, one, other))
         return RunState(
             state.half_cycle,
             self.system.layers.settled(state.worn + (one.worn - other.worn).times(share)),
@@ -252,7 +245,7 @@ class Stepper:
                 _between(own, first, second, share)
                 for own, first, second in zip(state.contacts, one.contacts, other.contacts, strict=True)
             ),
-            temperature,
+            self._temperature(base + share * (first - second)),
             state.totals + (one.totals - other.totals).times(share),
         )
 
@@ -276,11 +269,10 @@ class Stepper:
 
     def _rate(self, state: RunState, half_cycles: float) -> WornDepths:
         """Return what a cycle wears at the depths, temperatures and pressures of a state."""
-        system, surfaces = self.system, None
+        system, exchange = self.system, self.coupled.heat.exchange
         pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
         shear = system.ways.shear(pressures)
-        if self.coupled.heat is not None and state.temperature is not None:
-            surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
+        surfaces = exchange.contact_temperatures(exchange.own(state.temperature))
         conditions: Sequence[ContactConditions] = [
             system.conditions(k, pressure, surfaces, state.worn, half_cycles, shear)
             for k, pressure in enumerate(pressures)
@@ -332,19 +324,18 @@ class Stepper:
         return self._end(state, begin, last, cycles)
 
     def _moment(self, state: RunState) -> _Moment:
-        heat, temperature = self.coupled.heat, None
-        if heat is not None and state.temperature is not None:
-            temperature = heat.exchange.own(state.temperature).values
-        return _Moment(state.worn, temperature, state.totals)
+        return _Moment(state.worn, self.coupled.heat.exchange.own(state.temperature).values, state.totals)
+
+    def _temperature(self, values: Array) -> HeatState | None:
+        """Return the temperatures of coordinates (dim,); None of none."""
+        return self.coupled.heat.exchange.at(values) if len(values) else None
 
     def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
         """Return the end of a step whose last stage is solved."""
-        now, heat, temperature = before.after(last, cycles), self.coupled.heat, None
+        now = before.after(last, cycles)
         worn = self.system.layers.settled(now.worn)
-        if heat is not None and now.temperature is not None:
-            temperature = heat.exchange.at(now.temperature)
-            self._heated, self._conductances = last.heated, last.conductances
-        return RunState(state.half_cycle, worn, parted(last.contact), temperature, now.totals)
+        self._heated, self._conductances = last.heated, last.conductances
+        return RunState(state.half_cycle, worn, parted(last.contact), self._temperature(now.temperature), now.totals)
 
     def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
         """Return how depths follow in a stage where coefficients depend on them."""
@@ -376,16 +367,12 @@ class Stepper:
             before.temperature,
             cycles - 0.5,
             start,
-            lambda thermal, coupling, near: self._solve(
-                gap if thermal is None else gap + thermal, near, (before.worn, cycles), coupling
-            ),
+            lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
             self._passing(before.worn, cycles),
             lagged=True,
         )
         contact, begin = solved.contact, solved.temperature
-        heated: Array = np.zeros(0)
-        if begin is not None:
-            heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
+        heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
         flowed: Array | None = None
         if self._flowed is not None:
@@ -502,7 +489,7 @@ class Stepper:
 
     def _last_cycle_heat(self, state: RunState) -> list[HalfCycleHeat | None]:
         """Return the heat of the cycle that ends with the state."""
-        if self.coupled.heat is None or state.temperature is None:
+        if not self.coupled.heat.dim:
             return [None] * len(state.contacts)
         heats: list[HalfCycleHeat | None] = []
         exchange = self.coupled.heat.exchange
@@ -511,8 +498,8 @@ class Stepper:
             pressure = present(contact).pressure[0]
             conductance = exchange.conductance(pressure) if self._conductances is None else self._conductances[phase]
             temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
-            bulk = np.nan if temperature.bulk is None else temperature.bulk
-            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature, phase), terms, 1, bulk))
+            surfaces = exchange.contact_temperatures(temperature, phase)
+            heats.append(HalfCycleHeat(*surfaces, terms, 1, temperature.bulk))
         return heats
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import BLOCK, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
-from fenwear.cycle.state import RunState, beginning
+from fenwear.cycle.state import RunState, beginning, on_exchange
 
 
 def march(
@@ -41,10 +40,7 @@ def march(
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
         InterruptedRunError: as `watch`.
     """
-    exchange = system.exchange
-    state = start or beginning(system, None if exchange is None else exchange.initial())
-    if exchange is not None and state.temperature is not None:
-        state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
+    state = on_exchange(start or beginning(system), system.exchange)  # before rank 0 leads
     watching = Watching(system.team, watch)
     course = RunLimits(half_cycles, periodic_within, block, stops, leave, watching)
     step = system.contact_law.half_cycles(system, watching, loading, implicit=implicit)

@@ -61,7 +61,7 @@ def monotonic(system: Tribosystem, *, properties_within: float | None = None) ->
     """
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    unheated = replace(system, exchange=None)  # the heat of its motion is not asked for
+    unheated = replace(system, exchange=system.isothermal)  # the heat of its motion is not asked for
     found = [
         with_own_properties(unheated, partial(_one_way, d), lambda one: one.end, properties_within)[0]
         for d in DIRECTIONS

@@ -14,11 +14,11 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.onwards import Onwards
 from fenwear.cycle.state import pressure_scale
-from fenwear.cycle.thermal import ThermalContact
+from fenwear.cycle.thermal import ColdContact, ThermalContact
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.layers import LayerEvolution, LayerStep
+from fenwear.layers import LayerEvolution
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
 from fenwear.sliding.cross_shear import CycleShear
@@ -57,21 +57,20 @@ class PhaseStep:
         flows = implicit and system.layers.hardness < np.inf
         self._at_begin = PhaseStep(system, phase, implicit=False) if flows else None
         self._constant, self._load = system.constant_coefficients, 1.0
-        exchange = system.exchange
-        self._initial = None if exchange is None else exchange.initial()
         # Explicitly, wear and what remembers follow the pressure, and do not change it.
         friction, asks = system.friction, system.friction.asks
         apart = not self._constant and not implicit and not friction.remembers and not asks("edge")
         self._wears_after = apart and friction.constant
         self._slides_before = apart and not friction.constant and not asks("p", "pm")
-        follows = apart and exchange is None and asks("p", "pm")
+        follows = apart and not system.exchange.conducts and asks("p", "pm")
         self._contact = system.passed_contact(phase, following=follows)
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
-        self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
+        self._kind = ThermalContact if system.exchange.conducts else ColdContact
+        self._thermal = self._kind(system, phase, self._contact)
         conditions = system.conditions(phase)
         # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
         coated = any(own is not None for own in system.coatings)
-        more = coated or exchange is not None or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+        more = coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
         self._staying = None if more else conditions
         self._mu = system.friction.values(conditions)
         self._friction_ratio = system.phase_friction(phase, self._mu)
@@ -101,7 +100,7 @@ class PhaseStep:
         """Return the end of the phase.
 
         Args:
-            temperature: At its start; None without heat, or for the initial one.
+            temperature: At its start; None for the initial one.
             worn: Depths at its start.
             before: The same phase one cycle ago.
             load: Factor of all loads.
@@ -131,26 +130,24 @@ class PhaseStep:
         cycle: CycleShear | None,
     ) -> PhaseEnd:
         """Return the end of the phase, as `solve`."""
-        temperature = temperature or self._initial
+        begin = self.system.exchange.own(temperature)
         if load != self._load:
             self._contact.press(load)
             self._load = load
-        if self._thermal is not None and temperature is not None:
-            temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn, passing=True)
         start = (before if self._onwards is None else self._onwards.start(before)) or near
         if self._constant:
-            end = self._solve(temperature, gap, start, self._passing, worn)
+            end = self._solve(begin, gap, start, self._passing, worn)
             self._remember(before, end[0])
             return self._end(*end, before, self._passing, worn)
 
         near_pressure = None if start is None else start.pressure[0]
         touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
         if self._slides_before:  # friction is that of the state at the start
-            self._update(near_pressure, temperature, worn, half_cycles, cycle, touching=touching)
+            self._update(near_pressure, begin, worn, half_cycles, cycle, touching=touching)
         if self._wears_after or self._slides_before:
-            contact, after, heat = self._solve(temperature, gap, start, self._passing, worn)
-            passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
+            contact, after, heat = self._solve(begin, gap, start, self._passing, worn)
+            passing = self._update(contact.pressure[0], begin, worn, half_cycles, cycle, ended=True)
             self._remember(before, contact)
             return self._end(contact, after, heat, before, passing, worn)
 
@@ -167,15 +164,15 @@ class PhaseStep:
                 if self.system.edges is None:
                     passing = self._taken(mu.at(contact.pressure[0]), worn, ended=True)
                 else:
-                    passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
+                    passing = self._update(contact.pressure[0], begin, worn, half_cycles, cycle, ended=True)
                 self._remember(before, contact)
                 return self._end(contact, None, None, before, passing, worn)
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            passing = self._update(pressure, temperature, worn, half_cycles, cycle, touching=touching)
+            passing = self._update(pressure, begin, worn, half_cycles, cycle, touching=touching)
             try:
-                contact, after, heat = self._solve(temperature, gap, start, passing, worn)
+                contact, after, heat = self._solve(begin, gap, start, passing, worn)
             except ConvergenceError as error:
                 largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
                 raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
@@ -206,7 +203,7 @@ class PhaseStep:
         if self.system.layers.hardness == np.inf:
             return self._contact.solve(gap, start, self._passing.step(worn, implicit=self.implicit))
         solve = self._capped if self._contact.most < np.inf else partial(self._flowing, self._contact)
-        contact, _, _ = solve(None, gap, start, self._passing, worn)
+        contact, _, _ = solve(self.system.exchange.initial(), gap, start, self._passing, worn)
         return contact
 
     def _remember(self, before: ContactState | None, contact: ContactState) -> None:
@@ -217,7 +214,7 @@ class PhaseStep:
     def _update(
         self,
         pressure: Array | None,
-        temperature: HeatState | None,
+        temperature: HeatState,
         worn: WornDepths,
         half_cycles: float,
         cycle: CycleShear | None,
@@ -230,9 +227,7 @@ class PhaseStep:
         Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
         that touch, by default those that carry this pressure.
         """
-        surfaces = None
-        if self._thermal is not None and temperature is not None:
-            surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
+        surfaces = self.system.exchange.contact_temperatures(temperature, self.phase - 1)
         conditions = self._conditions(pressure, surfaces, worn, half_cycles, cycle, touching)
         return self._taken(conditions, worn, ended=ended)
 
@@ -271,8 +266,7 @@ class PhaseStep:
             self._friction_ratio = self._bare + mu[:, None] * self._along
             if not ended:
                 self._contact.slide([self._friction_ratio])
-                if self._thermal is not None:
-                    self._thermal.slide(heating_friction(system, mu, self.phase))
+                self._thermal.slide(heating_friction(system, mu, self.phase))
         wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
         ends = end if ended else None
         return LayerEvolution(system.layers, wear, self._lost(conditions), evolution, ends)
@@ -293,7 +287,7 @@ class PhaseStep:
 
     def _solve(
         self,
-        temperature: HeatState | None,
+        temperature: HeatState,
         gap: Array,
         start: ContactState | None,
         passing: LayerEvolution,
@@ -302,7 +296,7 @@ class PhaseStep:
         contact = self._contact
         if self.system.layers.hardness == np.inf:
             wearing = passing.step(worn, implicit=self.implicit)
-            return self._pressed(contact, self._thermal, temperature, gap, start, wearing)
+            return self._thermal.solve(temperature, gap, start, wearing)
         if isinstance(contact, CondensedContact) and contact.most < np.inf:
             try:
                 return self._capped(temperature, gap, start, passing, worn)
@@ -314,7 +308,7 @@ class PhaseStep:
 
     def _capped(
         self,
-        temperature: HeatState | None,
+        temperature: HeatState,
         gap: Array,
         start: ContactState | None,
         passing: LayerEvolution,
@@ -322,14 +316,14 @@ class PhaseStep:
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
         """Return the end of a phase whose contact lets no pressure beyond the hardness."""
         wearing = passing.step(worn, implicit=self.implicit, capped=True)
-        contact, after, heat = self._pressed(self._contact, self._thermal, temperature, gap, start, wearing)
+        contact, after, heat = self._thermal.solve(temperature, gap, start, wearing)
         self._flowed = self.system.layers.flowed(contact.pressure[0], contact.gap[0])
         return replace(contact, gap=contact.gap + self._flowed), after, heat
 
     def _flowing(
         self,
         solver: ContactSolver,
-        temperature: HeatState | None,
+        temperature: HeatState,
         gap: Array,
         start: ContactState | None,
         passing: LayerEvolution,
@@ -337,32 +331,18 @@ class PhaseStep:
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
         """Return the end of a phase whose contact flows by and by."""
         wearing, near, thermal = passing.step(worn, implicit=self.implicit), start, self._thermal
-        if thermal is not None and solver is not self._contact:
-            thermal = ThermalContact(self.system, thermal.exchange, self.phase, solver)
+        if solver is not self._contact:
+            thermal = self._kind(self.system, self.phase, solver)
             thermal.slide(heating_friction(self.system, self._mu, self.phase))
 
         def solve(flowed: Array) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
             nonlocal near
-            found = self._pressed(solver, thermal, temperature, gap + flowed, near, wearing)
+            found = thermal.solve(temperature, gap + flowed, near, wearing)
             near = found[0]
             return found
 
         found, self._flowed = self.system.layers.flowing(solve, lambda found: found[0].pressure)
         return found
-
-    def _pressed(
-        self,
-        solver: ContactSolver,
-        thermal: ThermalContact | None,
-        temperature: HeatState | None,
-        gap: Array,
-        start: ContactState | None,
-        wearing: LayerStep | None,
-    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        """Return contact, and the heat that goes with it."""
-        if thermal is None or temperature is None:
-            return solver.solve(gap, start, wearing), None, None
-        return thermal.solve(temperature, gap, start, wearing)
 
     def _end(
         self,

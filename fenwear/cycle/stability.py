@@ -115,7 +115,7 @@ def _factors(
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
-    dim = (0 if heat is None else heat.dim) + system.creep.size
+    dim = heat.dim + system.creep.size
     dim += 0 if system.layers.debris is None else len(system.pair.strip.weights) if system.layers.strip_carries else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
@@ -137,7 +137,7 @@ def explicit_growth(system: Tribosystem) -> float | None:
     half-cycle, so that explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit
     ones let disturbances grow, too, and where nothing can be told: without heat, or with laws that pass.
     """
-    if system.exchange is None or system.passing_laws:
+    if not system.exchange.conducts or system.passing_laws:
         return None
     even = np.full((len(system.motion.phases), len(system.pair.weights)), system.rigid.mean_pressure)
     try:
@@ -176,7 +176,7 @@ def _stationary_growth(
         heat, states = repeating_temperatures(system, pressure)
     except (CaseError, ConvergenceError) as error:
         return None, str(error)
-    if heat is not None and states:
+    if states:
         found = np.array(heat.exchange.contact_temperatures(states[phase], phase - 1))
         away = float(np.abs(found - surfaces).max())
         scale = float(np.abs(found - heat.exchange.heat.initial).max())
@@ -192,7 +192,7 @@ def _stationary_growth(
 
 def repeating_temperatures(
     system: Tribosystem, pressure: Array, conductances: Array | None = None
-) -> tuple[CycleHeat | None, list[HeatState]]:
+) -> tuple[CycleHeat, list[HeatState]]:
     """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
 
     None where no law and no conductance depends on the state: then any temperatures do.
@@ -201,9 +201,7 @@ def repeating_temperatures(
         ConvergenceError: there are none, or friction and the temperatures that it depends on do not come together.
     """
     heat = cycle_heat(system)
-    if heat is None:
-        return None, []
-    if system.constant_coefficients and heat.exchange.heat.conductance_per_pressure is None:
+    if not heat.dim or (system.constant_coefficients and not heat.exchange.by_pressure):
         return heat, []
     if conductances is None:
         conductances = heat.conductances(touching(pressure))
@@ -236,9 +234,7 @@ def repeating_temperatures(
     )
 
 
-def _rested(
-    system: Tribosystem, pressure: Array, heat: CycleHeat | None, states: Sequence[HeatState]
-) -> WornDepths | None:
+def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Sequence[HeatState]) -> WornDepths | None:
     """Return what laws remember, and debris, at rest at pressures and temperatures of the phases; None without.
 
     Raises:
@@ -248,7 +244,7 @@ def _rested(
     if layers.memory is None and layers.debris is None:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
-    if heat is not None and states:
+    if states:
         warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
     conditions = [
         system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))

@@ -12,6 +12,7 @@ from fenwear.assembly import Tribosystem, carried, node_maps, on_nodes
 from fenwear.contact import ContactState
 from fenwear.cycle.totals import Totals, none_yet
 from fenwear.errors import ConvergenceError
+from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import WornDepths
 
@@ -51,9 +52,15 @@ def with_phases(state: RunState | None, count: int) -> RunState | None:
     return replace(state, contacts=(None,) * count, periodic_phases=0, finer=with_phases(state.finer, count))
 
 
-def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:
-    """Return the unworn bodies at their initial temperature."""
+def beginning(system: Tribosystem, temperature: HeatState | None = None) -> RunState:
+    """Return the unworn bodies at a temperature, by default the initial one."""
     return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature, none_yet(system))
+
+
+def on_exchange(state: RunState, exchange: HeatExchange) -> RunState:
+    """Return the state with its temperatures on the bases of an exchange; collective."""
+    finer = None if state.finer is None else on_exchange(state.finer, exchange)
+    return replace(state, temperature=exchange.own(state.temperature) if exchange.conducts else None, finer=finer)
 
 
 def carried_by(state: RunState) -> Mask:

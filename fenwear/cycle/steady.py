@@ -210,7 +210,7 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
 
 def _check_sinks(system: Tribosystem) -> None:
     """Raise where a body loses heat nowhere; collective."""
-    if system.exchange is None or system.bodies.heat is None or system.heat is None:
+    if not system.exchange.conducts or system.bodies.heat is None or system.heat is None:
         return
     heat = system.heat
     shares = (heat.partition, 1 - heat.partition) if heat.conductance == 0 else (1.0, 1.0)
@@ -268,7 +268,7 @@ def _loads_oppose(system: Tribosystem) -> bool:
     return bool(along.status == 0 and -along.fun <= ALONG)
 
 
-def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | None]:
+def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
     """Return contact of all phases, with heat the temperatures, the heat of whole cycles, and what laws remember."""
     system = problem.system
     try:
@@ -290,10 +290,10 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | 
     if (capped := _no_state_under_cap(problem)) and _any_shape_stays(problem, contact):
         raise ConvergenceError(capped)
     coupled = Coupled(system, problem.take)
-    if coupled.heat is None and system.constant_coefficients:
-        return Solved(contact), None, None
-    initial = None if coupled.heat is None else coupled.heat.initial()
-    solved = coupled.solve(initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling))
+    heat = coupled.heat
+    if not heat.dim and system.constant_coefficients:
+        return Solved(contact, heat.initial(), heat.conductances(contact.pressure)), heat, None
+    solved = coupled.solve(heat.initial(), np.inf, contact, lambda gap, coupling, _: problem.solve(gap, coupling))
     return solved, coupled.at_friction(), coupled.held
 
 
@@ -328,7 +328,7 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
 
 
-def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, held: Held | None) -> SteadyState:
+def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: Held | None) -> SteadyState:
     system, contact = problem.system, solved.contact
     hardness, peak = system.layers.hardness, float(contact.pressure.max())
     if peak > hardness:
@@ -361,20 +361,18 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
         0.0,
-        None if heat is None else _steady_heat(heat, solved, middle),
+        _steady_heat(heat, solved, middle) if heat.dim else None,
         coordinates=system.pair.punch.x,
         system=system,
-        conductances=None if heat is None else solved.conductances,
+        conductances=solved.conductances,
         debris=system.passing(problem.wear, conditions=problem.conditions).resting(contact.pressure),
         crept=system.creep.depth(crept),
         states={} if held is None or system.layers.memory is None else system.layers.memory.by_name(held),
     )
 
 
-def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat | None:
+def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat:
     """Follow the temperatures through one cycle of the steady state."""
-    if solved.temperature is None or solved.conductances is None:
-        return None
     exchange, now = heat.exchange, heat.exchange.at(solved.temperature)
     punch, strip = [], []
     for phase in range(len(solved.conductances)):
@@ -505,8 +503,7 @@ def _along(system: Tribosystem, state: SteadyState, fraction: float, ends: tuple
     """Return the same by the jumps of a problem nearby, of which the last two are near to the level; collective."""
     phases = len(state.directions)
     goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
-    heat = None if system.exchange is None else system.exchange.initial()
-    start = replace(beginning(system, heat), jump_length=ends[-1])
+    start = replace(beginning(system), jump_length=ends[-1])
     stops = frozenset(phases * end for end in ends)
     blocks = jump(system, ends[-1] * phases, tolerance=np.inf, block=phases, start=start, stops=stops)
     *_, low, high = (_Passed.of(block, state) for block in blocks)

@@ -67,7 +67,7 @@ def steady_cycle(
 ) -> SteadyCycle:
     """Return the half-cycles of pressures (m, n) that repeat, with heat of conductances (m, n), on one process."""
     heat, rows = cycle_heat(system), []
-    if heat is not None:
+    if heat.dim:
         conducting = heat.conductances(touching(phase_pressure)) if conductances is None else conductances
         end = heat.jump(heat.initial(), np.inf, conducting)
         state = heat.exchange.at(end.state(phase_pressure))

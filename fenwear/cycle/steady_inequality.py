@@ -191,7 +191,7 @@ class SteadyInequality:
         self._known = (slopes, held, layer, equations.derivative(scaled, held))
         return self._known[3]
 
-    def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
+    def solve(self, thermal: Array | float = 0.0, coupling: Array | None = None) -> ContactState:
         """Return the contact of all phases, starting from the last solution.
 
         Args:
@@ -199,7 +199,7 @@ class SteadyInequality:
             coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
         """
         m, n = self.m, self.n
-        thermal, coupling = self._creep.opening(np.zeros((m, n)) if thermal is None else thermal, coupling)
+        thermal, coupling = self._creep.opening(np.zeros((m, n)) + thermal, coupling)
         self.offset = self._cold.copy()
         self.offset[: m * n] += thermal.ravel() / self.gap_scale
         if isinstance(self.equations, ShapeEquations) and (coupling is not None or self.equations.coupling is not None):

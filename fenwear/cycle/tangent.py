@@ -25,7 +25,7 @@ def phase_tangent(
     system: Tribosystem,
     phase: int,
     pressure: Array,
-    heat: CycleHeat | None = None,
+    heat: CycleHeat,
     state: HeatState | None = None,
     conductance: Array | None = None,
     *,
@@ -50,7 +50,7 @@ def phase_tangent(
         system: The assembled problem.
         phase: Its number in the cycle.
         pressure: During it (n,), MPa.
-        heat: Of cycles, at the friction there; None without heat.
+        heat: Of cycles, at the friction there.
         state: Temperatures at its start; None where nothing depends on them.
         conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
         implicit: Whether the wear is.
@@ -103,7 +103,7 @@ def lies_after(
     system: Tribosystem,
     phase: int,
     pressure: Array,
-    heat: CycleHeat | None,
+    heat: CycleHeat,
     state: HeatState | None,
     worn: WornDepths | None,
 ) -> WornDepths | None:
@@ -120,7 +120,7 @@ def _goes_on(
     laws: _Laws,
     phase: int,
     pressure: Array,
-    heat: CycleHeat | None,
+    heat: CycleHeat,
     state: HeatState | None,
     conductance: Array | None,
     *,
@@ -133,13 +133,12 @@ def _goes_on(
         start (dim, dim) and by the pressure (dim, n).
     """
     n, dim = laws.mu_s.shape
-    of_heat = 0 if heat is None else heat.dim
+    of_heat = heat.dim
     gap_rows, before_s, state_s, state_p = (np.zeros(shape) for shape in ((n, dim), (n, dim), (dim, dim), (dim, n)))
-    if heat is not None:
-        gap_rows[:, :of_heat] = heat.gap_rows[phase]
-        if conductance is None:
-            conductance = heat.exchange.conductance(pressure)
-        state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
+    gap_rows[:, :of_heat] = heat.gap_rows[phase]
+    if conductance is None:
+        conductance = heat.exchange.conductance(pressure)
+    state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
     if laws.lies is not None:
         state_p[of_heat:], state_s[of_heat:], reads = laws.lies
         (gap_rows if implicit else before_s)[:, of_heat:] = -reads
@@ -174,14 +173,12 @@ def _conditions(
     system: Tribosystem,
     phase: int,
     pressure: Array,
-    heat: CycleHeat | None,
+    heat: CycleHeat,
     state: HeatState | None,
     worn: WornDepths | None,
 ) -> ContactConditions:
     """Return the conditions of a phase, at temperatures and with what lies between at its start."""
-    surfaces = None
-    if heat is not None and state is not None:
-        surfaces = heat.exchange.contact_temperatures(state, phase - 1)
+    surfaces = None if state is None else heat.exchange.contact_temperatures(state, phase - 1)
     return system.conditions(phase, pressure, surfaces, worn)
 
 
@@ -189,7 +186,7 @@ def _laws(
     system: Tribosystem,
     phase: int,
     pressure: Array,
-    heat: CycleHeat | None,
+    heat: CycleHeat,
     state: HeatState | None,
     worn: WornDepths | None = None,
 ) -> _Laws:
@@ -212,7 +209,7 @@ def _laws(
     mu_p, *mu_t = _slopes(friction, around)
     by_depths = _slopes(depths, around)
     worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
-    picked, rate = _picked(heat, phase, n), heating_friction(system, np.ones(n), phase)
+    picked, rate = _picked(heat, phase), heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
     if not lies:
@@ -300,10 +297,8 @@ def _heated(
     return changes, by_pressure
 
 
-def _picked(heat: CycleHeat | None, phase: int, n: int) -> Array:
+def _picked(heat: CycleHeat, phase: int) -> Array:
     """Return the rows that pick the temperatures of both surfaces at the start of a phase (2, n, dim)."""
-    if heat is None:
-        return np.zeros((2, n, 0))
     return np.array(heat.exchange.contact_changes(np.eye(heat.dim), phase - 1))
 
 

@@ -18,7 +18,6 @@ from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState, WearCompliance
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
-from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import HeatState
 from fenwear.parallel import agreed
 
@@ -43,13 +42,12 @@ class ThermalContact:
 
     Args:
         system: The assembled problem, with heat.
-        exchange: The bodies' temperatures.
         phase: Which phase.
         contact: Its contact.
     """
 
-    def __init__(self, system: Tribosystem, exchange: HeatExchange, phase: int, contact: ContactSolver) -> None:
-        self.system, self.exchange, self.phase = system, exchange, phase
+    def __init__(self, system: Tribosystem, phase: int, contact: ContactSolver) -> None:
+        self.system, self.exchange, self.phase = system, system.exchange, phase
         self._contact = contact
         self._response: _Response | None = None
         self._asked, self._repeats = b"", 0  # conductances asked for last, and how often in a row
@@ -77,8 +75,7 @@ class ThermalContact:
         """
         if start is None:
             start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, wearing)
-        heat = self.system.heat
-        if heat is not None and heat.coupling == "split":
+        if self.exchange.heat.coupling == "split":
             return self._split(temperature, gap, start, wearing)
         return self._implicit(temperature, gap, start, wearing)
 
@@ -116,8 +113,7 @@ class ThermalContact:
         known, key = self._response, conductance.tobytes()
         self._repeats = self._repeats + 1 if key == self._asked else 0
         self._asked = key
-        heat = self.system.heat
-        costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
+        costly = self.exchange.by_pressure or self.exchange.heat.operator == "full"
         near = known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT))
         if known is not None and agreed(self.system.comm, near):
             return known
@@ -128,8 +124,8 @@ class ThermalContact:
     def _split(
         self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
     ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
-        exchange, heat = self.exchange, self.system.heat
-        relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
+        exchange = self.exchange
+        relaxation, tolerance = exchange.heat.relaxation, exchange.heat.split_tolerance
         contact, pressure, volume = start, start.pressure[0], np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
             closed = np.where(contact.pressure[0] > 0, pressure, 0.0)  # relaxed pressures never get to zero
@@ -151,7 +147,27 @@ class ThermalContact:
 
     def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
         punch, strip = self.exchange.contact_temperatures(state, self.phase)
-        return HalfCycleHeat(punch, strip, terms, iterations, np.nan if state.bulk is None else state.bulk)
+        return HalfCycleHeat(punch, strip, terms, iterations, state.bulk)
+
+
+class ColdContact:
+    """Contact in one phase of bodies without heat; methods as of `ThermalContact`."""
+
+    def __init__(self, system: Tribosystem, phase: int, contact: ContactSolver) -> None:  # noqa: ARG002
+        self._contact = contact
+
+    def slide(self, mu: Array) -> None:
+        """Set the friction of the nodes, which heats nothing."""
+
+    def solve(
+        self,
+        temperature: HeatState,  # noqa: ARG002
+        gap: Array,
+        start: ContactState | None,
+        wearing: WearCompliance | None,
+    ) -> tuple[ContactState, None, None]:
+        """Return contact, and no heat."""
+        return self._contact.solve(gap, start, wearing), None, None
 
 
 def gap_volume(system: Tribosystem, gap: Array) -> float:

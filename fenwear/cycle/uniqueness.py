@@ -50,7 +50,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
         ConvergenceError: contact without heat did not converge.
     """
     exchange, positions = system.exchange, system.motion.positions
-    if exchange is None or system.sticks:  # there every time step tells whether its answer is the only one near
+    if not exchange.conducts or system.sticks:  # there every time step tells whether its answer is the only one near
         return None
     found = [0.0]
     for phase in range(positions // 2, len(system.motion.phases), positions):
@@ -73,7 +73,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
 def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: HeatState | None) -> Array:
     """Return the largest d(mu p)/dp of each node from no pressure to the largest one (n,)."""
     exchange, friction = system.exchange, system.friction
-    surfaces = None if state is None or exchange is None else exchange.contact_temperatures(state, phase - 1)
+    surfaces = exchange.contact_temperatures(exchange.own(state), phase - 1)
     conditions = system.conditions(phase, pressure, surfaces)
     if not friction.asks("p", "pm"):
         return friction.values(conditions)
@@ -99,8 +99,6 @@ def opened_by_heat(
         For each unit at the k nodes in contact (n, k), over the interface's elastic length, as the contact is scaled.
     """
     exchange = system.exchange
-    if exchange is None:
-        return np.zeros((len(pressure), int((pressure > 0).sum())))
     if slope is not None:
         heating = [heating_friction(system, slope, k) for k in range(len(system.motion.phases))]
         exchange = exchange.with_friction(np.array(heating))
@@ -108,8 +106,8 @@ def opened_by_heat(
     conductance, rise = exchange.conductance(pressure), exchange.conductance_slope(pressure)
     changes, _ = exchange.change(phase, conductance, pressure=unit)
     if state is not None and rise.any():
-        own = exchange if system.exchange is None else system.exchange
-        changes = changes + (own.by_conductance(phase, state, pressure, conductance) * rise)[:, pressure > 0]
+        by_rise = system.exchange.by_conductance(phase, state, pressure, conductance) * rise
+        changes = changes + by_rise[:, pressure > 0]
     return np.asarray(exchange.gap_change(changes, phase) / system.interfaces[phase].elastic_length)
 
 

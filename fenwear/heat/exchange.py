@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -71,6 +71,8 @@ class HeatExchange:
         thickness: Of the plane model, mm.
     """
 
+    conducts = True
+
     def __init__(
         self,
         heat: Heat,
@@ -80,7 +82,7 @@ class HeatExchange:
         weights: Array,
         thickness: float,
     ) -> None:
-        self.heat, self.sides, self.plans = heat, sides, plans
+        self.heat, self.sides, self.plans, self.bases = heat, sides, plans, _bases(sides)
         self.friction, self.weights, self.thickness = friction, weights, thickness
         self._steady = np.isinf(plans[0][0].duration)
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
@@ -142,18 +144,13 @@ class HeatExchange:
         other._forget()
         return other
 
-    @cached_property
-    def bases(self) -> tuple[Basis, Basis]:
-        """The bases of the coordinates of punch and strip."""
-        return self.sides[0].field.basis, self.sides[1].field.basis
-
     def initial(self) -> HeatState:
         """Return the initial state."""
         return self._initial or self.own(HeatState.nodal(*self._unheated()))
 
-    def own(self, state: HeatState) -> HeatState:
-        """Return the state on this exchange's bases; collective where it is on others."""
-        return state.on(self.bases)
+    def own(self, state: HeatState | None) -> HeatState:
+        """Return a state, by default the initial one, on this exchange's bases; collective where it is on others."""
+        return self.initial() if state is None else state.on(self.bases)
 
     def at(self, values: Array) -> HeatState:
         """Return the state of coordinates (dim,) on this exchange's bases."""
@@ -210,9 +207,14 @@ class HeatExchange:
             value[pressure <= 0] = np.nan
         return value
 
+    @property
+    def by_pressure(self) -> bool:
+        """Whether h_c depends on the pressure."""
+        return self.of_layer is not None or self.heat.conductance_per_pressure is not None
+
     def conductance_slope(self, pressure: Array) -> Array:
         """Return dh_c/dp of each node (n,), N/(mm s K MPa): zero where h_c is constant or none conducts."""
-        if self.of_layer is None and self.heat.conductance_per_pressure is None:
+        if not self.by_pressure:
             return np.zeros_like(pressure)
         ends = [self.conductance((1 + sign * SLOPE) * pressure) for sign in (1, -1)]
         return np.divide(ends[0] - ends[1], 2 * SLOPE * pressure, out=np.zeros_like(pressure), where=pressure > 0)
@@ -574,6 +576,74 @@ class HeatExchange:
         first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
         heat = self.heat
         return Exchanged((first, second), conductance, heat.convection, heat.partition, heat.debris)
+
+
+def _bases(sides: Sequence[Side]) -> tuple[Basis, ...]:
+    """Return the bases of the coordinates of punch and strip."""
+    return tuple(side.field.basis for side in sides)
+
+
+class Isothermal(HeatExchange):
+    """Bodies without heat, at one temperature: no coordinates, no gaps, nothing that conducts.
+
+    Args:
+        phases, nodes: Of the motion, and of the contact.
+        temperature: Of both bodies, K.
+    """
+
+    conducts = False
+    by_pressure = False
+
+    def __init__(self, phases: int, nodes: int, temperature: float) -> None:
+        self.plans: list[list[StepPlan]] = [[] for _ in range(phases)]
+        self.bases, self.friction = (), np.zeros((phases, nodes))
+        self.fineness = None
+        self._initial, self._surface = HeatState((), np.zeros(0)), np.full(nodes, temperature)
+
+    @property
+    def reduced(self) -> bool:
+        """Whether every rank could go on alone: it has no temperatures of all nodes."""
+        return True
+
+    def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:  # noqa: ARG002
+        """Return the same: nothing conducts."""
+        return self
+
+    def own(self, state: HeatState | None) -> HeatState:  # noqa: ARG002
+        """Return the initial state, which is the only one."""
+        return self.initial()
+
+    def gap(self, state: HeatState, phase: int = -1) -> Array:  # noqa: ARG002
+        """Return the gap that expansion opens (n,), mm: none."""
+        return np.zeros(len(self._surface))
+
+    def gap_change(self, changes: Array, phase: int = -1) -> Array:  # noqa: ARG002
+        """Return the gap of changes of no coordinates (0, k), mm: none."""
+        return np.zeros((len(self._surface), changes.shape[1]))
+
+    def contact_temperatures(self, state: HeatState, phase: int = -1) -> tuple[Array, Array]:  # noqa: ARG002
+        """Return the temperatures of both surfaces (n,), K."""
+        return self._surface, self._surface
+
+    def contact_changes(self, changes: Array, phase: int = -1) -> tuple[Array, Array]:
+        """Return the changes of both by changes of no coordinates (0, k): none."""
+        none = self.gap_change(changes, phase)
+        return none, none
+
+    def conductance(self, pressure: Array) -> Array:
+        """Return h_c of each node (n,), N/(mm s K): none."""
+        return np.zeros(len(pressure))
+
+    def change(
+        self,
+        phase: int,  # noqa: ARG002
+        conductance: Array,  # noqa: ARG002
+        changes: Array | None = None,
+        pressure: Array | None = None,
+    ) -> tuple[Array, Array]:
+        """Return the changes of no coordinates (0, k) and of the heat terms: none."""
+        columns = next((a.shape[1] for a in (changes, pressure) if a is not None), 0)
+        return np.zeros((0, columns)), np.zeros((len(TERMS) + len(CROSSING), columns))
 
 
 def _down(further: int, constants: Array) -> Array:

@@ -132,14 +132,14 @@ class HeatState:
     """The temperatures of both bodies, with what gives them meaning.
 
     Attributes:
-        bases: Of the punch and of the strip.
+        bases: Of the punch and of the strip; none of bodies that stay at their initial temperature.
         values: Coordinates on the punch's and then on the strip's basis.
         told: What is on its way back on a closed track, see `track`, where no basis has it; None for the initial state.
         surfaces: Temperatures of both contact surfaces at the interface nodes (n,), K, at the end of a step: a basis
             may leave out what fades within one. None where the coordinates say all.
     """
 
-    bases: tuple[Basis, Basis]
+    bases: tuple[Basis, ...]
     values: Array
     told: Array | None = None
     surfaces: tuple[Array, Array] | None = None
@@ -152,9 +152,9 @@ class HeatState:
         return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)), track)
 
     @property
-    def bulk(self) -> float | None:
-        """Temperature of the bulk of the strip's closed track, K; None where there is none, or for the initial one."""
-        return None if self.track is None else float(self.track[:, -1].mean())
+    def bulk(self) -> float:
+        """Temperature of the bulk of the strip's closed track, K; NaN where there is none, or for the initial one."""
+        return np.nan if self.track is None else float(self.track[:, -1].mean())
 
     @property
     def track(self) -> Array | None:
@@ -172,7 +172,7 @@ class HeatState:
         punch, strip = (basis.body.function(t) for basis, t in zip(self.bases, self.temperatures(), strict=True))
         return punch, strip
 
-    def on(self, bases: tuple[Basis, Basis]) -> HeatState:
+    def on(self, bases: tuple[Basis, ...]) -> HeatState:
         """Return the same temperatures, or the nearest there are, on other bases; collective, or while one leads."""
         if all(one is other for one, other in zip(self.bases, bases, strict=True)):
             return self

@@ -24,7 +24,7 @@ KEPT, MEMORY = 8, 10**9  # cycles of different conducting nodes that are kept, a
 
 def cycle_memory(exchange: HeatExchange) -> float:
     """Return the bytes that the maps of a cycle's steps take, and what they are made of, for one set of nodes."""
-    dim, n, phases = sum(len(basis) for basis in exchange.bases), len(exchange.weights), len(exchange.plans)
+    dim, (phases, n) = sum(len(basis) for basis in exchange.bases), exchange.friction.shape
     kinds = [{(plan.punch, plan.strip) for plan in plans} for plans in exchange.plans]
     maps, prepared = sum(map(len, kinds)), len(set[tuple[int, int]]().union(*kinds))
     return 8.0 * dim * (maps * (dim + n) + prepared * (dim + 2 * n) + (2 * phases + 1) * dim)
@@ -192,10 +192,13 @@ class CycleJump:
         """The thermal gaps without pressure."""
         return self.gaps(np.zeros((len(self._cycle.maps), len(self._gap_constants[0]))))
 
-    @property
-    def coupling(self) -> Array:
-        """Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa."""
-        return self._end.coupling(self._cycle, self._gap_rows)
+    def coupling(self, factors: Array) -> Array | None:
+        """Return the thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa; None for none.
+
+        Args:
+            factors: What pressures are multiplied by for the heat (m, n).
+        """
+        return self._end.coupling(self._cycle, self._gap_rows) * factors
 
 
 class CycleHeat:
@@ -233,6 +236,16 @@ class CycleHeat:
             self._cycles[key] = Cycle([self._phase_map(phase, conductances[phase]) for phase in range(m)])
         return self._cycles[key]
 
+    def states(self, state: Array, pressure: Array, conductances: Array) -> list[Array]:
+        """Return the states (dim,) before, between and after the phases of a cycle.
+
+        Args:
+            state: Before.
+            pressure: Of the phases (m, n), MPa.
+            conductances: Of the phases (m, n).
+        """
+        return [state, *self.cycle(conductances).states(state, pressure)]
+
     def _phase_map(self, phase: int, conductance: Array) -> PhaseMap:
         exchange = self.exchange
         maps: dict[tuple[int, int], StepMap] = {}
@@ -247,3 +260,44 @@ class CycleHeat:
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
         return CycleJump(state, self.cycle(conductances), cycles, self.gap_rows, self._gap_constants)
+
+
+class ColdJump(CycleJump):
+    """A jump of bodies without heat: no coordinates, no gaps."""
+
+    def __init__(self, phases: int, nodes: int) -> None:
+        self._none = np.zeros((phases, nodes))
+
+    def state(self, pressure: Array) -> Array:  # noqa: ARG002
+        """Return the state at its end: no coordinates."""
+        return np.zeros(0)
+
+    def gaps(self, pressure: Array) -> Array:  # noqa: ARG002
+        """Return the thermal gap at the end of each phase (m, n), mm: none."""
+        return self._none
+
+    @property
+    def gap(self) -> Array:
+        """The thermal gaps without pressure: none."""
+        return self._none
+
+    def coupling(self, factors: Array) -> Array | None:  # noqa: ARG002
+        """Return no coupling."""
+        return None
+
+
+class ColdCycles(CycleHeat):
+    """Cycles of bodies without heat."""
+
+    def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:  # noqa: ARG002
+        """Return the end of cycles."""
+        return ColdJump(*conductances.shape)
+
+    def states(self, state: Array, pressure: Array, conductances: Array) -> list[Array]:  # noqa: ARG002
+        """Return no coordinates before, between and after the phases."""
+        return [state] * (len(pressure) + 1)
+
+
+def cycles_of(exchange: HeatExchange) -> CycleHeat:
+    """Return the heat of whole cycles."""
+    return (CycleHeat if exchange.conducts else ColdCycles)(exchange)

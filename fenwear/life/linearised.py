@@ -23,6 +23,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import ConvergenceError
+from fenwear.heat.periodic import CycleJump
 from fenwear.life.model import Snapshot, steady_snapshot
 from fenwear.sliding.pressure_law import PressureLaw
 
@@ -31,13 +32,12 @@ def differentiable(system: Tribosystem) -> bool:
     """Return whether the equations above are all there is: constant coefficients and conductances."""
     if system.sticks:
         return False
-    heat = system.heat
     if system.layers.closure is not None:
         return False
     laws = [law for law in system.sliding.wear if law is not None]
     if not all(PressureLaw.of(law).power for law in laws):
         return False
-    return system.constant_coefficients and (heat is None or heat.conductance_per_pressure is None)
+    return system.constant_coefficients and not system.exchange.by_pressure
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,8 @@ class SteadyTangent:
         for k, (own, ratio) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
             gaps[k, :, k] = own.compliance(ratio).matrix()
             balance[k, :, k] = own.rigid.equilibrium(ratio)
-        heat = cycle_heat(system)
-        if heat is not None:
-            gaps += heat.jump(heat.initial(), np.inf, heat.conductances(closed.astype(float))).coupling
+        by_heat = _heat_at_rest(system, closed).coupling(np.ones((m, n)))
+        gaps += 0.0 if by_heat is None else by_heat
         left, right = system.phases_wear.border(self.state.pressure)
         wear = np.einsum("iq,kqj->ikj", left[0], right)
         by_pressure = np.concatenate([
@@ -167,8 +166,7 @@ class SteadyTangent:
         """Return the steady state of a system nearby, where the state has moved by factor times a step."""
         state = self.state.plus(step, factor)
         velocity = {name: float(part) for name, part in zip(system.rigid.mode_names, state.velocity, strict=True)}
-        heat = cycle_heat(system)
-        conductances = None if heat is None else heat.conductances(self.closed.astype(float))
+        conductances = cycle_heat(system).conductances(self.closed.astype(float))
         return steady_snapshot(system, state.pressure, velocity, conductances)
 
 
@@ -187,8 +185,10 @@ def _gaps(system: Tribosystem, state: _Unknown, closed: Mask) -> Array:
             )
         ]
     )
+    return gaps + _heat_at_rest(system, closed).gaps(state.pressure) + state.shape
+
+
+def _heat_at_rest(system: Tribosystem, closed: Mask) -> CycleJump:
+    """Return the heat of cycles that repeat, in which closed nodes (m, n) conduct."""
     heat = cycle_heat(system)
-    if heat is not None:
-        end = heat.jump(heat.initial(), np.inf, heat.conductances(closed.astype(float)))
-        gaps += end.gap + np.einsum("kilj,lj->ki", end.coupling, state.pressure)
-    return gaps + state.shape
+    return heat.jump(heat.initial(), np.inf, heat.conductances(closed.astype(float)))

@@ -199,7 +199,7 @@ class Model:
         def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
             start = reached
             if course is not None:
-                start = start or beginning(on, None if on.exchange is None else on.exchange.initial())
+                start = start or beginning(on)
                 start = replace(start, jump_length=ONE_STEP)
             return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
 

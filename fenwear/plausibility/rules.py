@@ -398,7 +398,7 @@ def coarse_heat_basis(seen: Seen) -> Fields:
 
 def fineness_of(system: Tribosystem) -> Fineness | None:
     """Return how fine the steps and the basis of a system's heat are; None without heat."""
-    return None if system.exchange is None else system.exchange.fineness
+    return system.exchange.fineness
 
 
 def unstable_speed(seen: Seen) -> Fields:

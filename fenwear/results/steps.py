@@ -82,7 +82,7 @@ def of_time_steps(function: Callable[[S], dict[str, T]]) -> Callable[[S], dict[s
 @of_time_steps
 def variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of time steps of a system whose law resolves them; none of others."""
-    found = {**VARIABLES, **({} if system.exchange is None else HEAT_VARIABLES)}
+    found = {**VARIABLES, **(HEAT_VARIABLES if system.exchange.conducts else {})}
     if system.pair.punch.dim == 3:
         found = {**{name: one for name, one in found.items() if name not in IN_SOLIDS}, **of_solids()}
     if any(system.sliding.field.turn):

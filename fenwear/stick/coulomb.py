@@ -36,7 +36,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.gross_sliding import LAW as SLIDING
-from fenwear.cycle.state import RunState, beginning
+from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
@@ -163,7 +163,7 @@ class Coulomb:
 
     def replicated(self, system: Tribosystem) -> bool:
         """Return whether every rank could go on alone."""
-        return system.exchange is None or system.exchange.reduced
+        return system.exchange.reduced
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
@@ -256,7 +256,7 @@ def system_of(
         if touches(problem):
             problem, fineness = fine_enough(problem, case)
             ends = fineness.ends
-    exchange = None if problem.heat is None else problem.heat.exchange
+    exchange = system.exchange if problem.heat is None else problem.heat.exchange
     setup = StickSetup(problem, fineness, _told_apart(case, bodies), ends, heat != "none")
     return replace(system, exchange=exchange, law_state=setup)
 
@@ -288,15 +288,10 @@ class _Run:
         self.strokes = system.motion.half_cycles
         self.meter = Meter(system, self.problem)
 
-    def beginning(self) -> RunState:
-        """Return the unworn bodies at their initial temperature."""
-        exchange = self.system.exchange
-        return beginning(self.system, None if exchange is None else exchange.initial())
-
     def temperature(self, state: RunState) -> Array | None:
         """Return the temperatures of a state on this system's bases (dim,)."""
         exchange = self.system.exchange
-        return None if exchange is None or state.temperature is None else exchange.own(state.temperature).values
+        return exchange.own(state.temperature).values if exchange.conducts else None
 
     def at(self, state: RunState, load: float) -> PartialSlipState:
         """Return where the time steps of a state are, with its own depths and temperatures."""
@@ -381,9 +376,7 @@ class HalfCycles(_Run):
         record = self.half_cycle(number, steps, (worn, totals), adds, load)
         contacts = list(state.contacts)
         contacts[stroke] = record.phases[0].contact
-        warm, exchange = state.temperature, self.system.exchange
-        if exchange is not None and at.temperature is not None:
-            warm = exchange.at(at.temperature)
+        warm = None if at.temperature is None else self.system.exchange.at(at.temperature)
         memory = Memory(
             replace(at, worn=worn, held=None, temperature=None), stuck=stuck.astype(float), made_of=self.setup.made_of
         )
@@ -440,7 +433,7 @@ class Jumps(_Run):
             made.append(record)
         warm = state.temperature
         after: tuple[HeatState, ...] = ()
-        if exchange is not None and then.warm is not None and then.end.temperature is not None:
+        if then.warm is not None and then.end.temperature is not None:
             warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
         kept = replace(then, end=replace(then.end, temperature=None), warm=None, finer=None)
         memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.made_of)
@@ -473,7 +466,7 @@ class Jumps(_Run):
         load = self._load(number)
         if cycle is None or memory is None or memory.made_of != self.setup.made_of or cycle.end.load != load:
             return first_cycle(self.problem, self.at(state, load), state.worn, number, self.temperature(state))
-        if exchange is None:
+        if not exchange.conducts:
             return cycle
         (after,) = memory.warm
         end = replace(cycle.end, temperature=exchange.own(after).values)

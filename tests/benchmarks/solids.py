@@ -131,7 +131,6 @@ def with_heat(asked: argparse.Namespace) -> None:
         hot = elastic(place_case(describe(asked.elements, heat=True)), fresh=asked.fresh)
     with timed("with heat: steps on a reduced basis"):
         hot = with_exchange(hot, reduced=True)
-    assert hot.exchange is not None
     first, second = (len(basis) for basis in hot.exchange.bases)
     say(f"{'':52} {first} and {second} temperatures")
     with timed("with heat: 2,000 half-cycles by jumps"):

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, march, steady
 from fenwear.cycle import Block, decay_rates, evolve, growth_rate
+from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import present
 from fenwear.cycle.tangent import phase_tangent
 from fenwear.results.reading import load_history
@@ -151,7 +152,7 @@ def test_growth_rates_see_creep(load: str) -> None:
     changed = ends[1].end.worn - ends[0].end.worn
     tangent = np.eye(len(state) + len(worn))
     for phase, pressure in enumerate(ends[0].pressure):
-        tangent = phase_tangent(system, phase, pressure) @ tangent
+        tangent = phase_tangent(system, phase, pressure, cycle_heat(system)) @ tangent
     expected = tangent @ np.concatenate([state, worn])
     assert np.abs(changed.crept - expected[: len(state)]).max() < 1e-6 * 1e-9
     assert np.abs(changed.punch - expected[len(state) :]).max() < 1e-6 * 1e-9

@@ -237,7 +237,6 @@ def test_maps_of_heat_that_do_not_fit_are_refused(
 ) -> None:
     """Before they are made; told are the bytes of the maps and of what they are made of, about as much."""
     system = with_reduced_heat(assembled("example1-heat", "geometry.degree=2"))
-    assert system.exchange is not None
     heat = CycleHeat(system.exchange)
     phases, n = len(system.motion.phases), len(system.pair.weights)
     maps = {id(one): one for phase in heat.cycle(np.ones((phases, n))).maps for one, _ in phase.steps}

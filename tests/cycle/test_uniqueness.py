@@ -32,7 +32,6 @@ HALF_CYCLES = 200
 def dense(system: Tribosystem) -> tuple[Array, Array, Array, Array]:
     """Return S + Theta, S, H and E of full contact, made column by column from the compliance and the heat."""
     n, interface, exchange = len(system.pair.weights), system.interface, system.exchange
-    assert exchange is not None
     uniform = np.full(n, system.rigid.mean_pressure)
     states, _ = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
     ratio = system.friction_ratio(1)
@@ -81,7 +80,6 @@ def test_the_gain_is_of_the_tangent_where_friction_depends_on_pressure(
 
     def determinant(own: Tribosystem, *, heated: bool) -> float:
         phase, exchange = own.motion.positions // 2, own.exchange
-        assert exchange is not None
         rigid = own.interfaces[phase].rigid
 
         def force(pressure: Array) -> Array:
@@ -227,7 +225,6 @@ def test_of_a_program_the_worst_stage_is_told(tmp_path: Path) -> None:
     told = []
     for stage in stages_of(case):
         system = at_stage(assemble(case), stage)
-        assert system.exchange is not None
         assert system.exchange.fineness is not None
         told.append(system.exchange.fineness.difference)
     assert difference == pytest.approx(max(told), rel=1e-6)

@@ -227,9 +227,6 @@ def test_uniform_warmth_is_other_constants(edited: Edited) -> None:
     unit = 1e-3 * max(np.abs(its).max(initial=0) for its in answers)  # loads of free bodies leave rounding alone
     for own, its in zip(hot.condensed.punch.arrays().values(), answers, strict=True):
         np.testing.assert_allclose(own, its, atol=1e-9 * max(np.abs(its).max(initial=0), unit))
-    assert hot.exchange is not None
-    assert other.exchange is not None
-    assert cold.exchange is not None
     np.testing.assert_allclose(hot.exchange.gap(at), other.exchange.gap(at), rtol=1e-8)
     assert np.abs(hot.exchange.gap(at) / cold.exchange.gap(at) - 1).max() > 0.05
     (one,), (two,) = march(hot, 1), march(other, 1)

@@ -148,7 +148,6 @@ def test_a_source_that_goes_round() -> None:
     """A strip that goes round under a square punch is as warm as the half-space, at every node but those of the rim."""
     system = assemble(round_case())
     exchange, pressure = system.exchange, np.ones(len(system.pair.weights))
-    assert exchange is not None
     state = exchange.initial()
     for phase in range(6):
         state, _ = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
@@ -183,7 +182,6 @@ def test_a_shaft_that_turns_round() -> None:
     fixed = steady_exchange(through, [speed])
     state, _ = fixed.half_cycle(fixed.initial(), 0, pressure, fixed.conductance(pressure))
     expected = fixed.contact_temperatures(state)[1]
-    assert own.exchange is not None
     heat, every = CycleHeat(own.exchange), np.tile(pressure, (rows, 1))
     end = heat.jump(heat.initial(), np.inf, heat.conductances(every))
     found = own.exchange.contact_temperatures(own.exchange.at(end.state(every)))[1]

@@ -11,6 +11,7 @@ from combinations import SMALL, STICK
 from fenwear import Tribosystem, assemble, load_case, steady
 from fenwear.arrays import Array
 from fenwear.cycle import Block, evolve, growth_rate, march
+from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState
 from fenwear.cycle.tangent import lies_after, phase_tangent
 from fenwear.errors import CaseError
@@ -199,10 +200,11 @@ def test_growth_rates_follow_what_the_strip_carries(laws: tuple[str, ...], way: 
         return list(march(system, 100 + strokes, implicit=implicit, start=moved))[-1].end
 
     predicted, known, contacts = np.eye(lies + n), worn, cycle(np.zeros(lies + n)).contacts
+    heat = cycle_heat(system)
     for phase in phases:
         pressure = contacts[phase].pressure[0]
-        predicted = phase_tangent(system, phase, pressure, implicit=implicit, worn=known) @ predicted
-        known = lies_after(system, phase, pressure, None, None, known)
+        predicted = phase_tangent(system, phase, pressure, heat, implicit=implicit, worn=known) @ predicted
+        known = lies_after(system, phase, pressure, heat, None, known)
     change = 1e-9 * np.sin(np.arange(lies + n) ** 2)
     ends = [cycle(sign * change).worn for sign in (1.0, -1.0)]
     found = np.concatenate([ends[0].carried[0] - ends[1].carried[0], ends[0].punch - ends[1].punch]) / 2

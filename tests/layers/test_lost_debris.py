@@ -11,6 +11,7 @@ from combinations import SMALL, STICK
 from fenwear import Tribosystem, assemble, load_case, steady
 from fenwear.arrays import Array
 from fenwear.cycle import Block, evolve, growth_rate, march
+from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.tangent import lies_after, phase_tangent
 
 WORN = {"gross-sliding": 1e-6, "coulomb": 2e-5}  # 1/MPa: the scar grows by some nodes
@@ -98,8 +99,8 @@ def test_growth_rates_follow_debris(laws: tuple[str, ...], *, implicit: bool) ->
 
     pressures, predicted, worn = cycle(np.zeros(2 * n)).pressure, np.eye(2 * n), start.worn
     for phase, pressure in enumerate(pressures):
-        predicted = phase_tangent(system, phase, pressure, implicit=implicit, worn=worn) @ predicted
-        worn = lies_after(system, phase, pressure, None, None, worn)
+        predicted = phase_tangent(system, phase, pressure, cycle_heat(system), implicit=implicit, worn=worn) @ predicted
+        worn = lies_after(system, phase, pressure, cycle_heat(system), None, worn)
     change = 1e-9 * np.sin(np.arange(2 * n) ** 2)
     ends = [cycle(sign * change).end.worn for sign in (1.0, -1.0)]
     found = np.concatenate([ends[0].between[0] - ends[1].between[0], ends[0].punch - ends[1].punch]) / 2

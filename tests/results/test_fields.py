@@ -23,7 +23,7 @@ def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset
     """March, write the fields of the last half-cycle, and read them back."""
     *_, block = march(system, half_cycles)
     temperatures = None
-    if system.exchange is not None and block.end.temperature is not None:
+    if block.end.temperature is not None:
         temperatures = block.end.temperature.temperatures()
     direction = int(block.direction[-1])
     phase = (half_cycles - 1) % system.motion.half_cycles

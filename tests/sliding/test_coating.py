@@ -400,7 +400,7 @@ def test_a_soft_coating_opens_a_gap_of_its_own(base: str, settings: tuple[str, .
         *_, found = march(soft, number, start=start)
         pressure, lost = found.pressure[-1], np.zeros(len(soft.pair.weights)) if start is None else start.worn.punch
         compressed = np.maximum(2e-3 - lost, 0) * -np.expm1(-pressure / 2000)
-        begin = start or beginning(bare, None if bare.exchange is None else bare.exchange.initial())
+        begin = start or beginning(bare)
         *_, exact = march(bare, number, start=replace(begin, worn=replace(begin.worn, punch=lost + compressed)))
         assert np.abs(none.pressure[0] - pressure).max() > 0.05 * pressure.max()
         np.testing.assert_allclose(pressure, exact.pressure[-1], rtol=0, atol=1e-9 * pressure.max())

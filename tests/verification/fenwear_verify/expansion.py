@@ -142,7 +142,6 @@ def bimetal() -> Result:
             "strip.temperatures=[]",
         )
         assert system.bodies.heat is not None
-        assert system.exchange is not None
         warm = [np.full(body.owned, value) for body, value in zip(system.bodies.heat, (warming, 0.0), strict=True)]
         x, deflection = system.pair.x, system.exchange.gap(HeatState.nodal(system.bodies.heat, warm))
         middle = np.abs(x) < 1

@@ -54,7 +54,7 @@ def run_relaxed(system: Tribosystem, half_cycles: int, relaxation: float) -> Cou
         ConvergenceError: a contact did not converge, or the volume of the gap did not rest.
     """
     exchange, heat, phases = system.exchange, system.heat, range(len(system.motion.phases))
-    if exchange is None or heat is None:
+    if heat is None:
         raise ValueError("expected a case with heat")
     contacts = [system.phase_contact((phase,)) for phase in phases]
     laws = [system.wear.phases([system.conditions(phase)], [phase]) for phase in phases]

@@ -31,8 +31,7 @@ from fenwear.assembly.growing import (
     with_room,
 )
 from fenwear.assembly.laws import law_named, register_contact_law
-from fenwear.assembly.placing import place, place_at_rest
-from fenwear.assembly.positions import place_case_bodies
+from fenwear.assembly.placing import place, place_at_rest, place_case_bodies
 from fenwear.assembly.resources import Resources, setup_resources
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (

@@ -1,4 +1,7 @@
-"""Both bodies on their meshes: elasticity, and conduction with heat."""
+"""Both bodies on their meshes: elasticity, and conduction with heat.
+
+Whether coatings fit on their bodies.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly.coatings import check_coatings
 from fenwear.assembly.grids import lay_grids
 from fenwear.assembly.strokes import make_sliding
 from fenwear.bodies.contact_surface import ContactSurface, profiled
@@ -22,12 +24,48 @@ from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
 from fenwear.case.names import told_by_name
+from fenwear.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
 from fenwear.interface import pair
 from fenwear.interface.edges import Edges
 from fenwear.parallel import release
+from fenwear.sliding.coating import coating_thickness
 from fenwear.sliding.wear import WornDepths
+
+ALL_WAYS = 0.1  # mean of the unit normals of a surface below which it looks all ways, as a bore does
+
+
+def check_coatings(case: Case, punch: ElasticBody, strip: ElasticBody) -> None:
+    """Make sure that coatings are no thicker than their bodies, at any place; collective.
+
+    Raises:
+        CaseError: one is, or it is negative somewhere.
+    """
+    for body, law, elastic in (("punch", case.wear.punch, punch), ("strip", case.wear.strip, strip)):
+        thickness = coating_thickness(law, elastic.surface.unworn, body)
+        if thickness is None:
+            continue
+        there, thickest = _height(elastic), float(thickness.max(initial=0.0))
+        if thickest >= there:
+            message = f"expected less than the body, which is {there:.4g} mm thick, got {thickest:.4g} mm"
+            raise CaseError(InputError(f"wear.{body}.coating.thickness", message))
+
+
+def _height(elastic: ElasticBody) -> float:
+    """Return how far a body reaches along the mean normal of its contact surface, mm; collective."""
+    surface, mesh = elastic.surface, elastic.body.mesh
+    x = mesh.geometry.x[:, : mesh.geometry.dim]
+    normal = surface.weights @ surface.outward / surface.weights.sum()
+    size = float(np.linalg.norm(normal))
+    along = x @ (normal / size)[:, None] if size > ALL_WAYS else x
+    sides = [
+        mesh.comm.allreduce(float(one.max(initial=-np.inf)), MPI.MAX)
+        - mesh.comm.allreduce(float(one.min(initial=np.inf)), MPI.MIN)
+        for one in along.T
+    ]
+    return max(sides)
+
 
 FLAT = 1e-6  # of the contact: what lies in a plane
 SWALLOWED = 0.2  # of a load: nodes at the end of its group that a support beside it holds may take less of it

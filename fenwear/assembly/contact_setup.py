@@ -32,13 +32,11 @@ from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.coating import coatings_of, covering
-from fenwear.sliding.cross_shear import CycleShear
-from fenwear.sliding.field import SlidingField
+from fenwear.sliding.field import SlidingField, node_rates
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.regions import Regions, any_split, regions_opposite
-from fenwear.sliding.spin import node_rates
-from fenwear.sliding.ways import SlidingWays
+from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis

@@ -20,7 +20,7 @@ from fenwear.assembly.bodies import with_surfaces
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.grids import on_grid
-from fenwear.assembly.positions import place_case_bodies
+from fenwear.assembly.placing import place_case_bodies
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.bodies.grid import RegularGrid

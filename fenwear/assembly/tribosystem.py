@@ -33,7 +33,7 @@ from fenwear.interface import Interface, RigidEquilibrium
 from fenwear.layers import Layers
 from fenwear.layers.between import SOFT
 from fenwear.parallel import all_together
-from fenwear.sliding.spin import node_rates
+from fenwear.sliding.field import node_rates
 from fenwear.sliding.wear import WornDepths
 
 T = TypeVar("T")

@@ -12,8 +12,7 @@ from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.growing import answers_anywhere, on_first_contact, relaid
 from fenwear.assembly.laws import law_named
-from fenwear.assembly.placing import place
-from fenwear.assembly.positions import place_case_bodies
+from fenwear.assembly.placing import place, place_case_bodies
 from fenwear.assembly.tribosystem import (
     Preparation,
     Tribosystem,

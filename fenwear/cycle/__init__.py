@@ -6,15 +6,19 @@ here, whose wear is taken off in `phase` and over many cycles in `jump_step`; `f
 """
 
 from fenwear.cycle.block import Block
-from fenwear.cycle.critical_speed import critical_speed
-from fenwear.cycle.evolve import evolve, integrate
-from fenwear.cycle.explicit_limit import stability_number
+from fenwear.cycle.evolve import evolve, integrate, march
 from fenwear.cycle.follow import Renewal, follow
 from fenwear.cycle.jump import jump
-from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
 from fenwear.cycle.program import Span, at_step, follow_program, held
-from fenwear.cycle.stability import decay_rates, explicit_growth, growth_rate, stationary_growth
+from fenwear.cycle.stability import (
+    critical_speed,
+    decay_rates,
+    explicit_growth,
+    growth_rate,
+    stability_number,
+    stationary_growth,
+)
 from fenwear.cycle.steady import RunningIn, SteadyState, cycles_to_reach, running_in, steady
 from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 

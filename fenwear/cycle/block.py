@@ -20,7 +20,7 @@ from fenwear.cycle.totals import Totals, stacked
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import TERMS
 from fenwear.interface import RigidEquilibrium
-from fenwear.sliding.cross_shear import SlidingTensor
+from fenwear.sliding.ways import SlidingTensor
 from fenwear.sliding.wear import WornDepths
 
 

@@ -1,18 +1,27 @@
-"""The thermo-elastic stability of a state: how fast its disturbances grow."""
+"""The thermo-elastic stability of a state: how fast its disturbances grow.
+
+The speed of sliding beyond which full contact is thermo-elastically unstable.
+
+The limit of explicit steps of wear on full contact.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
+from fenwear.arrays import Array, Mask
+from fenwear.assembly import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
+from fenwear.contact import CondensedContact, SlidingContact
+from fenwear.contact.operators import Solve
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.tangent import lies_after, phase_tangent
 from fenwear.errors import CaseError, ConvergenceError, InputError
@@ -266,3 +275,121 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
     else:
         raise ConvergenceError("debris does not come to a thickness at which as much is lost as comes")
     return layers.with_thickness(rest, thickness)
+
+
+def critical_speed(system: Tribosystem, direction: int) -> float:
+    """Return the sliding speed above which full contact is thermo-elastically unstable; collective.
+
+    Of disturbances that grow without moving along the contact, and without wear: there the steady
+    temperature of a pressure makes just this pressure, p = -V X Theta p, with X the elastic stiffness
+    of the contact and Theta the thermal gap of the friction heat at unit speed (for a half-plane on
+    an insulator: Burton, V = 2 (1 - nu) k m / (mu E alpha)). Infinite where no speed is critical.
+    In mm/s; in rad/s where the strip turns.
+
+    Args:
+        system: The assembled problem, with heat.
+        direction: Sliding direction d.
+
+    Raises:
+        CaseError: the case has no heat, or a body no heat sink.
+    """
+    n = len(system.pair.weights)
+    everywhere = np.ones(n, dtype=bool)
+    friction_ratio = system.friction_ratio(direction)
+    compliance = system.interface.compliance(friction_ratio).matrix()
+    stiffness = _restricted_stiffness(system, friction_ratio, compliance, everywhere)
+    speed = system.motion.mean_speed
+    for _ in range(50):  # the strip's temperature depends on its speed
+        exchange = steady_exchange(system, [direction * speed])
+        uniform = np.full(n, system.rigid.mean_pressure)
+        states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
+        thermal = exchange.gap_change(states) / speed
+        before, speed = speed, system.team.lead(partial(_unstable_speed, stiffness, thermal))
+        if np.isinf(speed):
+            break
+        if abs(speed - before) < 1e-6 * speed:
+            break
+    return speed
+
+
+def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance: Array, closed: Mask) -> Array:
+    """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
+    rigid = system.rigid
+    nodes = np.flatnonzero(closed)
+    k, r = len(nodes), rigid.rigid_normal.shape[1]
+    scale = system.interface.elastic_length
+    matrix = np.zeros((k + r, k + r))
+    matrix[:k, :k] = compliance[np.ix_(nodes, nodes)] / scale
+    matrix[:k, k:] = rigid.rigid_normal[nodes]
+    matrix[k:, :k] = rigid.equilibrium(friction_ratio)[:, nodes]
+    stiffness = np.zeros((len(closed), len(closed)))
+    stiffness[np.ix_(nodes, nodes)] = np.linalg.inv(matrix)[:k, :k] / scale
+    return stiffness
+
+
+def _unstable_speed(stiffness: Array, thermal: NDArray[Any]) -> float:
+    """Return the lowest V of p = -V X Theta p; infinite where there is none."""
+    values = np.linalg.eigvals(-stiffness @ thermal)
+    growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
+    return float(1 / growing.max()) if len(growing) else float("inf")
+
+
+PRODUCTS = 200  # after which the fastest modes are what is left: of two brake shoes 1.3 % above the fastest
+
+
+def stability_number(system: Tribosystem) -> float:
+    """Return the wear step over its explicit limit: above 1 an explicit run oscillates and diverges; collective.
+
+    On closed contact an opened gap lowers the pressure by P, the leading block of the inverse of
+    [[S, H], [E, 0]], and the pressure of a phase opens the gap by its wear by W: beta~ S b p^(b-1) of both
+    bodies at the mean pressure, the strip's put on its nodes and read there. An explicit step multiplies an
+    error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
+    the phase that wears most.
+    """
+    ratios, largest = system.friction_ratios(), 0.0
+    for phase, opened in system.team.lead(partial(_most_worn, system)):
+        interface = system.interfaces[phase]
+        contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
+        worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
+        largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
+    return largest / 2
+
+
+def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
+    """Return of each direction the phase that wears most, if any does, and its S b p^(b-1), on the strip's nodes."""
+    n = len(system.rigid.rigid_normal)
+    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
+    wear = system.phases_wear
+    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
+    directions, most = np.array(system.motion.directions), slopes.max(axis=1)
+    phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
+    opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]
+    return [(k, slope) for k, slope in zip(phases, opened, strict=True) if slope.data.any()]
+
+
+def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
+    """Return the largest eigenvalue of W P: the gap (n,) worn open by the pressure that a gap takes away."""
+    n = worn.shape[0]
+
+    def apply(gap: Array) -> Array:
+        right = np.zeros(size)
+        right[:n] = gap.ravel()
+        return np.asarray(worn @ solve(right)[:n])
+
+    start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
+    operator = LinearOperator((n, n), matvec=apply, dtype=float)
+    try:
+        found = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
+    except ArpackNoConvergence:  # modes that lie together, as those of two shoes that are alike, are not told apart
+        return _growth(apply, start)
+    return float(np.abs(found).max())
+
+
+def _growth(apply: Callable[[Array], Array], vector: Array) -> float:
+    """Return by how much a vector grows with each product in the end, of whichever modes it is made."""
+    size = 0.0
+    for _ in range(PRODUCTS):
+        vector = apply(vector)
+        size = float(np.linalg.norm(vector))
+        vector = np.asarray(vector / size, dtype=float)
+    return size

@@ -29,8 +29,7 @@ from fenwear.case import Case, Cycle
 from fenwear.case.program import stages_of
 from fenwear.cycle import march
 from fenwear.errors import CaseError, InputError
-from fenwear.flash.course import Course, past_of
-from fenwear.flash.heating import Heating, Window, grid_of
+from fenwear.flash.heating import Course, Heating, Window, grid_of, past_of
 from fenwear.memory import check_memory
 from fenwear.parallel import on_root
 from fenwear.results import checkpoint

@@ -35,14 +35,11 @@ from fenwear.errors import HeatError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
-from fenwear.heat.side import Fineness, Side, StepPlan
-from fenwear.heat.stage import HeatBalance, PreparedStage, Stage
-from fenwear.heat.step_map import PreparedStep, StepMap
+from fenwear.heat.side import EARLIER, Fineness, Side, StepPlan
+from fenwear.heat.stage import HeatBalance, PreparedStage, PreparedStep, Stage, StepMap
 from fenwear.parallel import Team
 
 T = TypeVar("T")
-STAGE = 1 - 1 / np.sqrt(2)  # gamma: of a time step, how long each of its two stages is
-EARLIER = (1 - STAGE) / STAGE  # r: how often the first one counts
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
 AT_ONCE = 8  # columns of coordinates that are kept for the balance of heat
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more

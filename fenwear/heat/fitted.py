@@ -1,23 +1,255 @@
-"""Temperatures of a body on a small basis as good as asked for: they die out, and are those of the whole mesh."""
+"""Temperatures of a body on a small basis as good as asked for: they die out, and are those of the whole mesh.
+
+The reduced temperatures of a body, kept on disk for the next start like its condensed elasticity.
+
+How the temperature at the contact answers to the fluxes there, by the end of a step of the full field.
+
+That is C A^-1 L, C the temperature at the contact nodes and L the loads of unit fluxes. Both touch the trace's degrees
+of freedom s alone, so that the Schur complement S of these in A has all of it, (A^-1)_ss = S^-1: one elimination in
+place of a solution for each contact node.
+
+How far the reduced temperatures of a body are from those of its whole mesh, at the contact.
+
+Both are led through a cycle of its steps from rest, and to the steady state of the cycle's mean flux, by an even
+pressure, one that grows along the contact, and one at random. What is compared is what contact feels: the temperature
+at its nodes and the thermal gap beside a rigid motion, at the end of the cycle.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from scipy.sparse import csc_array, csr_array
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, hstack, vstack
 
 from fenwear.arrays import Array
+from fenwear.bodies import kept
+from fenwear.bodies.factor import Factor, entries, make_together
+from fenwear.bodies.schur import available
 from fenwear.errors import HeatError
-from fenwear.heat.certificate import Trial, certificate
-from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.contact_response import contact_responses
-from fenwear.heat.field import ReducedBasis, ReducedField
-from fenwear.heat.kept_basis import Way
-from fenwear.heat.modal import ModalField, modal_basis
+from fenwear.heat.conduction import PREFIX, HeatBody, HeatStep, Surroundings
+from fenwear.heat.field import CHUNK, ModalField, ReducedBasis, ReducedField, modal_basis
 from fenwear.heat.reduction import PASSES, ROUNDING, reduced_basis
-from fenwear.parallel import once
+from fenwear.heat.side import EARLIER
+from fenwear.parallel import once, total
+
+STEPS = 40  # of a cycle, the last ones, that both are led through at most
+FLAT = 1e-6  # of the thermal gap: what of it is less beside a rigid motion counts against that
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a body's reduced temperatures are tried with.
+
+    Attributes:
+        inflow: Loads of unit fluxes (owned, q).
+        entering: Fluxes of each step of a cycle (q, m) under m pressures.
+        contact: Temperature at the contact nodes at the end of the cycle (n, owned).
+        opened: Gap there (n, k), mm, by changes of the temperature of this rank's nodes (owned, k); collective.
+        rigid: Gaps of rigid motions, orthonormal (n, r).
+        through: What takes temperatures where the fluxes enter to the contact nodes (n, q); None where they are these.
+    """
+
+    inflow: csc_array
+    entering: Sequence[Array]
+    contact: csr_array
+    opened: Callable[[Array], Array]
+    rigid: Array
+    through: csr_array | None = None
+
+
+def certificate(
+    step: HeatStep, velocity: float, surroundings: Surroundings, small: ReducedField, trial: Trial
+) -> float:
+    """Return the largest difference of the readings over their largest, at any node and under any pressure; collective.
+
+    Args:
+        step: A stage of the whole body, which it advances by.
+        velocity: Of its material in it, mm/s or rad/s.
+        surroundings: What the body meets.
+        small: Its reduced temperature with this stage.
+        trial: Fluxes, and what is compared.
+    """
+    body, last = step.body, trial.entering[-STEPS:]
+    dim, m = len(small.basis), last[0].shape[1]
+    compare = _Comparison(body, small, trial)
+    whole, reduced = np.zeros((body.owned, m)), np.zeros((dim, m))
+    for flux in last:
+        heated, answer = step.respond(trial.inflow @ flux), small.responses[0] @ flux
+        for counts in (EARLIER, 1.0):
+            whole = whole + counts * (step.advance(whole, sources=False) + heated - whole)
+            reduced = reduced + counts * (small.advance(0, reduced, sources=False) + answer - reduced)
+    found = compare.apart(whole, reduced, last[-1])
+    if body.loses_heat(velocity, surroundings):
+        mean = np.mean(trial.entering, axis=0)
+        steady = body.step(velocity, np.inf, surroundings, at_once=True)
+        whole = steady.respond(trial.inflow @ mean)
+        steady.free()
+        changes = np.eye(dim) - small.advance(0, np.eye(dim), sources=False)
+        fixed = scipy.linalg.solve(changes, small.responses[0] @ mean)
+        found = max(found, compare.apart(whole, fixed, mean))
+    return found
+
+
+def pressures(x: Array) -> Array:
+    """Return what the bodies are tried with at contact nodes x (n, d): even, growing along the contact, at random."""
+    along = x[:, 0] - x[:, 0].min()
+    random = np.random.default_rng(0).random(len(x))
+    return np.stack([np.ones(len(x)), along / max(float(along.max()), 1e-300), random], axis=1)
+
+
+def rigid_gaps(body: HeatBody, x: Array) -> Array:
+    """Return the gaps at contact nodes x (n, d) of rigid motions, orthonormal (n, r): rings do not tilt."""
+    tilts = x[:, :0] if body.kind == "axisymmetric" else x[:, :-1]
+    return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(x)), tilts]))[0])
+
+
+class _Comparison:
+    """Readings of a body's whole and reduced temperature; collective to make."""
+
+    def __init__(self, body: HeatBody, small: ReducedField, trial: Trial) -> None:
+        self._comm, self._trial, self._columns = body.body.mesh.comm, trial, small.basis.columns
+        self._contact = small.observe(trial.contact)
+        self._beyond: Array | None = None  # what a flux adds at the contact beside the coordinates
+        if small.contact_responses is not None:
+            exact = small.contact_responses[0]
+            exact = exact if trial.through is None else np.asarray(trial.through @ exact)
+            self._beyond = exact - self._contact.of_changes(small.responses[0])
+
+    def apart(self, whole: Array, reduced: Array, flux: Array) -> float:
+        """Return the largest difference of readings over their largest; collective.
+
+        Args:
+            whole: Temperatures (owned, m).
+            reduced: Coordinates (dim, m).
+            flux: Of the last step (q, m).
+        """
+        exact = total(self._comm, np.asarray(self._trial.contact @ whole))
+        contact = self._contact.of_changes(reduced)
+        if self._beyond is not None:
+            contact = contact + self._beyond @ flux
+        both = self._trial.opened(np.hstack([whole, self._columns @ reduced - whole]))
+        (gap, missing), rigid = np.hsplit(both, 2), self._trial.rigid
+        size = np.abs(gap).max(axis=0)
+        gap, missing = (one - rigid @ (rigid.T @ one) for one in (gap, missing))
+        return max(
+            _relative(contact - exact, np.abs(exact).max(axis=0)),
+            _relative(missing, np.maximum(np.abs(gap).max(axis=0), FLAT * size)),
+        )
+
+
+def _relative(difference: Array, size: Array) -> float:
+    return float((np.abs(difference).max(axis=0) / np.maximum(size, 1e-300)).max())
+
+
+def contact_responses(steps: Sequence[HeatStep], inflow: csc_array, contact_rows: csr_array) -> list[Array]:
+    """Return the contact temperature from unit fluxes (n, n) at the end of each full step; collective.
+
+    Args:
+        steps: Of a body. Their factors are made and freed one after the other.
+        inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
+        contact_rows: Temperature at the contact nodes (n, owned).
+    """
+    body = steps[0].body
+    comm = body.body.mesh.comm
+    free: Array = np.ones(body.owned)
+    free[body.held] = 0.0
+    loads = [csr_array(one) for one in comm.allgather(csr_array(inflow * free[:, None]))]
+    rows = comm.allgather(csr_array(contact_rows))
+    whole_loads, whole_rows = csr_array(vstack(loads)), csc_array(hstack(rows))
+    surface = np.union1d(whole_loads.nonzero()[0], whole_rows.nonzero()[1])
+    small = len(surface) ** 2 <= entries(whole_loads.shape[0], body.body.mesh.topology.dim)
+    found = []
+    for step in steps:
+        factor = _surface_factor(step, surface) if small and available() else None
+        if factor is None:
+            found.append(_by_columns(step, inflow, contact_rows))
+            continue
+        response: Array = np.zeros((contact_rows.shape[0], inflow.shape[1]))
+        if factor.schur is not None:
+            answers = scipy.linalg.solve(factor.schur, whole_loads[surface].toarray(), overwrite_b=True)
+            response = np.asarray(whole_rows[:, surface] @ answers)
+        comm.Bcast(response, root=factor.owner)
+        factor.free()
+        found.append(response)
+    return found
+
+
+def _surface_factor(step: HeatStep, surface: NDArray[np.int64]) -> Factor | None:
+    """Return the factor with the Schur complement of the surface; None where it would be spread; collective."""
+    mesh = step.body.body.mesh
+    factor = Factor(step.a, PREFIX, "lu", comm=mesh.comm, dim=mesh.topology.dim, surface=surface)
+    if factor.is_spread:
+        return None
+    make_together([factor])
+    return factor
+
+
+def _by_columns(step: HeatStep, inflow: csc_array, contact_rows: csr_array) -> Array:
+    """Return the response of one step by a solution for each flux; collective."""
+    n = inflow.shape[1]
+    response: Array = np.empty((n, n))
+    for begin in range(0, n, CHUNK):
+        some = slice(begin, begin + CHUNK)
+        response[:, some] = contact_rows @ step.respond(inflow[:, some].toarray())
+    step.free_factor()
+    return total(step.body.body.mesh.comm, response)
+
+
+Make = partial[ReducedBasis]  # the function that makes it, after the body all that it follows from
+Way = Callable[[Make, Sequence[HeatStep]], ReducedBasis]
+
+
+def made(make: Make, _: Sequence[HeatStep]) -> ReducedBasis:
+    """Return a basis that is made whatever is kept; collective."""
+    return make()
+
+
+def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> ReducedBasis:
+    """Return a basis from disk where it is kept, else make and keep it; collective.
+
+    Args:
+        make: Makes it from the body and further arguments.
+        steps: Of the body: their matrices have its mesh, materials, convection and held temperatures in them.
+        fresh: Make it whatever is kept.
+
+    Raises:
+        CaseError: the limit of what is kept is no number.
+    """
+    body: HeatBody = steps[0].body
+    comm = body.body.mesh.comm
+
+    def parts() -> Iterator[object]:
+        yield from ("reduced temperatures", body.body.mesh.geometry.x)
+        for argument in (*make.args[1:], *make.keywords.values()):
+            yield from _parts(argument)
+        for step in steps:
+            yield from (*step.a.getValuesCSR(), *step.b.getValuesCSR(), step.source, step.carried, step.entering)
+        yield from (body.initial(), body.held, body.storage, body.convected)
+
+    place = kept.known(comm, parts, fresh=fresh)
+    if place.arrays is not None:
+        return ReducedBasis(body, place.arrays["lift"], place.arrays["columns"])
+    basis = make()
+    place.save({"lift": basis.lift, "columns": basis.columns})
+    return basis
+
+
+def _parts(argument: object) -> Iterator[object]:
+    """Yield what tells an argument: arrays, and what has a text that tells all of it."""
+    if isinstance(argument, csc_array):
+        yield from (argument.data, argument.indices, argument.indptr)
+    elif isinstance(argument, Surroundings):
+        yield from (argument.renewed, argument.sliding, argument.exposed)
+    elif isinstance(argument, Sequence):
+        yield np.asarray(argument)
+    else:
+        yield argument
+
 
 NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 TRIES = 3  # of the basis, each ten times as sharp as the one before, and followed over twice as many steps

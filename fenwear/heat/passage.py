@@ -17,9 +17,8 @@ from scipy.sparse import csr_array
 
 from fenwear.interface import ContactPair, Placement, transfer_at
 from fenwear.interface.placement import HERE
-from fenwear.sliding.field import SlidingField
+from fenwear.sliding.field import SlidingField, Way
 from fenwear.sliding.motion import Motion
-from fenwear.sliding.screw import Way
 
 INSTANTS = 8  # places at most that stand for those of a step
 

@@ -17,7 +17,7 @@ import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.heat.exchange import HeatExchange
-from fenwear.heat.step_map import StepMap
+from fenwear.heat.stage import StepMap
 
 KEPT, MEMORY = 8, 10**9  # cycles of different conducting nodes that are kept, and bytes that they may take
 

@@ -12,21 +12,25 @@ from scipy.sparse import csc_array, csr_array, diags_array, hstack
 from fenwear.arrays import Array
 from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, InputError
-from fenwear.heat.certificate import Trial, pressures, rigid_gaps
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange
-from fenwear.heat.field import FullField, Functional, ReducedField
-from fenwear.heat.fitted import BasisRequest, fitted_field
-from fenwear.heat.halving import STEPS, HeatedPassage, chosen
-from fenwear.heat.kept_basis import Way, kept_basis, made
-from fenwear.heat.modal import ModalField
+from fenwear.heat.field import FullField, Functional, ModalField, ReducedField
+from fenwear.heat.fitted import BasisRequest, Trial, Way, fitted_field, kept_basis, made, pressures, rigid_gaps
 from fenwear.heat.passage import Passage
-from fenwear.heat.passing import ReciprocatingField
-from fenwear.heat.passing_strip import MANY, PassingStrip
-from fenwear.heat.plans import StageKind, at_places, step_plans
-from fenwear.heat.section import section_modes
-from fenwear.heat.side import Fineness, Reading, Side, StepPlan
-from fenwear.heat.track import TrackField
+from fenwear.heat.passing_strip import MANY, PassingStrip, ReciprocatingField
+from fenwear.heat.side import (
+    STEPS,
+    Fineness,
+    HeatedPassage,
+    Reading,
+    Side,
+    StageKind,
+    StepPlan,
+    at_places,
+    chosen,
+    step_plans,
+)
+from fenwear.heat.track import TrackField, section_modes
 from fenwear.interface import ContactPair
 from fenwear.parallel import once, total
 from fenwear.sliding.field import SlidingField

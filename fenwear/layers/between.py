@@ -47,7 +47,7 @@ from fenwear.layers.closure import (
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
-from fenwear.sliding.lubrication import asperity_share
+from fenwear.sliding.friction import asperity_share
 from fenwear.sliding.wear import NOTHING, WornDepths
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa

@@ -22,7 +22,7 @@ from fenwear.interface import ContactPair
 from fenwear.results.quantity import Variable
 from fenwear.results.surfaces import Column
 from fenwear.stick.edge import beside, stick_edges, zone_width
-from fenwear.stick.strain import along_sliding, directions
+from fenwear.stick.position import along_sliding, directions
 
 if TYPE_CHECKING:
     from fenwear.stick.coulomb import Steps

@@ -18,7 +18,7 @@ from fenwear.cycle.state import known_pressures
 from fenwear.interface.placement import in_space
 from fenwear.results.steps import steps_of
 from fenwear.results.surfaces import Column
-from fenwear.sliding.cross_shear import SlidingTensor
+from fenwear.sliding.ways import SlidingTensor
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:

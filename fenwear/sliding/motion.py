@@ -5,7 +5,7 @@ times, one for each position of the strip under the punch. Such a phase has one 
 an offset of the strip, and the sliding that is done there. Rotations are counted in rad in place of mm.
 
 A cycle that is a table is one half-cycle, whose phases are the steps between its rows. Each has a sliding field of its
-own, that of the constant screw which takes the strip from one row to the next (`fenwear.sliding.screw`): what slides
+own, that of the constant screw which takes the strip from one row to the next (`fenwear.sliding.field`): what slides
 past a place in space is exact for steps of any size.
 """
 
@@ -26,8 +26,7 @@ from fenwear.arrays import Array
 from fenwear.case import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.placement import HERE, Placement, Vector
-from fenwear.sliding.field import ALONG_X, SlidingField
-from fenwear.sliding.screw import Screw, Slide, Way
+from fenwear.sliding.field import ALONG_X, Screw, Slide, SlidingField, Way
 
 DEFAULT_POSITIONS = 9  # at least, in a half-cycle where the strip wears or is uneven; odd, with one in the middle
 

@@ -17,6 +17,8 @@ Both laws stand in one system, so that the coupling of unlike bodies needs no ou
 
 Coulomb's law with large friction has pieces of opposite orientation: then the step has no or several
 answers (A. Klarbring, Ing.-Archiv 60, 1990). The sign of the determinant of the piece shows it.
+
+Coulomb's cone: the tangential traction t of a node never exceeds mu p, in one or two tangential directions.
 """
 
 from __future__ import annotations
@@ -30,11 +32,39 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
-from fenwear.stick.cone import derivative, project
 from fenwear.stick.creep import Displaced, StickCreep
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
 from fenwear.stick.state import Imposed, StickState
+
+
+def project(trial: Array, radius: Array) -> Array:
+    """Return the points of the discs abs(t) <= radius that are nearest to `trial`.
+
+    Args:
+        trial: (n, m), m = d - 1 tangential directions, MPa.
+        radius: mu p (n,), MPa; negative ones count as zero.
+    """
+    size = np.linalg.norm(trial, axis=1)
+    limit = np.maximum(radius, 0.0)
+    outside = size > limit
+    return trial * np.where(outside, limit / np.where(outside, size, 1.0), 1.0)[:, None]
+
+
+def derivative(trial: Array, radius: Array) -> tuple[Array, Array]:
+    """Return the derivatives of the projection of points outside of their disc: to the trial, and to the radius.
+
+    With the direction n of z: (r / |z|) (I - n n^T), of (n, m, m), and n, of (n, m).
+
+    Args:
+        trial: z (n, m), abs(z) > radius.
+        radius: r (n,).
+    """
+    size = np.maximum(np.linalg.norm(trial, axis=1), 1e-300)
+    direction = trial / size[:, None]
+    across = np.eye(trial.shape[1]) - direction[:, :, None] * direction[:, None, :]
+    return (np.maximum(radius, 0.0) / size)[:, None, None] * across, direction
+
 
 CLOSE = 1e-10  # residual of the laws over the largest pressure
 FEW = 8  # Newton steps from where it should take one or two

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.sliding.screw import Screw
+from fenwear.sliding.field import Screw
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.program import Program, make_program, steps_of
 from fenwear.stick.records import TimeStepRecords

@@ -28,10 +28,9 @@ from fenwear.sliding.field import SlidingField
 from fenwear.sliding.track import Border
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import StickCreep, stiff
-from fenwear.stick.position import LoadEffect, Position, along_tangents, position_of
+from fenwear.stick.position import LoadEffect, Position, along_tangents, position_of, surface_gradient
 from fenwear.stick.program import steps_of
 from fenwear.stick.state import StickState
-from fenwear.stick.strain import surface_gradient
 
 
 class OppositeBodies:

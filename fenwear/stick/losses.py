@@ -1,24 +1,236 @@
-"""What time steps of contact with stick wear off both bodies, and what they do to what lies between."""
+"""What time steps of contact with stick wear off both bodies, and what they do to what lies between.
+
+The coatings of both bodies in partial slip: what of them and of their bases is worn, and how jumps count depths.
+
+What laws of friction and wear know of the nodes in time steps, and of the cycle before them.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.interface import ContactPair
 from fenwear.layers import Evolution, Layers
 from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
-from fenwear.sliding.coating import covering
+from fenwear.sliding.coating import CoatedBody, Shares, covering, left_of, shares
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.coated import BothShares, CoatedBodies
-from fenwear.stick.conditions import StepConditions, StepSlips
+from fenwear.stick.heat import StickHeat
+from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.program import Program
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.state import PartialSlipState
-from fenwear.stick.wear import LocalWear
+from fenwear.stick.wear import LocalLaws, LocalWear
+
+
+class StepSlips(NamedTuple):
+    """What laws ask of k time steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
+
+    pressure: Array
+    slid: Array
+    duration: Array
+    temperature: Array | None
+
+
+@dataclass(frozen=True)
+class StepConditions:
+    """What is known of each node in the time steps of a cycle.
+
+    Attributes:
+        interface: The bodies.
+        program: Of a cycle.
+        laws: Of friction and wear that change with the state of each node; None where they stay.
+        heat: Of friction; None without.
+        strip_wears: Whether the strip does.
+    """
+
+    interface: OppositeBodies
+    program: Program
+    laws: LocalLaws | None
+    heat: StickHeat | None
+    strip_wears: bool
+
+    @property
+    def asks_cycle(self) -> bool:
+        """Whether a law depends on what a whole cycle does: its cross-shear, its mean pressure."""
+        return self.laws is not None and (self.laws.asks("cs") or self.laws.asks("pm"))
+
+    def at_start(self, at: PartialSlipState) -> dict[str, Any]:
+        """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
+        warm = None
+        if self.heat is not None and at.temperature is not None:
+            punch, strip = self.heat.surfaces(at.temperature)
+            warm = punch, strip
+        speed = 0.0 if at.speed is None else at.speed
+        return {
+            "temperatures": warm,
+            "worn": at.worn,
+            "slid": at.slid,
+            "speed": speed,
+            "cycle": self._shear(at),
+        }
+
+    def _shear(self, at: PartialSlipState) -> CycleShear | None:
+        """Return what laws know of the last cycle before a state; None where none asks, or before the first.
+
+        A time step that has not been computed slips nothing at the mean pressure.
+        """
+        if at.slips is None or at.pressures is None:
+            return None
+        middle, mean, places = self.interface.middle, self.interface.middle.rigid.mean_pressure, self.program.steps
+        positions = [self.interface.position(step.offset) for step in places]
+        slips: Array = np.nan_to_num(at.slips)
+        ways = np.array([position.slid(slips[k]) for k, position in enumerate(positions)])
+        lengths = np.linalg.norm(ways, axis=2)
+        directions = ways / np.where(lengths > 0, lengths, 1.0)[:, :, None]
+        pairs, wears = [position.pair for position in positions], self.strip_wears
+        known = SlidingWays(pairs, middle.pair, lengths, directions, wears, mean, asked=True)
+        return known.shear(np.where(np.isnan(at.pressures), mean, at.pressures))
+
+    def of_steps(self, slips: StepSlips, before: PartialSlipState) -> list[ContactConditions]:
+        """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
+        laws, known = self.laws, self.at_start(before)
+        assert laws is not None
+        begun = np.zeros(slips.slid.shape[1]) if before.slid is None else before.slid
+        slid = begun + np.cumsum(slips.slid, axis=0)
+        warm = [known["temperatures"]] * len(slid)
+        if slips.temperature is not None and known["temperatures"] is not None:
+            warm[1:] = [(punch, strip) for punch, strip in slips.temperature[:-1]]
+        return [
+            laws.conditions(
+                pair,
+                slips.pressure[k],
+                speed=slips.slid[k] / slips.duration[k],
+                temperatures=warm[k],
+                worn=before.worn,
+                slid=slid[k],
+                debris=self.interface.layers.facing(pair, before.worn),
+                cycle=known["cycle"],
+            )
+            for k, pair in enumerate(self.pairs(slips, before))
+        ]
+
+    def pairs(self, slips: StepSlips, before: PartialSlipState) -> list[ContactPair]:
+        """Return the surfaces opposite each other in steps that begin at a state."""
+        steps = self.program.steps
+        places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(slips.slid))]
+        return [self.interface.position(place).pair for place in places]
+
+
+BothShares = tuple[Shares | None, Shares | None]  # of punch and strip; None for a body without coating
+PerLayer = tuple[tuple[Array, Array], tuple[Array, Array]]  # of punch and strip, of coating and base each
+
+
+@dataclass(frozen=True)
+class CoatedBodies:
+    """The coatings of punch and strip; None for a body without."""
+
+    punch: CoatedBody | None = None
+    strip: CoatedBody | None = None
+
+    @property
+    def none(self) -> bool:
+        """Whether neither body is coated."""
+        return self.punch is None and self.strip is None
+
+    @property
+    def _named(self) -> tuple[tuple[str, CoatedBody | None], tuple[str, CoatedBody | None]]:
+        return ("punch", self.punch), ("strip", self.strip)
+
+    def parts(self, before: WornDepths, more: WornDepths | None = None, bases: WornDepths | None = None) -> BothShares:
+        """Return what of coatings and bases is worn at the nodes of punch and strip; None for a body without coating.
+
+        Args:
+            before: Depths where it begins.
+            more, bases: What would be worn of coatings that go on, and of bases; by default so little that no coating
+                ends.
+        """
+        found: list[Shares | None] = []
+        for name, coated in self._named:
+            if coated is None:
+                found.append(None)
+                continue
+            left = left_of(coated.thickness, getattr(before, name))
+            of_coating, of_base = (
+                np.zeros_like(left) if one is None else np.asarray(getattr(one, name)) for one in (more, bases)
+            )
+            found.append(shares(of_coating, of_base, left))
+        return found[0], found[1]
+
+    def by(self, worn: WornDepths, bases: WornDepths) -> CoatedBodies:
+        """Return the same by the ratio of what would be worn of bases and of coatings, where something is."""
+        found = [
+            None if coated is None else coated.by(getattr(worn, name), getattr(bases, name))
+            for name, coated in self._named
+        ]
+        return CoatedBodies(found[0], found[1])
+
+    def measured_rate(self, rate: WornDepths, bases: WornDepths, worn: WornDepths) -> WornDepths:
+        """Return rates of depths as those of `measured`, where these depths are worn.
+
+        Args:
+            rate, bases: Of coatings that go on, and of bases.
+            worn: Depths.
+        """
+        found = {
+            name: coated.measured_rate(getattr(worn, name), getattr(rate, name), getattr(bases, name))
+            for name, coated in self._named
+            if coated is not None
+        }
+        return replace(rate, **found)
+
+    def measured(self, worn: WornDepths) -> WornDepths:
+        """Return depths as what coatings would have lost if they went on: it grows evenly through their end."""
+        own = ((name, coated) for name, coated in self._named if coated is not None)
+        return replace(worn, **{name: coated.measure(getattr(worn, name)) for name, coated in own})
+
+    def depths(self, measured: WornDepths) -> WornDepths:
+        """Return the depths that `measured` made these of."""
+        own = ((name, coated) for name, coated in self._named if coated is not None)
+        return replace(measured, **{name: coated.depth(getattr(measured, name)) for name, coated in own})
+
+    def slopes(self, worn: WornDepths) -> tuple[Array, Array]:
+        """Return the derivative of depths to what coatings would have lost, at the nodes of punch and strip."""
+        punch, strip = self.punch, self.strip
+        return (
+            np.ones_like(worn.punch) if punch is None else punch.slope(worn.punch),
+            np.ones_like(worn.strip) if strip is None else strip.slope(worn.strip),
+        )
+
+    def layers_of_wear(self, worn: WornDepths) -> tuple[PerLayer, PerLayer]:
+        """Return for punch and strip what of coating and base wears at their nodes, and over what `measured` counts it.
+
+        Args:
+            worn: Depths.
+        """
+        there: list[tuple[Array, Array]] = []
+        counted: list[tuple[Array, Array]] = []
+        for name, coated in self._named:
+            depth = getattr(worn, name)
+            lies = np.zeros(len(depth)) if coated is None else np.where(depth < coated.thickness, 1.0, 0.0)
+            there.append((lies, 1 - lies))
+            by_ratio = 1 - lies if coated is None else coated.measured_rate(depth, np.zeros_like(lies), 1 - lies)
+            counted.append((lies, by_ratio))
+        return (there[0], there[1]), (counted[0], counted[1])
+
+    def ends_between(self, before: WornDepths, after: WornDepths) -> bool:
+        """Return whether a coating ends somewhere between these depths."""
+        return any(
+            coated is not None
+            and bool(((getattr(before, name) < coated.thickness) & (getattr(after, name) >= coated.thickness)).any())
+            for name, coated in self._named
+        )
+
+
+NOT_COATED = CoatedBodies()
+
 
 _Both = tuple[Array, Array]  # of punch and strip
 

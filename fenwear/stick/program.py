@@ -16,9 +16,8 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Cycle, OneWay, Oscillation, Rotation, Stick
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.placement import HERE, Placement
-from fenwear.sliding.field import SlidingField
+from fenwear.sliding.field import Screw, SlidingField
 from fenwear.sliding.motion import Motion, make_motion
-from fenwear.sliding.screw import Screw
 
 SPACINGS = 1.0  # contact nodes that the strip moves to each side before its place matters
 

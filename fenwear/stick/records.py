@@ -11,9 +11,9 @@ from fenwear.arrays import Array, Mask
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.position import surface_strain
 from fenwear.stick.program import TimeStep
 from fenwear.stick.state import PartialSlipState
-from fenwear.stick.strain import surface_strain
 from fenwear.stick.wear import LocalWear
 
 

@@ -16,10 +16,10 @@ from fenwear.errors import CaseError, InputError
 from fenwear.memory import memory_size
 from fenwear.sliding.coating import coatings_of
 from fenwear.sliding.regions import regions_opposite
-from fenwear.stick.coated import CoatedBodies
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
+from fenwear.stick.losses import CoatedBodies
 from fenwear.stick.program import far_enough, make_program, passes
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.wear import LocalLaws

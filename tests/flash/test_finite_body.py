@@ -11,7 +11,7 @@ from scipy.special import k0
 from fenwear import load_case
 from fenwear.assembly import build_conduction, place_case
 from fenwear.case import Heat
-from fenwear.flash.finite_body import Spots, bulk_of, spots_of
+from fenwear.flash.partition import Spots, bulk_of, spots_of
 
 CONDUCTIVITY = 46.0
 SETTINGS = (

@@ -10,8 +10,7 @@ from scipy.integrate import dblquad, quad
 from scipy.special import erf
 
 from fenwear.arrays import Array
-from fenwear.flash.kernels import cell_integrals, history_kernel
-from fenwear.flash.response import Instants, Periodic
+from fenwear.flash.response import Instants, Periodic, cell_integrals, history_kernel
 
 STEEL, DIFFUSIVITY = 46.0, 12.8  # N/(s K), mm²/s
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from fenwear.arrays import Array
-from fenwear.flash.kernels import cell_integrals
 from fenwear.flash.partition import Bulk, HeatedSide, shared
-from fenwear.flash.response import Instants, Periodic
+from fenwear.flash.response import Instants, Periodic, cell_integrals
 
 A, FOREVER = 0.1, np.inf
 

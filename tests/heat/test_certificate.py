@@ -9,8 +9,8 @@ import pytest
 
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.assembly import expansions, with_exchange, with_reduced_heat
-from fenwear.heat.certificate import rigid_gaps
 from fenwear.heat.exchange import TERMS, HeatExchange
+from fenwear.heat.fitted import rigid_gaps
 from fenwear.heat.prepare import opened_gap
 from fenwear.plausibility import fineness_text, fineness_warnings
 from fenwear.stick.heat import free_expansion

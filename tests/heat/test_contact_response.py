@@ -9,7 +9,7 @@ import pytest
 
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import condensation
-from fenwear.heat.contact_response import _by_columns, contact_responses
+from fenwear.heat.fitted import _by_columns, contact_responses
 from fenwear.heat.prepare import contact_rows, inflows
 from fenwear.parallel import total
 

@@ -19,8 +19,7 @@ from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.heat.field import ReducedField
 from fenwear.heat.material import ConductionLaw
 from fenwear.heat.reduction import reduced_basis
-from fenwear.heat.section import section_modes
-from fenwear.heat.track import CELLS, TrackField
+from fenwear.heat.track import CELLS, TrackField, section_modes
 from fenwear.sliding.field import SlidingField
 
 K, RHO_C = 3.0, 2.0

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from fenwear.heat.field import ReducedBasis, ReducedField
-from fenwear.heat.modal import ModalField, modal_basis
+from fenwear.heat.field import ModalField, ReducedBasis, ReducedField, modal_basis
 
 DURATION = 0.05
 

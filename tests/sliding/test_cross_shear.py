@@ -9,8 +9,7 @@ import pytest
 
 from fenwear import CaseError, Tribosystem, jump, load_case, march
 from fenwear.case import WearLaw
-from fenwear.sliding.cross_shear import SlidingTensor
-from fenwear.sliding.ways import SlidingWays
+from fenwear.sliding.ways import SlidingTensor, SlidingWays
 
 PATHS = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "contact.friction=0")
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ellipe
 
 from fenwear import Tribosystem, march, steady
-from fenwear.sliding.spin import node_rates
+from fenwear.sliding.field import node_rates
 
 RADIUS, FORCE, K = 3.0, 100.0, 1e-8
 PIN = (

@@ -17,7 +17,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.plausibility import unique_text
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
-from fenwear.stick.cone import project
+from fenwear.stick.equations import project
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 

@@ -18,9 +18,9 @@ from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 from fenwear.stick.cycle import PartialSlipProblem
+from fenwear.stick.position import surface_gradient, surface_strain
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
-from fenwear.stick.strain import surface_gradient, surface_strain
 
 COARSE = (
     "geometry.parameters={radius='10 mm', contact_width='0.4 mm', stroke='0 mm', across=4,"

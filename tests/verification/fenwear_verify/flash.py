@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.flash.kernels import cell_integrals
-from fenwear.flash.response import Instants, Periodic
+from fenwear.flash.response import Instants, Periodic, cell_integrals
 from fenwear_verify.moving_source import HALF, RHO_C, K, rise_in_source
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

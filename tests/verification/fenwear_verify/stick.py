@@ -11,7 +11,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, make_sliding
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
-from fenwear.stick.strain import surface_gradient, surface_strain
+from fenwear.stick.position import surface_gradient, surface_strain
 from fenwear_verify.bodies import STEEL, two_block_case
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

@@ -22,8 +22,7 @@ from scipy.sparse.linalg import splu
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import on_root
-from fenwear.stick.cone import derivative
-from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
+from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement, derivative
 from fenwear.stick.interface import meshed
 from fenwear_verify.full_space.bodies import WholeBodies, whole_bodies
 

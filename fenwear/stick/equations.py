@@ -182,8 +182,8 @@ class Step:
         """
         duration, state = self.imposed.duration, self.before.crept
         punch, strip, layer = creep.displaced(state, duration)
-        forced, factors = self.imposed.loaded.by_force, creep.factors(duration)
-        punch, strip = punch + (factors[0] - 1) * forced[0], strip + (factors[1] - 1) * forced[1]
+        loaded, factors = self.imposed.loaded, creep.factors(duration)
+        punch, strip = punch + (factors[0] - 1) * loaded.forced_punch, strip + (factors[1] - 1) * loaded.forced_strip
         return (punch, strip, layer), creep.displaced(state)
 
     def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
@@ -303,10 +303,10 @@ class Step:
         moved = found.moved or self._moved(f, found.jump)
         crept = self.before.crept
         if self.creep.creeps:
-            (punch, strip), (push, back) = self.imposed.loaded.by_force, self.position.forces(f)
+            loaded, (push, back) = self.imposed.loaded, self.position.forces(f)
             elastic = (
-                self.creep.elastic(push, moved.on_punch, punch),
-                self.creep.elastic(-back, moved.on_strip, strip),
+                self.creep.elastic(push, moved.on_punch, loaded.forced_punch),
+                self.creep.elastic(-back, moved.on_strip, loaded.forced_strip),
                 self.creep.closure * pressure,
             )
             crept = self.creep.after(crept, elastic, self.imposed.duration)

@@ -51,7 +51,7 @@ class OppositeBodies:
     ) -> None:
         self.punch, self.strip, self.field = punch, strip, field
         self.creep = stiff(punch, strip)
-        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, (punch.by_load, strip.by_load))
+        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, punch.by_load, strip.by_load)
         self._positions: dict[float | Placement, Position] = {0.0: position_of(rigid, punch, strip, field)}
         self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
 
@@ -219,8 +219,8 @@ class StickInterface(OppositeBodies):
         bodies = self.bodies if fraction is None else self.bodies.under(self.case, fraction)
         resultant = np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant])
         punch, strip = self.punch.under(bodies.punch).by_load, self.strip.under(bodies.strip).by_load
-        forced = punch - self.creep.moved[0], strip - self.creep.moved[1]
-        self._loaded[fraction] = LoadEffect(resultant, punch, strip, forced)
+        forced_punch, forced_strip = punch - self.creep.moved[0], strip - self.creep.moved[1]
+        self._loaded[fraction] = LoadEffect(resultant, punch, strip, forced_punch, forced_strip)
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)

@@ -41,27 +41,28 @@ class LoadEffect:
         resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
         on_punch: Displacement of the punch's contact nodes (n, d), mm.
         on_strip: Of the strip at the nodes of its operator (q, d), mm.
-        by_force: Of both of these what forces do, and so creeps.
+        forced_punch, forced_strip: Of both of these what forces do, and so creeps.
     """
 
     resultant: Array
     on_punch: Array
     on_strip: Array
-    by_force: tuple[Array, Array]
+    forced_punch: Array
+    forced_strip: Array
 
     def times(self, factor: float) -> LoadEffect:
         """Return the same of loads times a factor."""
         if factor == 1:
             return self
-        forced = factor * self.by_force[0], factor * self.by_force[1]
-        return LoadEffect(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
+        return LoadEffect(*(factor * part for part in self._parts))
 
     def plus(self, other: LoadEffect) -> LoadEffect:
         """Return what both loads do."""
-        forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
-        return LoadEffect(
-            self.resultant + other.resultant, self.on_punch + other.on_punch, self.on_strip + other.on_strip, forced
-        )
+        return LoadEffect(*(one + more for one, more in zip(self._parts, other._parts, strict=True)))
+
+    @property
+    def _parts(self) -> tuple[Array, Array, Array, Array, Array]:
+        return self.resultant, self.on_punch, self.on_strip, self.forced_punch, self.forced_strip
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
 NO_PROSE = re.compile(
     r"^(`{3,}).*?^\1|^\$\$.*?\$\$$|^## Sources$.*?(?=^#|\Z)|<!--.*?-->|\A---\n.*?^---$", re.MULTILINE | re.DOTALL
 )
-NO_LINE = re.compile(r"\s*(#|\||!\[|\(\w+\)=|\+\+\+)")
+NO_LINE = re.compile(r" {4}|\s*(#|\||!\[|\(\w+\)=|\+\+\+)")
 FORMULA = re.compile(r"\$\$.+?\$\$|\$[^$]+\$", re.DOTALL)
 # These become one word; of a link its text stays.
 WORDS = (re.compile(r"(`+)[^`]+?\1"), re.compile(r"\$[^$]+\$"), re.compile(r"\[\]\([^)]*\)"))
@@ -76,6 +76,17 @@ def _joined(gathered: list[tuple[int, str]]) -> Paragraph:
     return Paragraph(text, tuple(lines))
 
 
+def read(page: Path) -> str:
+    """Return the text of a page; of a notebook's script its cells of Markdown, on their lines."""
+    lines = page.read_text("utf-8").split("\n")
+    if page.suffix == ".py":
+        prose = False
+        for at, line in enumerate(lines):
+            prose = "[markdown]" in line if line.startswith("# %%") else prose
+            lines[at] = line[2:] if prose and not line.startswith("# %%") else ""
+    return "\n".join(lines)
+
+
 def pages() -> list[Path]:
     """Return the pages that the check reads."""
     return sorted({path for pattern in SETTINGS["pages"] for path in ROOT.glob(pattern)})
@@ -109,7 +120,7 @@ def count() -> None:
     """Print the number of sentences of each page and how many of them are too long."""
     total = long = 0
     for page in pages():
-        lengths = [words(s) for paragraph in paragraphs(page.read_text("utf-8")) for _, s in paragraph.sentences()]
+        lengths = [words(s) for paragraph in paragraphs(read(page)) for _, s in paragraph.sentences()]
         over = sum(length > SETTINGS["longest"] for length in lengths)
         total, long = total + len(lengths), long + over
         print(f"{page.relative_to(ROOT)}: {len(lengths)} sentences, {over} long")
@@ -121,7 +132,7 @@ def check() -> int:
     CheckRegistry().register_many(all_checks)
     status = 0
     for page in pages():
-        for line, finding in findings(page.read_text("utf-8")):
+        for line, finding in findings(read(page)):
             print(f"{page.relative_to(ROOT)}:{line}: {finding}")
             status = 1
     return status

@@ -119,25 +119,25 @@ class Results(Written):
         others = [one for one in plane if one.name in registry.ON_SURFACES]
         groups: dict[str, Any] = {
             "In every run": registry.IN_RUN,
-            "What a tribometer measures; with _strip of the strip": (
+            "The sheet; names of the strip's variables end in _strip": (
                 *sheet.SLIDING,
                 *sheet.TURNING,
                 *sheet.of_a_plane_body("punch"),
                 *sheet.of_a_body("punch"),
                 *sheet.of_the_scar("punch", ("x",), ("length", "width")),
             ),
-            "Where the strip wears": registry.OF_STRIP,
+            "With wear of the strip": registry.OF_STRIP,
             "With a program": registry.OF_PROGRAM,
             "With heat": registry.OF_HEAT,
             "With heat.track": registry.OF_TRACK,
-            "Of solids and rings in place of those": others,
-            "Of a coated body, with _strip of the strip": coating.of_body("punch"),
-            "Of a body that creeps, with _strip of the strip": creep.of_member("punch"),
-            "Of solids in a cycle that is a table": table_cycle.VARIABLES,
-            "Of rough surfaces, with _strip of the strip": roughness.of_body("punch"),
+            "Solids and rings, in place of the plane variables": others,
+            "Coatings; names of the strip's variables end in _strip": coating.of_body("punch"),
+            "Creep; names of the strip's variables end in _strip": creep.of_member("punch"),
+            "Cycles as tables, in solids": table_cycle.VARIABLES,
+            "Rough surfaces; names of the strip's variables end in _strip": roughness.of_body("punch"),
             "With contact.law = coulomb": steps.VARIABLES,
             "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,
-            "With contact.law = coulomb in a solid instead, or as well": steps.of_solids(),
+            "With contact.law = coulomb in solids, further or in place of these": steps.of_solids(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

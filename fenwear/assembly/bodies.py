@@ -44,8 +44,6 @@ def check_coatings(case: Case, punch: ElasticBody, strip: ElasticBody) -> None:
     """
     for body, law, elastic in (("punch", case.wear.punch, punch), ("strip", case.wear.strip, strip)):
         thickness = coating_thickness(law, elastic.surface.unworn, body)
-        if thickness is None:
-            continue
         there, thickest = _height(elastic), float(thickness.max(initial=0.0))
         if thickest >= there:
             message = f"expected less than the body, which is {there:.4g} mm thick, got {thickest:.4g} mm"

@@ -251,8 +251,13 @@ class ContactSetup:
         return np.asarray(np.linalg.lstsq(onto.T, self.pair.weights, rcond=None)[0])
 
     @cached_property
-    def coatings(self) -> tuple[Array | None, Array | None]:
-        """Thickness of the coatings of punch and strip at their own contact nodes, mm; None for a body without.
+    def coated(self) -> bool:
+        """Whether a body is."""
+        return any(thickness.any() for thickness in self.coatings)
+
+    @cached_property
+    def coatings(self) -> tuple[Array, Array]:
+        """Thickness of the coatings of punch and strip at their own contact nodes, mm; 0 without.
 
         Raises:
             CaseError: it is negative somewhere.

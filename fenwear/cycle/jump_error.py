@@ -93,8 +93,6 @@ def _through_difference(system: Tribosystem, before: RunState, whole: RunState, 
     """
     found = 0.0
     for body, thickness in zip(("punch", "strip"), system.coatings, strict=True):
-        if thickness is None:
-            continue
         first, one, other = (getattr(state.worn, body) for state in (before, whole, halves))
         ended = (first < thickness) & (np.maximum(one, other) >= thickness)
         apart = float(np.abs(one - other).max(where=ended, initial=0.0))

@@ -139,8 +139,7 @@ class PhaseStep:
         self._thermal = self._kind(system, phase, self._contact)
         conditions = system.conditions(phase)
         # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
-        coated = any(own is not None for own in system.coatings)
-        more = coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+        more = system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
         self._staying = None if more else conditions
         self._mu = system.friction.values(conditions)
         self._friction_ratio = system.phase_friction(phase, self._mu)

@@ -155,8 +155,7 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
         totals: What is added otherwise.
         lost: Depths worn meanwhile.
     """
-    punch, strip = system.coatings
-    if punch is None and strip is None:
+    if not system.coated:
         return totals
     sums = totals.sums.copy()
     rows = zip(
@@ -164,7 +163,7 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
         (lost.punch, lost.strip), system.bodies.densities, strict=True,
     )  # fmt: skip
     for body, coating, weights, depth, density in rows:
-        if coating is not None:
+        if coating.any():
             areas, first = system.bodies.punch.thickness * weights, SUMS.index(f"volume_{body}")
             mass = np.nan if density is None else float(MILLIGRAM * (areas * density) @ depth)
             sums[first : first + 2] = float(areas @ depth), mass

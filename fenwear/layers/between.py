@@ -73,7 +73,7 @@ class Layers:
         memory: States of laws of one's own; None without.
         begun: These at the start; None without.
         strip_carries: Whether debris lies on the strip's material.
-        soft: Coatings of punch and strip that give way beside their base; None for a body without.
+        soft: Coatings of punch and strip that may give way beside their base; none where no law of wear is known.
     """
 
     nodes: int
@@ -85,7 +85,7 @@ class Layers:
     memory: Memory | None = None
     begun: Held | None = None
     strip_carries: bool = False
-    soft: tuple[SoftCoating | None, SoftCoating | None] = (None, None)
+    soft: tuple[SoftCoating, ...] = ()
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
@@ -128,34 +128,29 @@ class Layers:
         """Return whether something gives way by a law that is not linear, apart from what `capped` pressures flow."""
         return self.softens or (self.closure is not None if capped else self.curved)
 
-    @property
+    @cached_property
     def softens(self) -> bool:
         """Whether a coating gives way beside its base."""
-        return self.soft != (None, None)
+        return any(coating.modulus < np.inf for coating in self.soft)
 
-    def coatings_left(
-        self, pairs: Sequence[ContactPair], punch: Array, strip: Array
-    ) -> tuple[Array | None, Array | None]:
-        """Return what is left of coatings that give way in each phase (m, n), mm; None for a body without.
+    def coatings_left(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> tuple[Array, Array]:
+        """Return what is left of the coatings of punch and strip in each phase (m, n), mm.
 
         Args:
             pairs: The surfaces opposite each other in each phase.
             punch, strip: Depths worn off both bodies at their own nodes, mm.
         """
         of_punch, of_strip = self.soft
-        below = None if of_strip is None else of_strip.left(strip)
+        below = of_strip.left(strip)
         return (
-            None if of_punch is None else np.broadcast_to(of_punch.left(punch), (len(pairs), self.nodes)),
-            None if below is None else np.array([pair.wear_interpolation @ below for pair in pairs]),
+            np.broadcast_to(of_punch.left(punch), (len(pairs), self.nodes)),
+            np.array([pair.wear_interpolation @ below for pair in pairs]),
         )
 
     def coatings_closure(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> CoatedClosure:
         """Return by what coatings give way in each phase (m, n) at depths; arguments as of `coatings_left`."""
         left = self.coatings_left(pairs, punch, strip)
-        both = zip(left, self.soft, strict=True)
-        return CoatedClosure(
-            None, tuple((own, soft.modulus) for own, soft in both if own is not None and soft is not None)
-        )
+        return CoatedClosure(None, tuple((own, soft.modulus) for own, soft in zip(left, self.soft, strict=True)))
 
     def closure_at(self, pair: ContactPair, worn: WornDepths) -> Closure | None:
         """Return the law by which all that lies between gives way where these depths are worn, at one place."""

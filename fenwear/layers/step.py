@@ -298,9 +298,7 @@ class LayerStep:
         layers = self.passing.layers
         left = layers.coatings_left(self.passing.wear.pairs, *self._depths(pressure))
         punch, strip = (
-            np.ones_like(pressure)
-            if own is None or soft is None
-            else np.where(own > 0, 1 - compressed(pressure, soft.modulus), 1.0)
+            np.where(own > 0, 1 - compressed(pressure, soft.modulus), 1.0)
             for own, soft in zip(left, layers.soft, strict=True)
         )
         return punch, strip

@@ -38,7 +38,7 @@ def of_body(body: str) -> dict[str, Variable]:
 def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of coatings."""
     coated = zip(BODIES, placed.coatings, strict=True)
-    return {name: one for body, own in coated if own is not None for name, one in of_body(body).items()}
+    return {name: one for body, own in coated if own.any() for name, one in of_body(body).items()}
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -46,7 +46,7 @@ def values(block: Block) -> dict[str, Array]:
     pair, found = block.system.pair, dict[str, Array]()
     surfaces = ((pair.weights, block.wear), (pair.strip.weights, block.wear_strip))
     for end, thickness, (weights, depth) in zip(BODIES.values(), block.system.coatings, surfaces, strict=True):
-        if thickness is not None:
+        if thickness.any():
             coated, left = weights * (thickness > 0), left_of(thickness, depth)
             through = (depth >= thickness) @ coated
             scar = (depth > EDGE * depth.max(axis=1, keepdims=True)) @ coated
@@ -66,8 +66,6 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
     """
     system, found = block.system, dict[str, float]()
     for row, (body, thickness) in enumerate(zip(BODIES, system.coatings, strict=True)):
-        if thickness is None:
-            continue
         begun, own = ((before.worn.punch, block.wear), (before.worn.strip, block.wear_strip))[row]
         cycles = np.concatenate([[before.half_cycle], block.half_cycle])
         ended, at = _ends(_coated(system, body, thickness), np.vstack([begun, own]), cycles)

@@ -21,6 +21,8 @@ from fenwear.case.layers import place_values
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 
+Covered = tuple[Array | float, Array | float]  # of punch and strip
+BARE: Covered = (0.0, 0.0)
 FADES = 0.1  # of the thickness, over which the friction of a coating goes over to that of the base
 
 
@@ -32,6 +34,10 @@ class Shares:
     base: Array
     by_coating: Array
     by_base: Array
+
+    def of(self, coating: Array, base: Array) -> Array:
+        """Return w of A and B (..., n), mm."""
+        return self.coating * coating + self.base * base
 
     def at(self, interpolation: Array) -> Shares:
         """Return the same at other nodes, by a matrix that interpolates there."""
@@ -62,8 +68,8 @@ def covered(thickness: Array, depth: Array) -> Array:
     return np.where(thick, np.minimum(left_of(thickness, depth) / np.where(thick, FADES * thickness, 1.0), 1.0), 0.0)
 
 
-def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array | None:
-    """Return the thickness of a body's coating at its contact nodes (n,), mm; None without.
+def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array:
+    """Return the thickness of a body's coating at its contact nodes (n,), mm; 0 without.
 
     Args:
         law: The wear law of the body.
@@ -74,14 +80,14 @@ def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array | None:
         CaseError: it is negative somewhere.
     """
     if law is None or law.coating is None:
-        return None
+        return np.zeros(len(x))
     place = dict(zip("xyz", in_space(x).T, strict=True))
     name = f"wear.{key}.coating.thickness"
     return np.asarray(place_values(law.coating.thickness, place, len(x), "mm", name, 0.0))
 
 
-def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[Array | None, Array | None]:
-    """Return the thickness of the coatings of punch and strip at their own contact nodes, mm; None without.
+def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[Array, Array]:
+    """Return the thickness of the coatings of punch and strip at their own contact nodes, mm; 0 without.
 
     Raises:
         CaseError: it is negative somewhere.
@@ -99,7 +105,7 @@ class SoftCoating:
 
     Attributes:
         thickness: At the body's own contact nodes (n,), mm.
-        modulus: Small pressures over the share by which they compress it, MPa.
+        modulus: Small pressures over the share by which they compress it, MPa; infinite where it does not give way.
     """
 
     thickness: Array
@@ -110,40 +116,30 @@ class SoftCoating:
         return left_of(self.thickness, depth)
 
 
-def soft_coatings(
-    pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]
-) -> tuple[SoftCoating | None, SoftCoating | None]:
-    """Return the coatings of punch and strip that give way beside their base; None for a body without.
+def soft_coatings(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[SoftCoating, SoftCoating]:
+    """Return the coatings of punch and strip, which may give way beside their base.
 
     Raises:
         CaseError: the thickness of one is negative somewhere.
     """
-    punch, strip = (
-        SoftCoating(thickness, law.coating.modulus)
-        if law is not None and law.coating is not None and law.coating.modulus is not None and thickness is not None
-        else None
-        for law, thickness in zip(laws, coatings_of(pair, laws), strict=True)
-    )
+    coatings = [None if law is None else law.coating for law in laws]
+    moduli = [getattr(coating, "modulus", None) or np.inf for coating in coatings]
+    punch, strip = map(SoftCoating, coatings_of(pair, laws), moduli)
     return punch, strip
 
 
-def covering(
-    coatings: tuple[Array | None, Array | None], pair: ContactPair, depths: tuple[Array, Array] | None
-) -> tuple[Array | None, Array | None]:
+def covering(coatings: tuple[Array, Array], pair: ContactPair, depths: tuple[Array, Array] | None) -> Covered:
     """Return how much of the friction of both bodies' coatings is left at the contact's nodes (n,), from 1 to 0.
 
     Args:
-        coatings: Thickness at the bodies' own nodes; None for a body without.
+        coatings: Thickness at the bodies' own nodes, mm.
         pair: The surfaces opposite each other.
         depths: Worn off both bodies at their own nodes, mm; None where all is worn through.
     """
-    if depths is None or (coatings[0] is None and coatings[1] is None):
-        return None, None
-    punch, strip = (
-        None if thickness is None else covered(thickness, depth)
-        for thickness, depth in zip(coatings, depths, strict=True)
-    )
-    return punch, None if strip is None else pair.wear_interpolation @ strip
+    if depths is None or not any(thickness.any() for thickness in coatings):
+        return BARE
+    punch, strip = map(covered, coatings, depths)
+    return punch, pair.wear_interpolation @ strip
 
 
 @dataclass(frozen=True)
@@ -151,7 +147,7 @@ class CoatedBody:
     """A coated body whose coefficients go by a ratio: its depth by A, which grows evenly through the coating's end.
 
     Attributes:
-        thickness: Of the coating at the body's own contact nodes (n,), mm.
+        thickness: Of the coating at the body's own contact nodes (n,), mm; 0 without.
         ratio: k_b / k_c (n,).
     """
 

@@ -93,8 +93,7 @@ class ContactConditions:
         debris: Thickness of the third body (n,), mm; None without.
         edge: Distance from the edge of the contact (n,), mm; None where nothing asks for it.
         friction_temperature: Which one friction depends on, see `FRICTION_TEMPERATURES`.
-        covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`; None
-            for a body without one, or where all is worn through.
+        covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`.
     """
 
     pressure: Array
@@ -106,7 +105,7 @@ class ContactConditions:
     regions: tuple[Regions, Regions]
     cycle: CycleShear | None = None
     states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
-    covered: tuple[Array | None, Array | None] = (None, None)
+    covered: tuple[Array | float, Array | float] = (0.0, 0.0)
     debris: Array | None = None
     edge: Array | None = None
     friction_temperature: str = "mean"
@@ -277,7 +276,7 @@ class Friction:
         if self.of_coatings == (None, None):
             return found
         for of_coating, share in zip(reversed(self.of_coatings), reversed(conditions.covered), strict=True):
-            if of_coating is not None and share is not None:  # the punch's before the strip's, where both have one
+            if of_coating is not None:  # the punch's before the strip's, where both have one
                 found = found + share * (of_coating - found)
         return found
 

@@ -376,7 +376,7 @@ class Wear:
         sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
-        coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
+        coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
         split: Whether nodes between regions share their pressure among unlike coefficients.
     """
 
@@ -385,7 +385,7 @@ class Wear:
     sliding: tuple[Array, Array]
     pairs: Sequence[ContactPair]
     friction: Friction
-    coatings: tuple[Array | None, Array | None] = (None, None)
+    coatings: tuple[Array, Array]
     split: bool = False
 
     @cached_property
@@ -426,7 +426,7 @@ class Wear:
             above = law.of_coating
             coating = (
                 None
-                if above is None or thickness is None
+                if above is None
                 else _CoatingWear(rates(above), PressureLaw.of(above, self.friction.contact.uniform_share), thickness)
             )
             bodies.append(_BodyWear(rates(law), self._of_pressure[key], coating))

@@ -26,7 +26,7 @@ from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StepStart, StickHeat, coupled_step
 from fenwear.stick.increment import advance
 from fenwear.stick.interface import OppositeBodies, untouched
-from fenwear.stick.losses import NOT_COATED, CoatedBodies, StepConditions, StepLosses, StepSlips
+from fenwear.stick.losses import CoatedBodies, StepConditions, StepLosses, StepSlips
 from fenwear.stick.position import LoadEffect, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.records import TimeStepRecords, record
@@ -63,13 +63,15 @@ class PartialSlipProblem:
         heat: StickHeat | None = None,
         expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded,
         laws: LocalLaws | None = None,
-        coatings: CoatedBodies = NOT_COATED,
+        coatings: CoatedBodies | None = None,
     ) -> None:
-        self.expanded, self.laws, self.coatings = expanded, laws, coatings
+        pair = interface.middle.pair
+        self.expanded, self.laws = expanded, laws
+        self.coatings = coatings or CoatedBodies.bare(len(pair.weights), len(pair.strip.weights))
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
-        self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
+        self.weights, self.watch, self.heat = pair.weights, watch, heat
         self.conditions = StepConditions(interface, program, laws, heat, wear.strip is not None)
-        self.losses = StepLosses(self.conditions, wear, coatings)
+        self.losses = StepLosses(self.conditions, wear, self.coatings)
         self._pressed: PartialSlipState | None = None  # unworn, under the case's loads, where the first cycle begins
 
     def watching(self, watch: Callable[[], object]) -> PartialSlipProblem:

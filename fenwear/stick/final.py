@@ -444,15 +444,12 @@ def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
     """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    punch, strip = problem.coatings.punch, problem.coatings.strip
-    if problem.coatings.none or not 0 < share < 1:
+    if not problem.coatings.any or not 0 < share < 1:
         return np.asarray(share * depth)
-    strip = None if strip is None else strip.at(problem.interface.middle.pair.wear_interpolation)
+    punch, strip = problem.coatings.punch, problem.coatings.strip.at(problem.interface.middle.pair.wear_interpolation)
 
     def lost(rubbed: Array) -> tuple[Array, Array]:
-        parts = ((punch, share * rubbed), (strip, (1 - share) * rubbed))
-        found = [one if coated is None else coated.depth(one) for coated, one in parts]
-        return found[0], found[1]
+        return punch.depth(share * rubbed), strip.depth((1 - share) * rubbed)
 
     low, high = np.zeros_like(depth), np.maximum(depth, 1e-300)
     for _ in range(DOUBLED):

@@ -124,53 +124,42 @@ class StepConditions:
         return [self.interface.position(place).pair for place in places]
 
 
-BothShares = tuple[Shares | None, Shares | None]  # of punch and strip; None for a body without coating
+BothShares = tuple[Shares, Shares]  # of punch and strip
 PerLayer = tuple[tuple[Array, Array], tuple[Array, Array]]  # of punch and strip, of coating and base each
 
 
 @dataclass(frozen=True)
 class CoatedBodies:
-    """The coatings of punch and strip; None for a body without."""
+    """The coatings of punch and strip."""
 
-    punch: CoatedBody | None = None
-    strip: CoatedBody | None = None
+    punch: CoatedBody
+    strip: CoatedBody
+
+    @classmethod
+    def bare(cls, punch: int, strip: int) -> CoatedBodies:
+        """Return bodies of so many contact nodes without coatings."""
+        return cls(*(CoatedBody(np.zeros(nodes), np.ones(nodes)) for nodes in (punch, strip)))
 
     @property
-    def none(self) -> bool:
-        """Whether neither body is coated."""
-        return self.punch is None and self.strip is None
+    def any(self) -> bool:
+        """Whether a body is coated."""
+        return bool(self.punch.thickness.any() or self.strip.thickness.any())
 
-    @property
-    def _named(self) -> tuple[tuple[str, CoatedBody | None], tuple[str, CoatedBody | None]]:
-        return ("punch", self.punch), ("strip", self.strip)
-
-    def parts(self, before: WornDepths, more: WornDepths | None = None, bases: WornDepths | None = None) -> BothShares:
-        """Return what of coatings and bases is worn at the nodes of punch and strip; None for a body without coating.
+    def parts(self, before: WornDepths, more: WornDepths, bases: WornDepths) -> BothShares:
+        """Return what of coatings and bases is worn at the nodes of punch and strip.
 
         Args:
             before: Depths where it begins.
-            more, bases: What would be worn of coatings that go on, and of bases; by default so little that no coating
-                ends.
+            more, bases: What would be worn of coatings that go on, and of bases.
         """
-        found: list[Shares | None] = []
-        for name, coated in self._named:
-            if coated is None:
-                found.append(None)
-                continue
-            left = left_of(coated.thickness, getattr(before, name))
-            of_coating, of_base = (
-                np.zeros_like(left) if one is None else np.asarray(getattr(one, name)) for one in (more, bases)
-            )
-            found.append(shares(of_coating, of_base, left))
-        return found[0], found[1]
+        return (
+            shares(more.punch, bases.punch, left_of(self.punch.thickness, before.punch)),
+            shares(more.strip, bases.strip, left_of(self.strip.thickness, before.strip)),
+        )
 
     def by(self, worn: WornDepths, bases: WornDepths) -> CoatedBodies:
         """Return the same by the ratio of what would be worn of bases and of coatings, where something is."""
-        found = [
-            None if coated is None else coated.by(getattr(worn, name), getattr(bases, name))
-            for name, coated in self._named
-        ]
-        return CoatedBodies(found[0], found[1])
+        return CoatedBodies(self.punch.by(worn.punch, bases.punch), self.strip.by(worn.strip, bases.strip))
 
     def measured_rate(self, rate: WornDepths, bases: WornDepths, worn: WornDepths) -> WornDepths:
         """Return rates of depths as those of `measured`, where these depths are worn.
@@ -179,30 +168,20 @@ class CoatedBodies:
             rate, bases: Of coatings that go on, and of bases.
             worn: Depths.
         """
-        found = {
-            name: coated.measured_rate(getattr(worn, name), getattr(rate, name), getattr(bases, name))
-            for name, coated in self._named
-            if coated is not None
-        }
-        return replace(rate, **found)
+        punch = self.punch.measured_rate(worn.punch, rate.punch, bases.punch)
+        return replace(rate, punch=punch, strip=self.strip.measured_rate(worn.strip, rate.strip, bases.strip))
 
     def measured(self, worn: WornDepths) -> WornDepths:
         """Return depths as what coatings would have lost if they went on: it grows evenly through their end."""
-        own = ((name, coated) for name, coated in self._named if coated is not None)
-        return replace(worn, **{name: coated.measure(getattr(worn, name)) for name, coated in own})
+        return replace(worn, punch=self.punch.measure(worn.punch), strip=self.strip.measure(worn.strip))
 
     def depths(self, measured: WornDepths) -> WornDepths:
         """Return the depths that `measured` made these of."""
-        own = ((name, coated) for name, coated in self._named if coated is not None)
-        return replace(measured, **{name: coated.depth(getattr(measured, name)) for name, coated in own})
+        return replace(measured, punch=self.punch.depth(measured.punch), strip=self.strip.depth(measured.strip))
 
     def slopes(self, worn: WornDepths) -> tuple[Array, Array]:
         """Return the derivative of depths to what coatings would have lost, at the nodes of punch and strip."""
-        punch, strip = self.punch, self.strip
-        return (
-            np.ones_like(worn.punch) if punch is None else punch.slope(worn.punch),
-            np.ones_like(worn.strip) if strip is None else strip.slope(worn.strip),
-        )
+        return self.punch.slope(worn.punch), self.strip.slope(worn.strip)
 
     def layers_of_wear(self, worn: WornDepths) -> tuple[PerLayer, PerLayer]:
         """Return for punch and strip what of coating and base wears at their nodes, and over what `measured` counts it.
@@ -212,24 +191,16 @@ class CoatedBodies:
         """
         there: list[tuple[Array, Array]] = []
         counted: list[tuple[Array, Array]] = []
-        for name, coated in self._named:
-            depth = getattr(worn, name)
-            lies = np.zeros(len(depth)) if coated is None else np.where(depth < coated.thickness, 1.0, 0.0)
+        for coated, depth in ((self.punch, worn.punch), (self.strip, worn.strip)):
+            lies = np.where(depth < coated.thickness, 1.0, 0.0)
             there.append((lies, 1 - lies))
-            by_ratio = 1 - lies if coated is None else coated.measured_rate(depth, np.zeros_like(lies), 1 - lies)
-            counted.append((lies, by_ratio))
+            counted.append((lies, coated.measured_rate(depth, np.zeros_like(lies), 1 - lies)))
         return (there[0], there[1]), (counted[0], counted[1])
 
     def ends_between(self, before: WornDepths, after: WornDepths) -> bool:
         """Return whether a coating ends somewhere between these depths."""
-        return any(
-            coated is not None
-            and bool(((getattr(before, name) < coated.thickness) & (getattr(after, name) >= coated.thickness)).any())
-            for name, coated in self._named
-        )
-
-
-NOT_COATED = CoatedBodies()
+        bodies = (self.punch, before.punch, after.punch), (self.strip, before.strip, after.strip)
+        return any(((first < own.thickness) & (then >= own.thickness)).any() for own, first, then in bodies)
 
 
 _Both = tuple[Array, Array]  # of punch and strip
@@ -266,19 +237,16 @@ class StepLosses:
             rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps: of a
                 coated body then as if all of it were of the coating.
         """
-        worn = self.worn_of(records, first)
-        if self.coatings.none:
-            parts: BothShares = (None, None)
-        else:
-            bases = self.worn_of(records, first, of_bases=True)
-            parts = self.coatings.parts(*((before.worn,) if rate else (before.worn, worn, bases)))
-            if not rate:
-                punch, strip = parts
-                worn = WornDepths(
-                    worn.punch if punch is None else punch.coating * worn.punch + punch.base * bases.punch,
-                    worn.strip if strip is None else strip.coating * worn.strip + strip.base * bases.strip,
-                )
+        worn, bases = (self.worn_of(records, first, of_bases=of_bases) for of_bases in (False, True))
+        parts = self.unended(before.worn) if rate else self.coatings.parts(before.worn, worn, bases)
+        if not rate:
+            punch, strip = parts
+            worn = WornDepths(punch.of(worn.punch, bases.punch), strip.of(worn.strip, bases.strip))
         return self._with_between(worn, parts, records, first, before, rate=rate)
+
+    def unended(self, before: WornDepths) -> BothShares:
+        """Return what of coatings and bases is worn from depths on by so little that no coating ends."""
+        return self.coatings.parts(before, *(2 * (before.times(0.0),)))
 
     def worn_of(self, records: TimeStepRecords, first: int, *, of_bases: bool = False) -> WornDepths:
         """Return what the steps of a record, the first of this number, wear off at the nodes of punch and strip.
@@ -305,7 +273,7 @@ class StepLosses:
         if laws is None:
             return False
         return laws.passes or any(
-            of_coating is not None and first is not None and then is not None and bool((first != then).any())
+            of_coating is not None and bool(np.any(first != then))
             for of_coating, first, then in zip(
                 laws.friction.of_coatings,
                 covering(laws.coatings, pair, (before.punch, before.strip)),
@@ -329,12 +297,7 @@ class StepLosses:
             parts: What is worn of both, at the nodes of punch and strip.
         """
         onto = self.conditions.interface.middle.pair.wear_interpolation
-        of_punch, of_strip = parts[0], None if parts[1] is None else parts[1].at(onto)
-        found = [
-            of_coating if part is None else part.coating * of_coating + part.base * of_base
-            for part, of_coating, of_base in zip((of_punch, of_strip), coatings, bases, strict=True)
-        ]
-        return np.asarray(found[0] + found[1])
+        return parts[0].of(coatings[0], bases[0]) + parts[1].at(onto).of(coatings[1], bases[1])
 
     def _with_between(
         self,
@@ -380,13 +343,8 @@ class StepLosses:
         of_punch, of_strip = parts
         found = []
         for k, pair in enumerate(self.conditions.pairs(slips_of(records), before)):
-            above, below, onto = records.punch_depth[k], records.strip_depth[k], pair.wear_projection
-            if of_punch is not None:
-                above = of_punch.coating * above + of_punch.base * records.punch_base[k]
-            on_strip = onto @ below
-            if of_strip is not None:
-                on_strip = of_strip.coating * on_strip + of_strip.base * (onto @ records.strip_base[k])
-            found.append(onto @ above + on_strip)
+            above, onto = of_punch.of(records.punch_depth[k], records.punch_base[k]), pair.wear_projection
+            found.append(onto @ above + of_strip.of(onto @ records.strip_depth[k], onto @ records.strip_base[k]))
         return np.array(found)
 
     def debris_over(self, records: TimeStepRecords, before: PartialSlipState) -> DebrisCycle:
@@ -409,7 +367,7 @@ class StepLosses:
         memory, laws = self.layers.memory, self.conditions.laws
         if memory is None or laws is None:
             return None
-        parts = self.coatings.parts(before.worn)
+        parts = self.unended(before.worn)
 
         def wearing(k: int, at: ContactConditions) -> Array:
             tau = float(slips.duration[k])

@@ -108,7 +108,7 @@ def unheated_problem(
     coatings = coatings_of(middle.pair, sliding.wear)
     edges = edges_of(bodies, middle.pair.punch) if case.contact.asks("edge", sliding.wear) else None
     friction = replace(sliding.friction, split=regions[0].split(sliding.friction.contact.friction))
-    laws = LocalLaws(friction, sliding.wear, regions, initial, coatings, edges)
+    laws = LocalLaws(friction, sliding.wear, coatings, regions, initial, edges)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     layers = interface.layers
     conditions = laws.conditions(

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.sparse import eye_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.case import Dependence, WearLaw
@@ -91,15 +92,15 @@ class LocalLaws:
         wear: The wear laws of punch and strip; None where a body does not wear.
         regions: Of punch and strip at the contact nodes.
         initial: Temperature without heat, K.
-        coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
+        coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
         edges: Distances from the edge of the contact; None where nothing depends on them.
     """
 
     friction: Friction
     wear: tuple[WearLaw | None, WearLaw | None]
+    coatings: tuple[Array, Array]
     regions: tuple[Regions, Regions] = field(default_factory=lambda: (Regions(), Regions()))
     initial: float = 0.0
-    coatings: tuple[Array | None, Array | None] = (None, None)
     edges: Edges | None = None
 
     @property
@@ -194,21 +195,16 @@ class LocalLaws:
             bases,
         )
 
-    def coated(self, pair: ContactPair, conditions: ContactConditions) -> tuple[CoatedBody | None, CoatedBody | None]:
-        """Return the coatings of both bodies with the ratio of their base's coefficient to theirs there; None without.
+    def coated(self, pair: ContactPair, conditions: ContactConditions) -> tuple[CoatedBody, CoatedBody]:
+        """Return the coatings of both bodies with the ratio of their base's coefficient to theirs there.
 
         Raises:
             CaseError: a coefficient is negative or not finite there.
         """
-        found: list[CoatedBody | None] = []
-        for law, key, thickness in zip(self.wear, ("wear.punch", "wear.strip"), self.coatings, strict=True):
-            above = None if law is None else law.of_coating
-            if law is None or above is None or thickness is None:
-                found.append(None)
-                continue
-            base, coating = (coefficient(one, self.friction, conditions, key) for one in (law, above))
-            if key == "wear.strip":
-                base, coating = (pair.wear_projection @ one for one in (base, coating))
-            ratio = np.divide(base, coating, out=np.ones_like(base), where=coating > 0)
-            found.append(CoatedBody(thickness, np.asarray(ratio)))
+        found, own = [], eye_array(len(conditions.pressure))
+        onto = own, pair.wear_projection
+        for thickness, laws, put in zip(self.coatings, self.wear_at(conditions).layers, onto, strict=True):
+            coating, base = (np.zeros(len(thickness)) if law is None else put @ law.rate for law in laws)
+            ratio = np.divide(base, coating, out=np.ones_like(thickness), where=coating > 0)
+            found.append(CoatedBody(thickness, ratio))
         return found[0], found[1]

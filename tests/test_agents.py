@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from fenwear import CaseError, load_case
-from fenwear.case.editors import json_schema
+from fenwear.case.keys import json_schema
 from fenwear.cli import agents
 from fenwear.errors import StackError
 

@@ -16,7 +16,7 @@ from fenwear.assembly.bodies import Bodies, edges_of
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Dependence, Heat
+from fenwear.case import Case, Heat
 from fenwear.case.names import Names, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import Isothermal
@@ -379,14 +379,7 @@ class ContactSetup:
     @property
     def passing_laws(self) -> list[str]:
         """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
-        laws = zip(("punch", "strip"), self.sliding.wear, strict=True)
-        given: dict[str, object] = {
-            f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in laws if law is not None
-        }
-        given["contact.friction"] = self.friction.contact.friction
-        third = self.friction.contact.third_body
-        given["contact.third_body.life"] = None if third is None else third.life
-        return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
+        return self.case.passing_laws
 
     @cached_property
     def constant_coefficients(self) -> bool:

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.case.creep import Creep
+from fenwear.case.materials import Creep
 
 STAYS = 1e-12  # change of a load over that of the middle: rounding
 PER_DECADE, FIRST, LAST = 2, -1, 15  # terms of a logarithm's, and the decades around its onset that they reach over

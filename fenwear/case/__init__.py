@@ -1,8 +1,8 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
-from fenwear.case.bodies import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support
+from fenwear.case.bodies import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support, Topography
 from fenwear.case.contact import Contact
-from fenwear.case.course import Output, Run
+from fenwear.case.course import Output, Run, Setup
 from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
@@ -11,9 +11,7 @@ from fenwear.case.plausible import plausibility_warnings
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, heat_of, load_case, make_case
 from fenwear.case.schema import Case
-from fenwear.case.setup import Setup
 from fenwear.case.thermal import Heat, Track
-from fenwear.case.topography import Topography
 
 __all__ = [
     "AUTO",

@@ -1,30 +1,31 @@
-"""The tables of the two bodies: geometry, model, supports, loads and held temperatures."""
+"""The tables of the two bodies: geometry, model, supports, loads, held temperatures, profiles and rough surfaces."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from fenwear.arrays import Array
-from fenwear.case.creep import Creep
+from fenwear.case.materials import Creep
 from fenwear.case.quantities import (
     Axis,
+    Check,
     Forces,
     Kind,
     Length,
     Moments,
     Number,
+    OverCycle,
     Part,
     Point,
     Stresses,
     Temperature,
     Unit,
 )
-from fenwear.case.topography import Topography
 from fenwear.case.units import convert, shown
 
 NOTHING = 1e-9  # of a load: what is called a factor still
@@ -71,17 +72,12 @@ class Geometry(Part):
     order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
         default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
     )
-    follow_wear: Annotated[Number, Field(gt=0)] | None = Field(
+    follow_wear: Annotated[
+        Annotated[Number, Field(gt=0)] | None, BeforeValidator(lambda value: None if value == "never" else value)
+    ] = Field(
         default=0.5,
         description="worn depth over the elements' height above which the mesh follows the worn surface; or never",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _follow_or_not(cls, data: object) -> object:
-        if isinstance(data, Mapping) and data.get("follow_wear") == "never":
-            return {**data, "follow_wear": None}
-        return data
 
 
 class Grid(Part):
@@ -123,13 +119,13 @@ class Model(Part):
     plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
     thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
 
-    @model_validator(mode="after")
-    def _plane_alone(self) -> Self:
-        if self.kind != "plane":
-            for key, default in (("plane", "stress"), ("thickness", 1.0)):
-                if getattr(self, key) != default:
-                    raise ValueError(f"{key}: belongs to plane models, not with kind = '{self.kind}'")
-        return self
+    checks = tuple(
+        Check(
+            lambda s, key=key, default=default: s.kind != "plane" and getattr(s, key) != default,
+            f"{key}: belongs to plane models, not with kind = '{{0.kind}}'",
+        )
+        for key, default in (("plane", "stress"), ("thickness", 1.0))
+    )
 
     @property
     def law(self) -> Kind:
@@ -153,18 +149,18 @@ class Support(Part):
         description="displacement of each of these components, such as an approach in place of a load; by default zero",
     )
 
-    @model_validator(mode="after")
-    def _one_place(self) -> Self:
-        if (self.on is None) == (self.at is None):
-            raise ValueError("give either on = (a group) or at = (a point)")
-        if self.by is not None and len(self.by) != len(self.fix):
-            raise ValueError(f"by: expected a displacement for each of fix, {len(self.fix)}, got {len(self.by)}")
-        return self
+    one_of = (("on", "at"),)
+    checks = (
+        Check(
+            lambda s: s.by and len(s.by) != len(s.fix),
+            "by: expected a displacement for each of fix, {0.fix}, got {0.by}",
+        ),
+    )
 
     @property
     def moves(self) -> bool:
         """Whether it prescribes a displacement."""
-        return self.by is not None and any(self.by)
+        return any(self.by or ())
 
 
 class Load(Part):
@@ -182,26 +178,23 @@ class Load(Part):
     moment: Moments | None = Field(
         default=None, description="a moment besides, or alone: [about y], in a solid [about x, y, z]"
     )
-    over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+    over_cycle: OverCycle | None = Field(
         default=None,
         description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
     )
 
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        if self.force is not None and self.traction is not None:
-            raise ValueError("give either force or traction")
-        if self.force is None and self.traction is None and self.moment is None:
-            raise ValueError("expected a force, a traction or a moment")
-        if self.through is not None and self.force is None:
-            raise ValueError("through: expected a force, which acts through this point")
-        if self.over_cycle is not None:
-            fractions = [fraction for fraction, _ in self.over_cycle]
-            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
-                raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
-            if 0 < max(abs(factor) for _, factor in self.over_cycle) < NOTHING:
-                raise ValueError(f"over_cycle: expected a factor of at least {NOTHING:g}, or none but zeros")
-        return self
+    checks = (
+        Check(lambda s: len(s.given("force", "traction")) > 1, "give either force or traction"),
+        Check(lambda s: not s.given("force", "traction", "moment"), "expected a force, a traction or a moment"),
+        Check(
+            lambda s: s.given("through") and not s.given("force"),
+            "through: expected a force, which acts through this point",
+        ),
+        Check(
+            lambda s: 0 < max((abs(factor) for _, factor in s.over_cycle or ()), default=0.0) < NOTHING,
+            f"over_cycle: expected a factor of at least {NOTHING:g}, or none but zeros",
+        ),
+    )
 
     _of_table: bool = False  # of a motion that is a table
 
@@ -217,7 +210,7 @@ class Load(Part):
     def moment_problems(self, key: str, model: str) -> list[str]:
         """Return what of it does not go with a plane, an axisymmetric or a solid model."""
         if model == "axisymmetric":
-            wrong = [name for name in ("through", "moment") if getattr(self, name) is not None]
+            wrong = self.given("through", "moment")
             return [f"{key}.{name}: expected none in rings: what acts on them is the same all around" for name in wrong]
         told = {"plane": (1, "[about y]"), "solid": (3, "[about x, about y, about z]")}[model]
         if self.moment is None or len(self.moment) == told[0]:
@@ -243,9 +236,8 @@ class Load(Part):
 
     def _scaled(self, factor: float) -> Load:
         scaled = {
-            name: tuple(factor * component for component in vector)
-            for name in ("force", "traction", "moment")
-            if (vector := getattr(self, name)) is not None
+            name: tuple(factor * component for component in getattr(self, name))
+            for name in self.given("force", "traction", "moment")
         }
         return self.model_copy(update={**scaled, "over_cycle": None})
 
@@ -320,6 +312,55 @@ class Profile(Part):
         default="x",
         description="what the first number of points of a plane body is: x, or the arc length s, which is x in the "
         "middle of the curve and grows with x there; a file says it by its heading",
+    )
+
+
+Positive = Annotated[Length, Field(gt=0)]
+
+
+def _degree(value: object) -> object:
+    """Return the degree of a polynomial that has a name."""
+    return {"plane": 1, "mean": 0}.get(value, value) if isinstance(value, str) else value
+
+
+class Topography(Part):
+    """Heights of a surface above its shape: of a map in a file, self-affine, or wavy; on a contact grid alone."""
+
+    file: str | None = Field(
+        default=None,
+        description="a height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
+        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by SurfaceTopography or "
+        "surfalize, where one of them is installed",
+    )
+    holes: Literal["reject", "fill", "keep"] = Field(
+        default="reject",
+        description="of a map: points without a number, fill values such as -9999 and spikes; fill: by their "
+        "neighbours; keep: heights far beyond the others are real",
+    )
+    level: Annotated[int, BeforeValidator(_degree), Field(ge=0, le=8)] | None = Field(
+        default=None,
+        description="what is taken off a map: plane, or a polynomial of this degree; by default nothing",
+    )
+    rms: Positive | None = Field(default=None, description="Sq of a made self-affine surface, mean zero")
+    hurst: Annotated[Number, Field(gt=0, le=1)] = Field(default=0.8, description="H: the spectrum falls by q^-2(1+H)")
+    longest: Positive | None = Field(default=None, description="wave length from which on it has roughness")
+    shortest: Positive | None = Field(default=None, description="down to which; by default 8 spacings of the grid")
+    seed: Annotated[int, Field(ge=0, strict=True)] = Field(
+        default=0, description="of its phases: the same surface again"
+    )
+    amplitude: Positive | None = Field(default=None, description="or of a wave, half of peak to valley")
+    wavelength: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=2)] | None = Field(
+        default=None, description="of the wave along the grid, [x] or [x, y]; of two the product of both cosines"
+    )
+    height_factor: Number = Field(default=1.0, description="by which all heights are taken")
+
+    one_of = (("file", "rms", "amplitude"),)
+    together = (("rms", "longest"), ("amplitude", "wavelength"))
+    checks = (
+        Check(
+            lambda s: s.given("shortest") and s.longest and s.shortest >= s.longest,
+            "shortest: expected less than longest",
+        ),
     )
 
 

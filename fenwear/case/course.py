@@ -1,14 +1,14 @@
-"""The tables of the course of a run: how far it goes, the test program, and what is kept."""
+"""The tables of the course of a run: how it is set up, how far it goes, the test program, and what is kept."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from fenwear.case.motions import Cycle
-from fenwear.case.quantities import AngularFrequency, Force, Length, Number, Part, Speed, Temperature, Time
+from fenwear.case.quantities import AngularFrequency, Check, Force, Length, Number, Part, Speed, Temperature, Time
 
 
 class Run(Part):
@@ -88,18 +88,20 @@ class ProgramStep(Part):
         default=None, description="heat.ambient"
     )
 
-    @model_validator(mode="after")
-    def _one_length(self) -> Self:
-        if sum(length is not None for length in (self.cycles, self.distance, self.time)) != 1:
-            raise ValueError("give one of cycles, distance and time: how long the step takes")
-        for one, other in (("load", "load_factor"), ("load", "load_factors"), ("angular_frequency", "period")):
-            if getattr(self, one) is not None and getattr(self, other) is not None:
-                raise ValueError(f"{one}: give either {one} or {other}")
-        for key in ("speed", "angular_speed"):
-            rests = getattr(self, key) is not None and not any(getattr(self, key))
-            if rests and self.distance is not None:
-                raise ValueError(f"distance: expected time or cycles: {key} is zero, and nothing slides in this step")
-        return self
+    one_of = (("cycles", "distance", "time"),)
+    checks = (
+        *(
+            Check(lambda s, pair=pair: len(s.given(*pair)) > 1, f"{pair[0]}: give either {pair[0]} or {pair[1]}")
+            for pair in (("load", "load_factor"), ("load", "load_factors"), ("angular_frequency", "period"))
+        ),
+        *(
+            Check(
+                lambda s, key=key: s.given("distance") and s.given(key) and not any(getattr(s, key)),
+                f"distance: expected time or cycles: {key} is zero, and nothing slides in this step",
+            )
+            for key in ("speed", "angular_speed")
+        ),
+    )
 
     @property
     def ramps(self) -> list[str]:
@@ -140,4 +142,13 @@ class Output(Part):
     )
     figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
         default=(), description="half-cycles that the figures show; by default six spread over the run"
+    )
+
+
+class Setup(Part):
+    """By which ranks the bodies are condensed onto the contact; results agree on any of them."""
+
+    reproducible: bool = Field(
+        default=False,
+        description="results equal to the last bit on any number of ranks: each body is on one, so that two work",
     )

@@ -1,13 +1,18 @@
-"""Tables of a case's files: each heading is a known name with its unit, each cell a finite number."""
+"""Tables of a case's files: each heading is a known name with its unit, each cell a finite number; profiles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from fenwear.case.names import ROLES
 from fenwear.errors import CaseError, InputError
 from fenwear.files.table import TableError, check_names, heading, known_units, read_table
+
+OF_PROFILE = {"x": "mm", "r": "mm", "s": "mm", "y": "mm", "z": "mm", "depth": "mm", "height": "mm"}
+PLACES = (("x",), ("r",), ("s",), ("x", "y"), ("x", "y", "z"))
 
 
 @dataclass(frozen=True)
@@ -77,3 +82,57 @@ def headings(row: Sequence[str], columns: Mapping[str, str]) -> tuple[list[str],
     check_names(heads, columns, "")
     known_units(heads, columns)
     return [head.name for head in heads], [head.unit for head in heads]
+
+
+def with_profiles(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the tables of a case with the files of its bodies' profiles read into points.
+
+    Raises:
+        CaseError: a file cannot be read, or there are points besides.
+    """
+    found = dict(data)
+    for body in ROLES:
+        table = data.get(body)
+        profile = table.get("profile") if isinstance(table, Mapping) else None
+        if not isinstance(table, Mapping) or not isinstance(profile, Mapping) or "file" not in profile:
+            continue
+        key = f"{body}.profile.file"
+        if "points" in profile or not isinstance(profile["file"], str):
+            raise CaseError(InputError(key, "expected the name of a CSV file, and no points beside it"))
+        rest = {name: value for name, value in profile.items() if name != "file"}
+        path = Path(profile["file"]) if folder is None else folder / profile["file"]
+        found[body] = {**table, "profile": {**rest, **read_profile(path, key)}}
+    return found
+
+
+def read_profile(path: Path, key: str) -> dict[str, Any]:
+    """Return the table of a profile in a CSV file: the points of its rows, mm, and along what they go.
+
+    Args:
+        path: Of the file; each heading has its unit, as in "depth (um)"; height is minus the depth.
+        key: Of the case, for messages.
+
+    Raises:
+        CaseError: it cannot be read; names column and row.
+    """
+    table = read_csv(path, key, OF_PROFILE, least=2)
+    names = table.names
+    places = [name for name in names if name not in ("depth", "height")]
+    if tuple(sorted(places)) not in PLACES or len(places) + 1 != len(names):
+        expected = "x and depth (or height), r and depth of rings, s and depth along a curve, or x, y, (z) and depth"
+        raise table.wrong(f"expected the columns {expected}")
+    order = [names.index(name) for name in sorted(places)]
+    measured = next(k for k, name in enumerate(names) if name not in places)
+    sign = 1.0 if names[measured] == "depth" else -1.0
+    along = "arc" if "s" in places else "x"
+    points = [[*(row[k] for k in order), sign * row[measured] + 0.0] for row in table.rows]
+    return {"points": points, "along": along}
+
+
+def profile_text(kind: str, profile: Mapping[str, Any]) -> str:
+    """Return a CSV file that reads back as the table of a profile of a kind of model; depths in micrometres."""
+    points, first = profile["points"], "r" if kind == "axisymmetric" else "x"
+    axes = ("s",) if profile["along"] == "arc" else (first, "y", "z")[: len(points[0]) - 1]
+    lines = [",".join([*(f"{axis} (mm)" for axis in axes), "depth (um)"])]
+    lines += [",".join([*(f"{place:.9g}" for place in row[:-1]), f"{1e3 * row[-1]:.9g}"]) for row in points]
+    return "\n".join(lines) + "\n"

@@ -3,57 +3,59 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from fenwear.arrays import Array
 from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression, variables_of
 from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
-from fenwear.case.quantities import Force, Hardness, Length, Number, Part, Stress, Unit, quantity
+from fenwear.case.quantities import (
+    Check,
+    Force,
+    Hardness,
+    Length,
+    Number,
+    OverCycle,
+    Pairs,
+    Part,
+    Stress,
+    Unit,
+    quantity,
+    rising,
+)
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, CoefficientError, InputError
 
 
-class OfState(Part):
-    """A number that depends on the state: an expression, or a table with straight lines."""
+def _parsed(expression: str) -> str:
+    parse_expression(expression)
+    return expression
 
-    expression: str | None = Field(
+
+def _registered(law: str) -> str:
+    check_law(law)
+    return law
+
+
+class _State(Part):
+    """What a number that depends on the state has in all of its forms."""
+
+    expression: Annotated[str, AfterValidator(_parsed)] | None = Field(
         default=None,
         description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid), "
         "debris (mm, thickness of the third body), edge (mm, distance from the edge of the contact), "
         "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
     )
-    table: tuple[tuple[Number, Number], ...] | None = Field(
+    table: Annotated[Pairs, rising("at least two pairs [argument, value] with rising arguments")] | None = Field(
         default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
     of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm"] = Field(
         default="T", description="argument of the table"
     )
-
-    @property
-    def _forms(self) -> dict[str, object]:
-        """The forms of which one is given, by key."""
-        return {"expression": self.expression, "table": self.table}
-
-    @model_validator(mode="after")
-    def _one_form(self) -> Self:
-        if sum(form is not None for form in self._forms.values()) != 1:
-            *others, last = self._forms
-            raise ValueError(f"give one of {', '.join(others)} and {last}")
-        if self.expression is not None:
-            try:
-                parse_expression(self.expression)
-            except ValueError as error:
-                raise ValueError(f"expression: {error}") from None
-        if self.table is not None:
-            arguments = [argument for argument, _ in self.table]
-            if len(arguments) < 2 or np.any(np.diff(arguments) <= 0):
-                raise ValueError("table: expected at least two pairs [argument, value] with rising arguments")
-        return self
 
     def depends_on(self, name: str) -> bool:
         """Return whether a variable such as T, p or depth is in it."""
@@ -68,11 +70,20 @@ class OfState(Part):
         return evaluate(parse_expression(self.expression or ""), state, shape)
 
 
+class OfState(_State):
+    """A number that depends on the state: an expression, or a table with straight lines."""
+
+    one_of = (("expression", "table"),)
+
+
 def _form(value: object) -> str:
-    return "dependence" if isinstance(value, (Mapping, OfState)) else "number"
+    return "dependence" if isinstance(value, (Mapping, _State)) else "number"
 
 
-class Dependence(OfState):
+FORMS = ("expression", "table", "regions", "law")
+
+
+class Dependence(_State):
     """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
 
     regions: (
@@ -89,30 +100,49 @@ class Dependence(OfState):
         description="of each material region of the body, of the punch for friction: a number, or a table with "
         "expression or table; all in the same unit",
     )
-    law: str | None = Field(default=None, description="name of a law registered in Python")
+    law: Annotated[str, AfterValidator(_registered)] | None = Field(
+        default=None, description="name of a law registered in Python"
+    )
     unit: str = Field(
         default="", description="unit of the values; by default that of the key's bare numbers, which is told"
     )
 
-    @property
-    def _forms(self) -> dict[str, object]:
-        return {**super()._forms, "regions": self.regions, "law": self.law}
+    one_of = (FORMS,)
 
-    @model_validator(mode="after")
-    def _known_law(self) -> Self:
-        if self.law is not None:
-            try:
-                check_law(self.law)
-            except ValueError as error:
-                raise ValueError(f"law: {error}") from None
-        return self
+    @property
+    def form(self) -> str:
+        """The key of its form."""
+        return self.given(*FORMS)[0]
+
+    def check(self, unit: str | None, of: Sequence[str], forms: Sequence[str]) -> None:
+        """Raise where it is no coefficient of a key.
+
+        Args:
+            unit: Of the key; None where it is checked elsewhere.
+            of: What it may depend on.
+            forms: That it may have.
+
+        Raises:
+            ValueError: it depends on something else, has another form, or a unit of another kind; says what.
+        """
+        others = [name for name in VARIABLES if name not in of and self.depends_on(name)]
+        if others or self.form not in forms:
+            known = "" if tuple(of) == VARIABLES else f" of {', '.join(of)} alone"
+            got = others[0] if others else self.form
+            raise ValueError(f"expected {' or '.join(forms)}{known}, got {got}")
+        if unit == "" and self.unit:
+            raise ValueError(f"unit: expected none: its values are pure numbers, got {self.unit!r}")
+        try:
+            self.scale(unit or self.unit)
+        except ValueError as error:
+            raise ValueError(f"unit: {error}") from None
 
     def depends_on(self, name: str) -> bool:
         """Return whether a variable such as T, p or depth is in it."""
         if self.law is not None:
             return name in variables_of_law(self.law)
         if self.regions is not None:
-            return any(isinstance(one, OfState) and one.depends_on(name) for one in self.regions.values())
+            return any(depends_on(one, name) for one in self.regions.values())
         return super().depends_on(name)
 
     @property
@@ -131,11 +161,6 @@ class Dependence(OfState):
         """Whether regions differ in it."""
         given = list((self.regions or {}).values())
         return any(one != given[0] for one in given)
-
-    @property
-    def passes(self) -> bool:
-        """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
-        return self.depends_on("depth") or self.depends_on("s")
 
     def scale(self, unit: str) -> float:
         """Return what turns its values into a unit.
@@ -215,12 +240,47 @@ def _of_unit(unit: str, pressure_exponent: float, speed_exponent: float) -> floa
     return convert(f"1 {unit}", WearLaw.coefficient_unit(pressure_exponent, speed_exponent))
 
 
-def constant_or_dependence(constant: Any) -> Any:
-    """Return the type of a coefficient that is a constant of this type, or depends on the state."""
+def _checked(value: Any, unit: str | None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = FORMS) -> Any:
+    if isinstance(value, Dependence):
+        value.check(unit, of, forms)
+    return value
+
+
+def constant_or_dependence(
+    constant: Any, unit: str | None = None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = FORMS
+) -> Any:
+    """Return the type of a coefficient that is a constant of this type, or depends on the state, see `check`."""
     return Annotated[
         Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
         Discriminator(_form),
+        AfterValidator(partial(_checked, unit=unit, of=of, forms=forms)),
     ]
+
+
+def of_place(constant: Any, unit: str) -> Any:
+    """Return the type of a coefficient that is a constant, or depends on the place alone."""
+    return constant_or_dependence(constant, unit, ("x", "y", "z"), ("expression", "table"))
+
+
+def depends_on(value: object, *names: str) -> bool:
+    """Return whether a coefficient depends on one of these variables; a constant does not."""
+    return isinstance(value, _State) and any(map(value.depends_on, names))
+
+
+def varies(value: object) -> bool:
+    """Return whether a coefficient changes with more than the place."""
+    return isinstance(value, Dependence) and value.varies
+
+
+def place_values(value: Any, place: Mapping[str, Any], n: int, unit: str, key: str, least: float = 1e-300) -> Array:
+    """Return a constant or what depends on the place at n nodes (n,), in a unit.
+
+    Raises:
+        CaseError: it is less than `least` somewhere, by default not positive; names the key.
+    """
+    if isinstance(value, Dependence):
+        return value.values(place, (n,), value.scale(unit), key, least)
+    return np.full(n, float(value))
 
 
 class Stick(Part):
@@ -234,7 +294,7 @@ class Stick(Part):
     bulk_stress: Stress = Field(
         default=0.0, description="largest bulk stress along x in the strip, as in fretting fatigue, with the motion"
     )
-    bulk_over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+    bulk_over_cycle: OverCycle | None = Field(
         default=None,
         description="[fraction of the cycle, factor] pairs from 0 to 1 of the bulk stress; by default it follows the "
         "motion",
@@ -251,44 +311,14 @@ class Stick(Part):
         default=5, description="in which the loads rise at the start"
     )
 
-    @model_validator(mode="after")
-    def _bulk_table(self) -> Self:
-        if self.bulk_over_cycle is not None:
-            fractions = [fraction for fraction, _ in self.bulk_over_cycle]
-            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
-                raise ValueError("bulk_over_cycle: expected pairs [fraction, factor] with fractions rising from 0 to 1")
-        return self
+
+COEFFICIENTS = ("coefficient", "archard", "energy", "per_area")
 
 
-class OfPlace(Part):
-    """A table whose dependent values depend on the place alone."""
-
-    @model_validator(mode="after")
-    def _place_alone(self) -> Self:
-        for name, unit in self.units().items():
-            value = getattr(self, name)
-            if not isinstance(value, Dependence):
-                continue
-            other = [one for one in VARIABLES if one not in ("x", "y", "z") and value.depends_on(one)]
-            if other or value.regions is not None or value.law is not None:
-                got = other[0] if other else "regions" if value.regions is not None else "a law"
-                raise ValueError(f"{name}: expected an expression or a table of the place x, y, z alone, got {got}")
-            try:
-                value.scale(unit)
-            except ValueError as error:
-                raise ValueError(f"{name}: unit: {error}") from None
-        return self
-
-    @classmethod
-    def units(cls) -> Mapping[str, str]:
-        """Return the units of what may depend on the place, by key."""
-        return {}
-
-
-class Coating(OfPlace):
+class Coating(Part):
     """A coating above the base of a body: it wears by its own coefficient until it is worn through at a place."""
 
-    thickness: constant_or_dependence(Annotated[Length, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+    thickness: of_place(Annotated[Length, Field(ge=0)], "mm") = Field(  # type: ignore[valid-type]
         description="above the base, on the body's own material; of the place where it is uneven; 0 where there is none"
     )
     coefficient: Annotated[float | None, Unit("")] = Field(
@@ -317,25 +347,15 @@ class Coating(OfPlace):
         description="mu of the coating, which over its last tenth goes over to contact.friction; by default that",
     )
 
-    @model_validator(mode="after")
-    def _one_coefficient(self) -> Self:
-        keys = ("coefficient", "archard", "energy", "per_area")
-        given = [key for key in keys if getattr(self, key) is not None]
-        if len(given) != 1:
-            told = "coefficient, archard, energy and per_area"
-            raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
-        if (self.archard is None) != (self.hardness is None):
-            raise ValueError("hardness: expected together with archard, and only then")
-        if self.touching_from is not None and self.per_area is None:
-            raise ValueError("touching_from: expected with per_area")
-        if self.coefficient is not None and not (math.isfinite(self.coefficient) and self.coefficient > 0):
-            raise ValueError("coefficient: expected a finite number above zero")
-        return self
-
-    @classmethod
-    def units(cls) -> Mapping[str, str]:
-        """Return the units of what may depend on the place, by key."""
-        return {"thickness": "mm"}
+    one_of = (COEFFICIENTS,)
+    together = (("archard", "hardness"),)
+    checks = (
+        Check(lambda s: s.given("touching_from") and not s.given("per_area"), "touching_from: expected with per_area"),
+        Check(
+            lambda s: s.given("coefficient") and not 0 < s.coefficient < math.inf,
+            "coefficient: expected a finite number above zero",
+        ),
+    )
 
 
 class WearLaw(Part):
@@ -355,7 +375,7 @@ class WearLaw(Part):
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
-    per_area: constant_or_dependence(Annotated[Number | None, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+    per_area: constant_or_dependence(Annotated[Number | None, Field(ge=0)], "") = Field(  # type: ignore[valid-type]
         default=None,
         description="k_A, depth worn over the length slid wherever surfaces touch, whatever the pressure, as of "
         "polyethylene; in place of a law of the pressure",
@@ -412,39 +432,51 @@ class WearLaw(Part):
         return converted
 
     @model_validator(mode="after")
-    def _one_coefficient(self) -> Self:
-        keys = ("coefficient", "beta", "archard", "energy", "per_area")
-        given = [key for key in keys if getattr(self, key) is not None]
-        if len(given) != 1:
-            told = "coefficient, beta, archard, energy and per_area"
-            raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
-        if self.per_area is not None and (self.pressure_cap is not None or self.pressure_threshold > 0):
-            raise ValueError("per_area: expected without pressure_cap and pressure_threshold")
-        if self.per_area is None and not math.isclose(
-            self.touching_from, WearLaw.model_fields["touching_from"].default
-        ):
-            raise ValueError("touching_from: expected with per_area")
-        for key in ("coefficient", "beta"):
-            value = getattr(self, key)
-            if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{key}: expected a finite number, zero or larger")
-        if self.pressure_cap is not None and self.pressure_cap <= self.pressure_threshold:
-            raise ValueError("pressure_cap: expected more than pressure_threshold")
-        if (self.archard is None) != (self.hardness is None):
-            raise ValueError("hardness: expected together with archard, and only then")
-        if (self.archard, self.energy, self.per_area) != (None, None, None) and self._exponents != (1.0, 1.0):
-            raise ValueError(f"{given[0]}: expected with exponents of 1 only; give coefficient or beta")
-        if isinstance(self.coefficient, Dependence):
-            try:
-                convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
-            except ValueError as error:
-                raise ValueError(f"coefficient: unit: {error}") from None
-        if self.coating is not None and self.coating.coefficient is None and self._exponents != (1.0, 1.0):
-            raise ValueError("coating: expected a coefficient with other exponents than 1")
+    def _unit_of_coefficient(self) -> Self:
+        try:
+            _checked(self.coefficient, self.unit)
+        except ValueError as error:
+            raise ValueError(f"coefficient: {error}") from None
         return self
 
+    one_of = (("coefficient", "beta", *COEFFICIENTS[1:]),)
+    together = (("archard", "hardness"),)
+    checks = (
+        Check(
+            lambda s: s.given("per_area") and (s.given("pressure_cap") or s.pressure_threshold > 0),
+            "per_area: expected without pressure_cap and pressure_threshold",
+        ),
+        Check(
+            lambda s: not s.given("per_area") and s.touching_from != type(s).model_fields["touching_from"].default,
+            "touching_from: expected with per_area",
+        ),
+        *(
+            Check(
+                lambda s, key=key: isinstance(getattr(s, key), float) and not 0 <= getattr(s, key) < math.inf,
+                f"{key}: expected a finite number, zero or larger",
+            )
+            for key in ("coefficient", "beta")
+        ),
+        Check(
+            lambda s: s.given("pressure_cap") and s.pressure_cap <= s.pressure_threshold,
+            "pressure_cap: expected more than pressure_threshold",
+        ),
+        *(
+            Check(
+                lambda s, key=key: s.given(key) and s.exponents != (1.0, 1.0),
+                f"{key}: expected with exponents of 1 only; give coefficient or beta",
+            )
+            for key in COEFFICIENTS[1:]
+        ),
+        Check(
+            lambda s: s.coating and not s.coating.given("coefficient") and s.exponents != (1.0, 1.0),
+            "coating: expected a coefficient with other exponents than 1",
+        ),
+    )
+
     @property
-    def _exponents(self) -> tuple[float, float]:
+    def exponents(self) -> tuple[float, float]:
+        """The exponents b and a."""
         return self.pressure_exponent, self.speed_exponent
 
     @property
@@ -488,7 +520,7 @@ class WearLaw(Part):
     def scale(self) -> float:
         """What turns values of a dependent coefficient into its internal unit."""
         if isinstance(self.coefficient, Dependence) and self.coefficient.unit:
-            return _of_unit(self.coefficient.unit, *self._exponents)
+            return _of_unit(self.coefficient.unit, *self.exponents)
         return 1.0
 
     def resolved(self, data: dict[str, Any]) -> dict[str, Any]:
@@ -517,8 +549,4 @@ class Wear(Part):
         """The laws of both bodies by their roles; None where one does not wear."""
         return {"punch": self.punch, "strip": self.strip}
 
-    @model_validator(mode="after")
-    def _some_law(self) -> Self:
-        if self.punch is None and self.strip is None:
-            raise ValueError("expected the wear law of punch, strip or both")
-        return self
+    checks = (Check(lambda s: not s.laws, "expected the wear law of punch, strip or both"),)

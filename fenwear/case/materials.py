@@ -1,16 +1,15 @@
-"""The table of a material: constants, or properties that depend on the temperature."""
+"""The tables of a material: constants, or properties that depend on the temperature; and creep."""
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import VARIABLES
 from fenwear.case.laws import Dependence, constant_or_dependence
-from fenwear.case.quantities import Number, Part, Stress, quantity
+from fenwear.case.quantities import Check, Number, Part, Stress, Time, quantity
 
 PROPERTIES = {  # of a material, that may depend on the temperature, with their units
     "young": "MPa",
@@ -24,26 +23,31 @@ _HeatCapacity = Annotated[float, *quantity("mm^2/(s^2*K)"), Field(gt=0)] | None
 _Expansion = Annotated[float, *quantity("1/K")] | None
 
 
+def _of_temperature(constant: Any, name: str) -> Any:
+    """Return the type of a property that is a constant, or depends on the temperature alone."""
+    return constant_or_dependence(constant, PROPERTIES[name], ("T",), ("expression", "table", "law"))
+
+
 class Material(Part):
     """An isotropic, linear-elastic material; the thermal values are needed with heat only.
 
     All but nu and rho may depend on the temperature T, by an expression or a table.
     """
 
-    young: constant_or_dependence(Annotated[Stress, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+    young: _of_temperature(Annotated[Stress, Field(gt=0)], "young") = Field(  # type: ignore[valid-type]
         description="Young's modulus E"
     )
     poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
-    conductivity: constant_or_dependence(_Conductivity) = Field(  # type: ignore[valid-type]
+    conductivity: _of_temperature(_Conductivity, "conductivity") = Field(  # type: ignore[valid-type]
         default=None, description="thermal conductivity k; 1 W/(m K) = 1"
     )
-    heat_capacity: constant_or_dependence(_HeatCapacity) = Field(  # type: ignore[valid-type]
+    heat_capacity: _of_temperature(_HeatCapacity, "heat_capacity") = Field(  # type: ignore[valid-type]
         default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
     )
     density: Annotated[float, *quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
         default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
     )
-    expansion: constant_or_dependence(_Expansion) = Field(  # type: ignore[valid-type]
+    expansion: _of_temperature(_Expansion, "expansion") = Field(  # type: ignore[valid-type]
         default=None,
         description="linear thermal expansion alpha; where it depends on T, the mean from heat.initial to T",
     )
@@ -51,20 +55,6 @@ class Material(Part):
     yield_stress: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None, description="in tension; where it is given pressures beyond the shakedown limit are told"
     )
-
-    @model_validator(mode="after")
-    def _of_temperature_alone(self) -> Self:
-        for name in self.dependent:
-            value = getattr(self, name)
-            others = [one for one in VARIABLES if one != "T" and value.depends_on(one)]
-            if others or value.regions is not None:
-                got = "regions" if value.regions is not None else others[0]
-                raise ValueError(f"{name}: expected an expression or a table of the temperature T alone, got {got}")
-            try:
-                value.scale(PROPERTIES[name])
-            except ValueError as error:
-                raise ValueError(f"{name}: unit: {error}") from None
-        return self
 
     @property
     def dependent(self) -> list[str]:
@@ -93,3 +83,30 @@ class Material(Part):
         return value.values(
             {"T": temperature}, temperature.shape, value.scale(PROPERTIES[name]), f"{key}.{name}", least
         )
+
+
+class Retarded(Part):
+    """One term of the compliance, compliance (1 - exp(-t / time)), a spring and a dashpot side by side (Kelvin)."""
+
+    compliance: Annotated[Number, Field(ge=0)] = Field(description="that it comes to in the end, over the one at once")
+    time: Annotated[Time, Field(gt=0)] = Field(description="retardation time, after which 1 - 1/e of it is there")
+
+
+class Creep(Part):
+    """Creep at a constant Poisson's ratio: strain under a constant load grows as J(t) / J(0).
+
+    J(t) / J(0) = 1 + sum of compliance (1 - exp(-t / time)) + per_decade log10(1 + t / onset).
+    """
+
+    terms: tuple[Retarded, ...] = Field(default=(), description="terms that each come to an end (Prony's series)")
+    per_decade: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None, description="growth for each decade of time, over the compliance at once, without an end"
+    )
+    onset: Annotated[Time, Field(gt=0)] | None = Field(
+        default=None, description="time from which on it grows with the logarithm of time, with per_decade"
+    )
+
+    together = (("per_decade", "onset"),)
+    checks = (
+        Check(lambda s: not s.terms and not s.given("per_decade"), "expected terms, or per_decade with an onset"),
+    )

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from fenwear.case.bodies import CourseLoad
 from fenwear.case.csv_table import headings
 from fenwear.case.cycle_table import COLUMNS, LOADS, CycleCourse, course_of
-from fenwear.case.quantities import Angle, AngularFrequency, Length, Number, Part, Point, Speed, Time, Vector
+from fenwear.case.quantities import Angle, AngularFrequency, Check, Length, Number, Part, Point, Speed, Time, Vector
 
 
 class _Along(Part):
@@ -24,14 +24,10 @@ class _Along(Part):
     )
     along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
 
-    @model_validator(mode="after")
-    def _one_direction(self) -> Self:
-        if self.along is not None:
-            if not any(self.along):
-                raise ValueError("along: expected a direction, got zero")
-            if self.axis != "x":
-                raise ValueError("along: give either along or axis")
-        return self
+    checks = (
+        Check(lambda s: s.given("along") and not any(s.along), "along: expected a direction, got zero"),
+        Check(lambda s: s.given("along") and s.axis != "x", "along: give either along or axis"),
+    )
 
 
 class _About(Part):
@@ -40,11 +36,7 @@ class _About(Part):
     axis: Vector = Field(default=(0.0, 0.0, 1.0), description="of the rotation")
     centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")
 
-    @model_validator(mode="after")
-    def _some_axis(self) -> Self:
-        if not any(self.axis):
-            raise ValueError("axis: expected a direction, got zero")
-        return self
+    checks = (Check(lambda s: not any(s.axis), "axis: expected a direction, got zero"),)
 
 
 class _ToAndFro(Part):
@@ -74,13 +66,13 @@ class _Profile(_ToAndFro):
         default=None, description="trapezoidal: fraction of the half-cycle in which the speed rises, and falls"
     )
 
-    @model_validator(mode="after")
-    def _one_frequency(self) -> Self:
-        if (self.angular_frequency is None) == (self.period is None):
-            raise ValueError("give either angular_frequency or period")
-        if (self.ramp is not None) != (self.profile == "trapezoidal"):
-            raise ValueError("ramp: expected with a trapezoidal profile, and only then")
-        return self
+    one_of = (("angular_frequency", "period"),)
+    checks = (
+        Check(
+            lambda s: bool(s.ramp) != (s.profile == "trapezoidal"),
+            "ramp: expected with a trapezoidal profile, and only then",
+        ),
+    )
 
     @property
     def half_period(self) -> float:
@@ -132,15 +124,17 @@ class Tabulated(_Along, _ToAndFro):
     times: Annotated[tuple[Time, ...], Field(min_length=3)] = Field(description="rising from 0 to the cycle's end")
     displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(description="of the strip, towards +x")
 
-    @model_validator(mode="after")
-    def _a_cycle(self) -> Self:
-        if len(self.times) != len(self.displacements):
-            raise ValueError(f"displacements: expected {len(self.times)} values, one for each time")
-        if self.times[0] != 0 or np.any(np.diff(self.times) <= 0):
-            raise ValueError("times: expected 0 first, and rising")
-        if self.displacements[0] != self.displacements[-1] or len(set(self.displacements)) < 2:
-            raise ValueError("displacements: expected a motion that ends where it starts")
-        return self
+    checks = (
+        Check(
+            lambda s: len(s.times) != len(s.displacements),
+            "displacements: expected as many values as times, one for each",
+        ),
+        Check(lambda s: s.times[0] != 0 or np.any(np.diff(s.times) <= 0), "times: expected 0 first, and rising"),
+        Check(
+            lambda s: s.displacements[0] != s.displacements[-1] or len(set(s.displacements)) < 2,
+            "displacements: expected a motion that ends where it starts",
+        ),
+    )
 
 
 NO_PLACE = {  # beginnings of columns of a cycle that a model has no place for

@@ -195,13 +195,8 @@ def _laws_without_unit(case: Case) -> Iterator[str]:
     """Tell of expressions, tables, regions and laws that say no unit, in which what they give is read."""
     for key, law, unit in _dependences(case, ""):
         if unit and not law.unit:
-            form, article = next(
-                (name, "an" if name == "expression" else "a")
-                for name in ("expression", "table", "regions", "law")
-                if getattr(law, name) is not None
-            )
-            named = "values of regions" if form == "regions" else f"{article} {form}"
-            yield f'{key}: {named} without a unit, read in {unit}: give it, {{{form} = ..., unit = "{unit}"}}'
+            named = {"expression": "an expression", "regions": "values of regions"}.get(law.form, f"a {law.form}")
+            yield f'{key}: {named} without a unit, read in {unit}: give it, {{{law.form} = ..., unit = "{unit}"}}'
 
 
 def _dependences(part: BaseModel | Mapping[str, Any], path: str) -> Iterator[tuple[str, Dependence, str]]:
@@ -244,11 +239,7 @@ def _tables(case: Case) -> Iterator[str]:
     if case.heat is None:
         return
     initial = case.heat.initial
-    laws = {"contact.friction": case.contact.friction}
-    for body, law in case.wear.by_body.items():
-        if law is not None:
-            laws[f"wear.{body}.coefficient"] = law.coefficient
-    for key, law in laws.items():
+    for key, law in case.coefficients.items():
         if not isinstance(law, Dependence) or law.table is None or law.of != "T":
             continue
         first, last = law.table[0][0], law.table[-1][0]

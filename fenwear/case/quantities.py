@@ -5,13 +5,15 @@ Every number is held in mm, N, s, K (see `fenwear.case.units`); a case file may 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from types import UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, Union, get_args, get_origin
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -105,13 +107,34 @@ def _kinds(part: type[BaseModel], name: str) -> frozenset[object]:
     return frozenset(plain(part.model_fields[name].annotation) - {type(None)})
 
 
+class Check(NamedTuple):
+    """What must not be so in a table.
+
+    Attributes:
+        wrong: Of the table.
+        message: With the values of the table, as in "by: expected {0.fix}".
+    """
+
+    wrong: Callable[[Any], object]
+    message: str
+
+
 class Part(BaseModel):
-    """A table of the case file: unknown keys refused, values frozen."""
+    """A table of the case file: unknown keys refused, values frozen.
+
+    Attributes:
+        one_of: Keys of which exactly one is given.
+        together: Keys of which all are given, or none.
+        checks: What else has to hold.
+    """
 
     # Validators are built when a whole case is first read: once, and not once more for each table on the way.
     model_config = ConfigDict(
         defer_build=True, extra="forbid", frozen=True, hide_input_in_errors=True, ser_json_inf_nan="strings"
     )
+    one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    together: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    checks: ClassVar[tuple[Check, ...]] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -127,3 +150,41 @@ class Part(BaseModel):
             if isinstance(value, float) and value.is_integer() and kinds and int in kinds and float not in kinds:
                 changed[name] = int(value)
         return {**data, **changed} if changed else data
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        own = [vars(kind) for kind in type(self).__mro__]
+        for keys in (keys for names in own for keys in names.get("one_of", ())):
+            if len(self.given(*keys)) != 1:
+                got = " and ".join(self.given(*keys)) or "none"
+                raise ValueError(f"give one of {', '.join(keys[:-1])} and {keys[-1]}, got {got}")
+        for keys in (keys for names in own for keys in names.get("together", ())):
+            given = self.given(*keys)
+            missing = [key for key in keys if key not in given]
+            if given and missing:
+                raise ValueError(f"{missing[0]}: expected together with {' and '.join(given)}, and only then")
+        for check in (check for names in own for check in names.get("checks", ())):
+            if check.wrong(self):
+                raise ValueError(check.message.format(self))
+        return self
+
+    def given(self, *keys: str) -> list[str]:
+        """Return those of the keys that are given."""
+        return [key for key in keys if getattr(self, key) is not None]
+
+
+def rising(expected: str, *ends: float) -> AfterValidator:
+    """Return pydantic metadata: at least two pairs whose first numbers rise, from one end to the other if given."""
+
+    def check(pairs: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        numbers = [number for number, _ in pairs]
+        rises = len(numbers) > 1 and all(a < b for a, b in pairwise(numbers))
+        if not rises or (ends and (numbers[0], numbers[-1]) != ends):
+            raise ValueError(f"expected {expected}")
+        return pairs
+
+    return AfterValidator(check)
+
+
+Pairs = tuple[tuple[Number, Number], ...]
+OverCycle = Annotated[Pairs, rising("pairs [fraction, factor] with fractions that rise from 0 to 1", 0, 1)]

@@ -1,14 +1,24 @@
-"""The table of heat: its sharing, its ways out, and how it is computed."""
+"""The table of heat: its sharing, its ways out, and how it is computed.
+
+How far heat gets into a strip that slides one way or turns is its diffusivity over its speed: below a contact of length
+L, under which material passes at v, a layer sqrt(a L / v) heats up, a = k / (rho c) (J. C. Jaeger, Moving sources of
+heat and the temperature at sliding contacts, 1942).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+import math
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
-from fenwear.case.quantities import CONDUCTANCE, Conductance, Number, Part, Temperature, Unit, quantity
+from fenwear.case.materials import Material
+from fenwear.case.motions import OneWay, Rotation
+from fenwear.case.quantities import CONDUCTANCE, Check, Conductance, Number, Part, Temperature, Unit, quantity
 from fenwear.case.units import convert, quantity_text, shown
+
+STEP = 2  # between the values of a / v that meshes are made for: cases of about the same speed share one
 
 
 def _perfect_or_conductance(value: object) -> float | str:
@@ -48,11 +58,9 @@ class Track(Part):
         default=0.0, description="to the surroundings, beside that of area; 1 W/K = 1000"
     )
 
-    @model_validator(mode="after")
-    def _one_capacity(self) -> Track:
-        if (self.volume > 0) == (self.heat_capacity > 0):
-            raise ValueError("expected either volume or heat_capacity, above zero")
-        return self
+    checks = (
+        Check(lambda s: (s.volume > 0) == (s.heat_capacity > 0), "expected either volume or heat_capacity, above zero"),
+    )
 
 
 class Heat(Part):
@@ -135,3 +143,35 @@ class Heat(Part):
             return data
         ruled = data.get("partition") is not None or data.get("conductance_per_pressure") is not None
         return {**data, "conductance": 0.0 if ruled else "perfect"}
+
+    checks = (
+        Check(lambda s: s.track and s.given("inflow"), "inflow: expected none with heat.track, whose bulk comes in"),
+        Check(lambda s: s.track and s.operator != "reduced", "operator: expected 'reduced' with heat.track"),
+        Check(
+            lambda s: s.conductance_per_pressure and s.conductance != 0,
+            "conductance: give either conductance or conductance_per_pressure",
+        ),
+    )
+
+
+def diffusion_of(motion: OneWay | Rotation, steps: Iterable[Any], materials: Iterable[Material]) -> dict[str, float]:
+    """Return a / v, mm, or where the strip turns a / omega, mm²/rad, by the parameter of the ready geometries.
+
+    The smallest of all materials and speeds, rounded down to a power of 2; none where the strip stands.
+
+    Args:
+        motion: Of the strip that conducts heat and passes.
+        steps: Of its program, whose speeds count, too.
+        materials: Of its regions, with constants.
+    """
+    name, key, speed = (
+        ("diffusion_length", "speed", motion.speed)
+        if isinstance(motion, OneWay)
+        else ("diffusion_area", "angular_speed", motion.angular_speed)
+    )
+    fastest = max([speed, *(one for step in steps for one in getattr(step, key) or ())])
+    diffusivities = [(m.conductivity or 0.0) / ((m.density or 0.0) * (m.heat_capacity or 0.0)) for m in materials]
+    if fastest <= 0:
+        return {}
+    exact = min(diffusivities) / fastest
+    return {name: float(STEP ** math.floor(math.log(exact, STEP)))}

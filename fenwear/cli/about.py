@@ -80,6 +80,6 @@ def _list_file(path: Path, *, as_json: bool) -> None:
 @app.command("schema")
 def schema_command() -> None:
     """Print the JSON schema of case files, by which editors complete and check them."""
-    from fenwear.case.editors import json_schema
+    from fenwear.case.keys import json_schema
 
     print_json(json_schema())

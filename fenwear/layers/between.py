@@ -23,15 +23,8 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Case, Contact, Dependence, Material, WearLaw
-from fenwear.case.layers import (
-    STIFFNESS,
-    ExponentialLayer,
-    LinearLayer,
-    PowerLayer,
-    RoughLayer,
-    place_values,
-)
-from fenwear.case.lubrication import Lubrication
+from fenwear.case.contact import STIFFNESS, ExponentialLayer, LinearLayer, Lubrication, PowerLayer, RoughLayer
+from fenwear.case.laws import depends_on, place_values
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
@@ -419,9 +412,7 @@ def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: flo
 
 def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[str, Array], n: int) -> list[Array]:
     """Return what of a layer may depend on the place (n,) each, in the order of its keys."""
-    return [
-        place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units().items()
-    ]
+    return [place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units.items()]
 
 
 def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> Callable[[Array], Array]:
@@ -430,13 +421,12 @@ def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> 
     Raises:
         CaseError: it depends on a speed or temperature that changes, which a layer does not follow.
     """
-    name, value = lubrication.given
-    asked = [one for one in ("v", "T") if isinstance(value, Dependence) and value.depends_on(one)]
+    asked = [one for one in ("v", "T") if depends_on(lubrication.coefficient, one)]
     changing = [one for one in asked if one not in known]
     if changing:
         message = (
-            f"contact.lubrication.{name} depends on {changing[0]}, which changes during the cycle. A layer of "
-            "asperities does not follow it. Remove the layer, or let the share depend on p and the place alone"
+            f"contact.lubrication.{lubrication.key} depends on {changing[0]}, which changes during the cycle. A layer "
+            "of asperities does not follow it. Remove the layer, or let the share depend on p and the place alone"
         )
         raise CaseError(InputError("contact.layer", message))
     return lambda pressure: asperity_share(lubrication, {**known, "p": pressure}, pressure.shape, checked=False)

@@ -18,7 +18,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.case.layers import RoughLayer
+from fenwear.case.contact import RoughLayer
 from fenwear.interface import ContactPair
 from fenwear.layers.between import Layers, Regions, common_modulus, over_materials
 from fenwear.layers.closure import SharedClosure

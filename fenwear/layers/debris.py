@@ -33,7 +33,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence
-from fenwear.case.layers import ThirdBody
+from fenwear.case.contact import ThirdBody
 from fenwear.sliding.friction import ContactConditions
 
 LIFE, LEAST = "contact.third_body.life", 1e-300

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
-from fenwear.case import Case, Dependence
+from fenwear.case import Case
 from fenwear.cycle import Block, Renewal, critical_speed, follow, jump, running_in, steady
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.cycle.steady_cycle import SteadyCycle, steady_cycle
@@ -108,17 +108,12 @@ class Model:
         Raises:
             CaseError: there is one.
         """
-        laws = {"contact.friction": self.case.contact.friction}
-        for body, law in self.case.wear.by_body.items():
-            if law is not None:
-                laws[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
-        for key, law in laws.items():
-            if isinstance(law, Dependence) and law.passes:
-                message = (
-                    "depends on the worn depth or the distance slid: it changes as long as a run goes on, so that no "
-                    "steady state exists"
-                )
-                raise CaseError(InputError(key, message))
+        for key in self.case.passing_laws:
+            message = (
+                "depends on the worn depth or the distance slid: it changes as long as a run goes on, so that no "
+                "steady state exists"
+            )
+            raise CaseError(InputError(key, message))
 
     def _check_constant(self, quantity: str) -> None:
         """Refuse properties of the temperature for what is told of bodies as they are at the start.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, make_case
-from fenwear.case.profile import profile_text
+from fenwear.case.csv_table import profile_text
 from fenwear.initial_shape import InitialShape
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import make_directory, write_case

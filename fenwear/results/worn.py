@@ -17,7 +17,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import place_case
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, load_case
-from fenwear.case.profile import profile_text
+from fenwear.case.csv_table import profile_text
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 from fenwear.results.disk import write_text, writing

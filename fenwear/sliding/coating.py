@@ -17,7 +17,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import WearLaw
-from fenwear.case.layers import place_values
+from fenwear.case.laws import place_values
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 

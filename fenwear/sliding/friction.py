@@ -26,7 +26,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence
-from fenwear.case.lubrication import Lubrication
+from fenwear.case.contact import Lubrication
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
@@ -49,7 +49,7 @@ def asperity_share(
     Raises:
         CaseError: it is not between 0 and 1 somewhere, or the film is not positive.
     """
-    name, value = lubrication.given
+    name, value = lubrication.key, lubrication.coefficient
     key = f"contact.lubrication.{name}"
     if not isinstance(value, Dependence):
         found = np.full(shape, float(value))

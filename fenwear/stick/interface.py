@@ -124,7 +124,7 @@ class StickInterface(OppositeBodies):
         self.border = Border.of_swept([middle, *(pair(middle.punch, middle.strip, there) for there in places)])
         middle = self.border.on(middle, self.border.on_strip(middle.strip))
         modulus = common_modulus(case, bodies.regions, middle)
-        initial = 0.0 if case.heat is None else case.heat.initial
+        initial = case.initial_temperature
         carries = moves and case.debris_on_strip  # else surfaces stay opposite each other: it lies where it is
         self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial, strip_carries=carries)
         if bodies.followed is None:

@@ -104,7 +104,7 @@ def unheated_problem(
     )
     middle = interface.middle
     regions = regions_opposite(bodies.regions, middle.pair)
-    initial = 0.0 if case.heat is None else case.heat.initial
+    initial = case.initial_temperature
     coatings = coatings_of(middle.pair, sliding.wear)
     edges = edges_of(bodies, middle.pair.punch) if case.contact.asks("edge", sliding.wear) else None
     friction = replace(sliding.friction, split=regions[0].split(sliding.friction.contact.friction))

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.sparse import eye_array
 
 from fenwear.arrays import Array, Mask
-from fenwear.case import Dependence, WearLaw
+from fenwear.case import WearLaw
+from fenwear.case.laws import depends_on
 from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
@@ -118,7 +119,7 @@ class LocalLaws:
     def passes(self) -> bool:
         """Whether a coefficient changes as long as a run goes on: with the worn depth, or with what is slid."""
         given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear if law is not None)]
-        return any(isinstance(one, Dependence) and one.passes for one in given)
+        return any(depends_on(one, "depth", "s") for one in given)
 
     def asks(self, name: str) -> bool:
         """Return whether friction, wear or the loss of debris depends on a variable of coefficients."""

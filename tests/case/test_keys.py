@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from fenwear.case import builtin_cases, load_case
-from fenwear.case.editors import json_schema
-from fenwear.case.keys import all_keys, find_keys
+from fenwear.case.keys import all_keys, find_keys, json_schema
 from fenwear.case.laws import Dependence
 from fenwear.case.units import convert
 from fenwear.errors import CaseError

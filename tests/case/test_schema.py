@@ -170,7 +170,7 @@ LOAD_TWICE = "punch.loads=[{on='punch_load', force=[0, -1], traction=[0, -1]}]"
         (["motion.angular_frequency='10 Hz'"], "motion.angular_frequency", "2 pi"),
         (["punch.regions.punch_lower='cheese'"], "punch.regions.punch_lower", "composite, steel"),
         (["punch.loads=[]"], "punch.loads", "at least one load"),
-        ([SUPPORT_TWICE], "punch.supports.0", "either"),
+        ([SUPPORT_TWICE], "punch.supports.0", "one of on and at"),
         (["punch.supports.0.fix=[]"], "punch.supports.0.fix", "at least 1"),
         (["punch.supports.0.fix=['y']"], "punch.supports.0.fix.0", "'x' or 'z'"),
         ([LOAD_TWICE], "punch.loads.0", "either"),

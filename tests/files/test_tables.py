@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fenwear import Case, CaseError, load_case
-from fenwear.case.profile import read_profile
+from fenwear.case.csv_table import read_profile
 from fenwear.files.table import TableError, read_table
 from fenwear.life import read_data
 

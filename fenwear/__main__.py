@@ -70,7 +70,7 @@ def _start(arguments: list[str], petsc_options: list[str]) -> int:
         sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     else:
         sys.stdout, sys.stderr = _Patient(sys.stdout), _Patient(sys.stderr)  # type: ignore[assignment]
-    from fenwear.compiled import ensure_folder
+    from fenwear.stack import ensure_folder
 
     told = ensure_folder(comm)
     if told is not None:

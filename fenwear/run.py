@@ -63,8 +63,7 @@ from fenwear.results.history import (
 )
 from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
 from fenwear.results.surfaces import surface_cells
-from fenwear.run_monitor import RunMonitor
-from fenwear.signals import Signals
+from fenwear.signals import RunMonitor, Signals
 from fenwear.sliding.chart import sliding_chart
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 

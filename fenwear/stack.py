@@ -5,19 +5,28 @@ In wheels from PyPI, dolfinx and PETSc find the library of MPI only where mpi4py
 
 from __future__ import annotations
 
+import atexit
 import os
+import platform
+import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fenwear.errors import StackError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 LINKED = ("dolfinx", "petsc4py")  # to MPI
 PARTS = {"basix", "cffi", "ffcx", "gmsh", "mpi4py", "ufl", *LINKED}
 SOLVER = 'pip install "fenwear[solver]"'
 LIBRARIES = "libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1"  # of Debian, with what they bring: those of gmsh
+PLACE = "XDG_CACHE_HOME"  # where FEniCSx keeps the forms that it compiles
 REAL = "fenwear needs PETSc with real numbers: install dolfinx-solver-real, on Debian python3-dolfinx-real"
 
 
@@ -102,7 +111,6 @@ def compiling() -> Iterator[None]:
 def lacks_to_compile() -> str | None:
     """Return what there is not that forms are compiled with; None where all is there."""
     import shlex
-    import shutil
     import sysconfig
 
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")[0]
@@ -110,3 +118,57 @@ def lacks_to_compile() -> str | None:
         return f"there is no C compiler {compiler} on PATH: install gcc, or name another one in CC"
     header = Path(sysconfig.get_paths()["include"]) / "Python.h"
     return None if header.is_file() else f"there is no {header}: install Python's headers, on Debian python3-dev"
+
+
+def ensure_folder(comm: MPI.Comm) -> str | None:
+    """Make sure of a folder for compiled forms, a temporary one where the usual one cannot be had; collective.
+
+    Before dolfinx is imported, which takes the folder from the environment.
+
+    Returns:
+        What is to be said of it; None where all is well.
+    """
+    from fenwear.parallel import on_root
+
+    text = on_root(comm, _problem)
+    if text is None:
+        return None
+    folder = on_root(comm, lambda: tempfile.mkdtemp(prefix="fenwear-"))
+    if comm.rank == 0:
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ[PLACE] = folder
+    return f"{text}: forms are compiled in a temporary folder, and nothing is kept; {PLACE} chooses another one"
+
+
+def _problem() -> str | None:
+    folder = Path(os.environ.get(PLACE) or Path.home() / ".cache") / "fenics"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            return None
+    except OSError as error:
+        return f"{folder.parent} cannot be written ({error.strerror})"
+
+
+def versions() -> dict[str, str]:
+    """Return the version of each part by its name."""
+    import dolfinx
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    import fenwear
+
+    found = {
+        "fenwear": fenwear.__version__,
+        "dolfinx": dolfinx.__version__,
+        "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "MPI": MPI.Get_library_version().split(",")[0].strip("\x00 \n"),
+        "Python": platform.python_version(),
+    }
+    for name in ("fenics-ufl", "fenics-basix", "gmsh", "numpy", "scipy", "xarray", "h5netcdf", "pydantic", "pint"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:  # a Debian package without Python metadata
+            module = __import__(name.removeprefix("fenics-"))
+            found[name] = str(getattr(module, "__version__", "present"))
+    return found

@@ -72,7 +72,6 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "belongs to plane models": (PHYSICS, "a state of the plane in solids or rings"),
         "what acts on them is the same all around": (PHYSICS, "loads through a point, and moments that bend, on rings"),
     },
-    "case/cycle_table.py": {"ends where it begins": (PHYSICS, "a cycle that does not come back")},
     "case/laws.py": {
         "with exponents of 1 only": (PHYSICS, "`archard` and `energy`, laws of p v, with other exponents"),
         "without pressure_cap and pressure_threshold": (
@@ -80,7 +79,10 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
             "wear per contact area, whose pressure is given, with bounds of pressure",
         ),
     },
-    "case/motions.py": {"a motion that ends where it starts": (PHYSICS, "a stroke that does not come back")},
+    "case/motions.py": {
+        "ends where it begins": (PHYSICS, "a cycle that does not come back"),
+        "a motion that ends where it starts": (PHYSICS, "a stroke that does not come back"),
+    },
     "case/checks.py": {
         "as thin as its own nodes are wide": (MODEL, 'heat on contact grids, `"fine"` bodies and half-spaces: above'),
         "one solution for each node; or": (
@@ -242,13 +244,12 @@ OTHERS: dict[str, tuple[str, ...]] = {
         "belongs to a shape from CAD",
         "belongs to the mesh of another",
     ),
-    "case/cycle_table.py": ("only then",),
+    "case/motions.py": ("only then",),
     "case/laws.py": (
         "with per_area",
         "a coefficient with other exponents",
     ),
     "case/materials.py": ("or per_decade with an onset",),
-    "case/motions.py": ("only then",),
     "case/quantities.py": ("only then",),
     "case/reading.py": ("with a base", "a list of keys", "with meshes that are given"),
     "case/checks.py": (

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import fenwear
 from fenwear import Case, CaseError, ConvergenceError, State, assemble, jump, load_case, march, register_law, steady
 from fenwear.case import Dependence
-from fenwear.case.own_laws import forget_laws
+from fenwear.case.dependence import forget_laws
 from fenwear.cycle import Block, evolve
 from fenwear.life import (
     DataSet,

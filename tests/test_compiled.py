@@ -13,7 +13,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from fenwear.bodies.assembly import compiled
-from fenwear.compiled import ensure_folder
+from fenwear.stack import ensure_folder
 
 
 @pytest.mark.mpi

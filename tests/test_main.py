@@ -15,7 +15,7 @@ from mpi4py import MPI
 from fenwear import __main__, cli
 from fenwear.errors import CaseError, OutputError
 from fenwear.results.history import clear_directory, make_directory
-from fenwear.versions import versions
+from fenwear.stack import versions
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ from fenwear.plausibility import (
     system_warnings,
 )
 from fenwear.plausibility.boundary import contact_chamfers, contact_limits, thickness
-from fenwear.plausibility.large import strain_and_rotation
+from fenwear.plausibility.elastic import strain_and_rotation
 from fenwear.plausibility.meshes import few, heated_layer, turned
 from fenwear.report.page import page
 from fenwear.results.summary import net_of

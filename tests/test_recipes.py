@@ -22,7 +22,7 @@ from fenwear import (
 )
 from fenwear.assembly import laws, place_case
 from fenwear.case.contact import CONTACT_LAWS
-from fenwear.case.own_laws import forget_laws
+from fenwear.case.dependence import forget_laws
 from fenwear.cycle.gross_sliding import GrossSliding
 from fenwear.interface import patches
 from fenwear.interface.patches import CHARTS, Side

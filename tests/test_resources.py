@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, assemble, load_case, memory
+from fenwear import CaseError, assemble, load_case, parallel
 from fenwear.assembly import elastic, place_case, resources_of, tribosystem
 from fenwear.bodies import factor
 from fenwear.bodies.condensation import condense
-from fenwear.memory import GIB, check_memory, free_memory
+from fenwear.parallel import GIB, check_memory, free_memory
 from fenwear.stick.setup import partial_slip_problem
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
@@ -34,8 +34,8 @@ def test_memory_of_a_set_up() -> None:
 def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rejected before anything is factored, in gross sliding and with stick."""
     placed = place_case(load_case("ball-on-flat", COARSE))
-    monkeypatch.setattr(memory, "SMALL", 0.0)
-    monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
+    monkeypatch.setattr(parallel, "SMALL", 0.0)
+    monkeypatch.setattr(parallel, "free_memory", lambda: 1e5)
     monkeypatch.setattr(tribosystem, "operators_for", lambda *_, **__: pytest.fail("condensed all the same"))
     with pytest.raises(CaseError, match=r"geometry: .* unknowns, \d+ contact nodes takes about \d+ MiB, but 0 MiB"):
         elastic(placed)
@@ -62,11 +62,11 @@ def test_a_factor_over_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_fits_and_what_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     """The system says what is free; less than a GiB is never rejected."""
     assert (free_memory() or 0.0) > 0
-    monkeypatch.setattr(memory, "free_memory", lambda: 2.0 * GIB)
+    monkeypatch.setattr(parallel, "free_memory", lambda: 2.0 * GIB)
     check_memory(MPI.COMM_SELF, 2.0 * GIB, "geometry", "it", "")
     with pytest.raises(CaseError, match=r"^geometry: it takes about 3\.0 GiB, but 2\.0 GiB are free\. Use less\."):
         check_memory(MPI.COMM_SELF, 3.0 * GIB, "geometry", "it", "Use less.")
-    monkeypatch.setattr(memory, "free_memory", lambda: 0.0)
+    monkeypatch.setattr(parallel, "free_memory", lambda: 0.0)
     check_memory(MPI.COMM_SELF, 0.9 * GIB, "geometry", "it", "")
 
 

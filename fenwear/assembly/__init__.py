@@ -12,7 +12,6 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
-from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import Clock, ContactSetup
 from fenwear.assembly.creep import Creep, CreepStage
 from fenwear.assembly.growing import (
@@ -30,7 +29,7 @@ from fenwear.assembly.growing import (
     relaid,
     with_room,
 )
-from fenwear.assembly.laws import law_named, register_contact_law
+from fenwear.assembly.laws import ContactLaw, law_named, register_contact_law
 from fenwear.assembly.placing import place, place_at_rest, place_case_bodies
 from fenwear.assembly.resources import Resources, setup_resources
 from fenwear.assembly.strokes import Sliding, make_sliding

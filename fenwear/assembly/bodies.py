@@ -15,12 +15,11 @@ from fenwear.arrays import Array
 from fenwear.assembly.grids import lay_grids
 from fenwear.assembly.strokes import make_sliding
 from fenwear.bodies.contact_surface import ContactSurface, profiled
-from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic, nodal_function
 from fenwear.bodies.mesh import BodyMesh, build_meshes
 from fenwear.bodies.operators import check_operators
-from fenwear.bodies.regions import contact_regions
+from fenwear.bodies.regions import contact_density, contact_regions
 from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
 from fenwear.case.names import told_by_name

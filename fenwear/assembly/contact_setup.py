@@ -18,7 +18,7 @@ from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Heat
 from fenwear.case.names import Names, told_by_name
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, InputError, Remedies
 from fenwear.heat.exchange import Isothermal
 from fenwear.heat.passage import Passage
 from fenwear.interface import (
@@ -30,7 +30,6 @@ from fenwear.interface.placement import in_model, in_space
 from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, conductance_of, layers_of
 from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
-from fenwear.remedies import Remedies
 from fenwear.sliding.coating import coatings_of, covering
 from fenwear.sliding.field import SlidingField, node_rates
 from fenwear.sliding.friction import ContactConditions, Friction
@@ -96,7 +95,7 @@ class ContactSetup:
 
     @property
     def contact_law(self) -> Any:
-        """The law of contact, a `contact_law.ContactLaw`."""
+        """The law of contact, a `laws.ContactLaw`."""
         return law_named(self.law)
 
     @property

@@ -32,7 +32,7 @@ from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.patches import facet_side
 from fenwear.interface.transfer import dual_transfer
-from fenwear.memory import check_memory
+from fenwear.parallel import check_memory
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
 PER_NODE = 300.0  # bytes that a node takes in each position of the strip (measured, 129 and 257 nodes in 3 and 21)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import with_surfaces
-from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.grids import on_grid
+from fenwear.assembly.laws import ContactLaw
 from fenwear.assembly.placing import place_case_bodies
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import Tribosystem

@@ -13,7 +13,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import entries
 from fenwear.bodies.response import by_surface
 from fenwear.case import AUTO, CONDENSED
-from fenwear.memory import check_memory, memory_size
+from fenwear.parallel import check_memory, memory_size
 
 NUMBER = 8  # bytes
 WORKING = 1.3  # of a factor: what it is made in

@@ -8,10 +8,9 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies
-from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.growing import answers_anywhere, on_first_contact, relaid
-from fenwear.assembly.laws import law_named
+from fenwear.assembly.laws import ContactLaw, law_named
 from fenwear.assembly.placing import place, place_case_bodies
 from fenwear.assembly.tribosystem import (
     Preparation,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
-from fenwear.assembly.contact_law import ContactLaw
+from fenwear.assembly.laws import ContactLaw
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.case import Body, Case
 from fenwear.errors import CaseError

@@ -75,7 +75,7 @@ def summary() -> dict[str, Any]:
 @cache
 def _surroundings() -> str:
     """Return what else decides the last bits of results: the versions of all parts, and the number of threads."""
-    from fenwear.versions import versions
+    from fenwear.stack import versions
 
     sources = hashlib.blake2b(digest_size=20)
     package = Path(__file__).parents[1]

@@ -25,21 +25,18 @@ from numpy.typing import NDArray
 from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.bodies import kept
-from fenwear.bodies.constants import constants
-from fenwear.bodies.mesh_check import element_problems
-from fenwear.bodies.raw_mesh import GmshView, RawMesh, raw_mesh
-from fenwear.bodies.ready import meshes_folder
+from fenwear.bodies.raw_mesh import GmshView, RawMesh, element_problems, raw_mesh
+from fenwear.bodies.ready import constants, meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
 from fenwear.files.formats import CAD, MESHES, is_foreign, read_mesh
 from fenwear.files.groups import Group, GroupedMesh, grouped, into_gmsh, normal, rows_text
 from fenwear.files.mesh import stacked
-from fenwear.files.session import gmsh_model
-from fenwear.memory import check_memory
-from fenwear.parallel import on_root
+from fenwear.parallel import check_memory, on_root
 
 BODIES = ROLES
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3

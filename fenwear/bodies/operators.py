@@ -22,7 +22,7 @@ from fenwear.bodies.fine import fine
 from fenwear.bodies.half_space import half_space
 from fenwear.bodies.response import Request
 from fenwear.case import AUTO, CONDENSED, Case
-from fenwear.case.own_laws import BELOW
+from fenwear.case.dependence import BELOW
 from fenwear.errors import CaseError, InputError
 
 

@@ -1,10 +1,12 @@
-"""The ready geometries, by what they say of themselves: the head of each .geo, and its parameters."""
+"""Geometries in .geo files: the parameters of any, and what the ready ones say of themselves."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 from pathlib import Path
+
+from fenwear.errors import CaseError, InputError
 
 PACKAGE = Path(__file__).parents[1]
 PARAMETER = re.compile(r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE)
@@ -56,3 +58,19 @@ def _read(path: Path) -> ReadyGeometry:
     block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
     parameters = tuple(PARAMETER.findall(block[1])) if block else ()
     return ReadyGeometry(path.name, about, parameters, tuple(dict.fromkeys(GROUP.findall(text))))
+
+
+def constants(path: Path) -> dict[str, str]:
+    """Return the parameters of a .geo file, in their order, with their defaults as they are written.
+
+    Raises:
+        CaseError: it defines a Macro, which gmsh would read a second time in a wrong way.
+    """
+    text = re.sub(r"//.*", "", path.read_text("utf-8"))
+    if re.search(r"^\s*(Macro|Function)\b", text, re.MULTILINE):
+        message = (
+            f"{path.name} defines a Macro, which gmsh reads safely only once in a process: write it out, or give a .msh"
+        )
+        raise CaseError(InputError("geometry.file", message))
+    blocks = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", text, re.DOTALL)
+    return {name: value.strip() for block in blocks for name, value in re.findall(r"(\w+)\s*=\s*([^,]*)", block)}

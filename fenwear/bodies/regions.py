@@ -1,4 +1,4 @@
-"""Which material regions a contact surface belongs to."""
+"""Which material regions a contact surface belongs to, and the density of what is worn off them."""
 
 from __future__ import annotations
 
@@ -34,3 +34,19 @@ def contact_regions(body: ElasticBody) -> Mapping[str, Array]:
     mesh.mesh.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
     shares = body.on_surface(sums / sums.sum(axis=1, keepdims=True))[body.surface.nodes]
     return dict(zip(mesh.regions, shares.T, strict=True))
+
+
+def contact_density(shares: Mapping[str, Array], densities: Mapping[str, float | None]) -> Array | None:
+    """Return the density at the pressure nodes (n,), N s²/mm⁴; None where a region there has none.
+
+    A node between two regions has the mean of both.
+
+    Args:
+        shares: Of the regions in the nodes (n,), by their names.
+        densities: Of the regions.
+    """
+    found = np.zeros(len(next(iter(shares.values()))))
+    for name, share in shares.items():
+        rho = densities.get(name)
+        found += np.where(share > 0, share * (np.nan if rho is None else rho), 0.0)
+    return found if bool(np.isfinite(found).all()) else None

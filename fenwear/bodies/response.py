@@ -19,8 +19,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import Factor, entries, moved, solve_together
-from fenwear.bodies.schur import available
+from fenwear.bodies.factor import Factor, available, entries, moved, solve_together
 from fenwear.parallel import total
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small

@@ -22,8 +22,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_here
-from fenwear.bodies.factor import factored_here, solved, without_factor
-from fenwear.bodies.schur import condense_only, schur_complement
+from fenwear.bodies.factor import condense_only, factored_here, schur_complement, solved, without_factor
 
 Numbers = NDArray[np.int64]
 

@@ -3,10 +3,10 @@
 from fenwear.case.bodies import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support, Topography
 from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Run, Setup
+from fenwear.case.dependence import State, register_law
 from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
-from fenwear.case.own_laws import State, register_law
 from fenwear.case.plausible import plausibility_warnings
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, heat_of, load_case, make_case

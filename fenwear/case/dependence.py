@@ -1,4 +1,4 @@
-"""Coefficients that depend on the state of the contact: expressions of a case file.
+"""Coefficients that depend on the state of the contact: expressions of a case file, and registered functions.
 
 An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
 position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), debris, the thickness of the third
@@ -6,20 +6,30 @@ body (mm), edge, the distance from the edge of the contact (mm), and of the cycl
 mean pressure over the sliding (MPa). It is parsed, checked node by node and then
 computed with numpy: no other name, call or operation than those below exists for it, so that a case file cannot run
 code.
+
+Laws of one's own are functions that a program in Python has registered by name; a case file alone cannot. A law may
+have states: fields at the contact's nodes that it remembers, such as the thickness of an oxide film or the damage of a
+surface. They begin somewhere, and their rates are functions of the conditions of each node, of the wear there and of
+the states themselves. What becomes of them is decided in `fenwear.layers.memory`.
 """
 
 from __future__ import annotations
 
 import ast
+import math
 import operator
+import time
 import warnings
-from collections.abc import Callable, Mapping
-from functools import lru_cache
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from types import MappingProxyType
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.errors import CaseError, InputError
 
 VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm")
 UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm",
@@ -46,8 +56,8 @@ OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
 }
 KNOWN = f"numbers, {', '.join(VARIABLES)}, + - * / **, {', '.join(FUNCTIONS)}"
 
-State = Mapping[str, Array]
-Function = Callable[[State], Any]
+Now = Mapping[str, Array]
+Function = Callable[[Now], Any]
 
 
 @lru_cache(maxsize=100)
@@ -115,8 +125,233 @@ def _constant(value: float, text: str) -> Function:
     return lambda _: constant
 
 
-def evaluate(function: Function, state: State, shape: tuple[int, ...]) -> Array:
+def evaluate(function: Function, state: Now, shape: tuple[int, ...]) -> Array:
     """Return the values (shape) of a parsed expression; NaN and infinities are left to the caller."""
     with np.errstate(all="ignore"):
         found = np.array(function(state), dtype=float)
     return found if found.shape == shape else np.broadcast_to(found, shape).copy()
+
+
+F = TypeVar("F", bound=Function)
+BELOW: Any = object()  # in place of a function that follows a decorator
+WEAR = "wear"  # worn off both bodies at a node, mm/s: rates of states may depend on it
+FIRST, SLOW = 3, 0.02  # calls of a law that are timed, and seconds of each that are told
+
+
+@dataclass(frozen=True)
+class State:
+    """A state that a law of one's own remembers at each node of the contact: dy/dt = rate.
+
+    It is on the material of the body whose wear law depends on it, a state of friction alone on the punch's. Strip that
+    is not under the punch has its rate without pressure, speed and wear.
+
+    Attributes:
+        rate: Function of the variables in `of` and of the state itself, by their names at n nodes (n,), that returns
+            the change in a second (n,), or one number.
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other states, and `wear`, what both
+            bodies lose there (mm/s), the rate depends on.
+        initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
+        unit: Of its values, as it is told in results.
+        fills: Gap that a unit of it fills, mm: 1 of a film's thickness in mm that carries as third bodies do. Such a
+            state is the contact's, and stays with the punch.
+        least, most: Between which its values are.
+        slope: Derivative of the rate to the state itself, a function as the rate; by default by differences.
+    """
+
+    rate: Function
+    of: Sequence[str] = ("T", "p", "v")
+    initial: float | Function = 0.0
+    unit: str = "1"
+    fills: float = 0.0
+    least: float = -np.inf
+    most: float = np.inf
+    slope: Function | None = None
+
+
+@dataclass(frozen=True)
+class _Law:
+    """A registered function, and the names of what it depends on."""
+
+    function: Function
+    of: frozenset[str]
+
+
+NO_STATES: Mapping[str, State] = MappingProxyType({})
+_CALLS: dict[str, list[float]] = {}  # CPU seconds of the first ones, by the law's name
+_LAWS: dict[str, _Law] = {}  # by their names: those of this process
+_STATES: dict[str, State] = {}
+
+
+@overload
+def register_law(
+    name: str, *, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> Callable[[F], F]: ...
+@overload
+def register_law(
+    name: str, function: F, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> F: ...
+def register_law(
+    name: str, function: Any = BELOW, of: Sequence[str] = ("T", "p", "v"), states: Mapping[str, State] = NO_STATES
+) -> Any:
+    """Make a law of one's own known by its name, as `law = "name"` in a case made in Python.
+
+    Without a function it is a decorator: `@register_law("name")` above the function.
+
+    It is called with the values of its variables at the contact nodes (n,), by their names, and returns the
+    coefficient at each (n,), or one number. Derivatives are taken by differences, where any are needed.
+
+    Args:
+        name: A word; registered again, the new function takes its place.
+        function: Of the state of the contact; without it, what the decorator stands above.
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with depth or
+            s nothing ever repeats.
+        states: What it remembers, by names that are words; laws that name the same state share it.
+
+    Returns:
+        The function, or the decorator.
+
+    Raises:
+        CaseError: `name` is no word, `function` cannot be called, or a state is wrong.
+    """
+    if function is BELOW:
+        return partial(register_law, name, of=of, states=states)
+    key = f"law {name!r}"
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise CaseError(InputError("law", f"expected a word as the name of a law, got {str(name)!r}"))
+    if not callable(function):
+        raise CaseError(InputError(key, "expected a function of the state"))
+    own = dict(states)
+    known = {**_STATES, **own}
+    _check_of(key, of, (*VARIABLES, *known))
+    for word, state in own.items():
+        _check_state(word, state, (*VARIABLES, WEAR, *known))
+    _STATES.update(own)
+    _LAWS[name] = _Law(function, frozenset({*of, *own}))
+    _CALLS.pop(name, None)
+    return function
+
+
+def forget_laws() -> None:
+    """Forget all laws and states."""
+    for known in (_LAWS, _STATES, _CALLS):
+        known.clear()
+
+
+def _check_of(key: str, of: Sequence[str], known: Sequence[str]) -> None:
+    unknown = [one for one in of if one not in known]
+    if unknown or isinstance(of, str):
+        message = f"expected a list of some of {', '.join(known)}, got {unknown[0] if unknown else of!r}"
+        raise CaseError(InputError(key, message))
+
+
+def _check_state(name: str, state: State, known: Sequence[str]) -> None:
+    key = f"state {name!r}"
+    taken = (*VARIABLES, *FUNCTIONS, WEAR)
+    if not (isinstance(name, str) and name.isidentifier()) or name in taken:
+        raise CaseError(InputError(key, f"expected a word that is none of {', '.join(taken)}"))
+    if not isinstance(state, State):
+        raise CaseError(InputError(key, "expected a fenwear.State"))
+    if not callable(state.rate) or not (state.slope is None or callable(state.slope)):
+        raise CaseError(InputError(key, "expected functions as its rate and its slope"))
+    _check_of(key, state.of, known)
+    if not state.least < state.most:
+        raise CaseError(InputError(key, f"expected least < most, got {state.least:g} and {state.most:g}"))
+    if not (np.isfinite(state.fills) and state.fills >= 0):
+        raise CaseError(InputError(key, f"expected fills of zero or more, got {state.fills!r}"))
+    if not callable(state.initial) and not state.least <= state.initial <= state.most:
+        wanted = f"expected an initial value from {state.least:g} to {state.most:g}"
+        raise CaseError(InputError(key, f"{wanted}, got {state.initial!r}"))
+
+
+def states_of_law(name: str) -> dict[str, State]:
+    """Return the states that a registered law depends on, and those that these depend on; none where there is none."""
+    found: dict[str, State] = {}
+    left = list(_LAWS[name].of) if name in _LAWS else []
+    while left:
+        word = left.pop()
+        if word in _STATES and word not in found:
+            found[word] = _STATES[word]
+            left += _STATES[word].of
+    return {word: found[word] for word in sorted(found)}
+
+
+def variables_of_law(name: str) -> frozenset[str]:
+    """Return what a registered law depends on, by its states, too; nothing where there is none."""
+    states = states_of_law(name)
+    return frozenset({*(_LAWS[name].of if name in _LAWS else ()), *(one for s in states.values() for one in s.of)})
+
+
+def check_law(name: str) -> None:
+    """Raise where no law of this name is registered.
+
+    Raises:
+        ValueError: says what is.
+    """
+    if name not in _LAWS:
+        known = f"known are {', '.join(sorted(_LAWS))}" if _LAWS else "there is none"
+        raise ValueError(
+            f"no law {name!r} is registered, {known}: laws of one's own are made known in Python, by "
+            "fenwear.register_law, and do not exist on the command line"
+        )
+
+
+def _tell_slow(name: str, seconds: float, nodes: int) -> None:
+    """Warn once of a law whose fastest of its first calls takes long: it is called some ten times in a half-cycle."""
+    calls = _CALLS.setdefault(name, [])
+    calls.append(seconds)
+    if len(calls) == FIRST and min(calls) > SLOW:
+        warnings.warn(
+            f"the law {name!r} takes {min(calls):.2g} s for {nodes} nodes, and a half-cycle calls it some ten times: "
+            "make it faster, with arrays of numpy in place of loops",
+            stacklevel=2,
+        )
+
+
+def evaluate_law(name: str, now: Now, shape: tuple[int, ...]) -> Array:
+    """Return the values (shape) of a registered law.
+
+    Raises:
+        ValueError: it fails, or gives what is no number for each node; says so.
+    """
+    check_law(name)
+    law = _LAWS[name]
+    if len(_CALLS.get(name, ())) >= FIRST:
+        return _called(f"the law {name!r}", law.function, law.of, now, shape)
+    begin = time.thread_time()
+    found = _called(f"the law {name!r}", law.function, law.of, now, shape)
+    _tell_slow(name, time.thread_time() - begin, shape[0] if shape else 1)
+    return found
+
+
+def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
+    """Return the values (shape) of a function of a state: its rate, a slope, or its values at the start.
+
+    Raises:
+        CaseError: it fails, or gives what is no finite number for each node; says so.
+    """
+    try:
+        found = _called(f"the state {name!r}", function, of, now, shape)
+    except ValueError as error:
+        raise CaseError(InputError(f"state {name!r}", str(error))) from error
+    if not math.isfinite(float(found @ found)) and not np.isfinite(found).all():  # a square may be beyond all numbers
+        node = int(np.flatnonzero(~np.isfinite(found))[0])
+        at = ", ".join(f"{one} = {np.broadcast_to(now[one], shape)[node]:g}" for one in of)
+        raise CaseError(InputError(f"state {name!r}", f"expected finite numbers, got {found[node]:g} at {at}"))
+    return found
+
+
+def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
+    given = {key: now[key].copy() if now[key].shape == shape else np.full(shape, now[key]) for key in of}
+    try:
+        found = np.asarray(function(given))
+        if found.dtype.kind == "c":
+            raise ValueError("it gives complex numbers")
+        values = found.astype(float)  # a copy of what may be the user's own
+    except KeyError as error:
+        asked = f"asks for {error}, but is of {', '.join(sorted(given))}"
+        raise ValueError(f"{what} {asked}: expected it among what `of` names") from error
+    except Exception as error:  # a user's own code may raise anything
+        raise ValueError(f"{what} fails: {error}") from error
+    if values.shape not in ((), shape):
+        raise ValueError(f"{what} gives {values.shape} values; expected one for each of {shape[0]} nodes")
+    return values if values.shape == shape else np.full(shape, values)

@@ -11,8 +11,18 @@ import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression, variables_of
-from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
+from fenwear.case.dependence import (
+    UNITS,
+    VARIABLES,
+    State,
+    check_law,
+    evaluate,
+    evaluate_law,
+    parse_expression,
+    states_of_law,
+    variables_of,
+    variables_of_law,
+)
 from fenwear.case.quantities import (
     Check,
     Force,

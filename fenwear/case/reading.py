@@ -13,9 +13,9 @@ from typing import Any, get_args
 import pydantic
 
 from fenwear.case.csv_table import with_profiles
-from fenwear.case.cycle_table import with_cycle
 from fenwear.case.keys import all_keys, find_keys
 from fenwear.case.laws import Dependence
+from fenwear.case.motions import with_cycle
 from fenwear.case.names import ROLES
 from fenwear.case.plausible import written
 from fenwear.case.program import check_length, half_cycles_of, with_program

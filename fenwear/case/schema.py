@@ -18,10 +18,9 @@ from fenwear.case.bodies import Body, CourseLoad, Geometry, Grid, Load, Model
 from fenwear.case.checks import AGAINST_STICK, case_problems
 from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Program, Run, Setup
-from fenwear.case.cycle_table import PLACES
 from fenwear.case.laws import Dependence, Stick, Wear, depends_on
 from fenwear.case.materials import Material
-from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
+from fenwear.case.motions import PLACES, Cycle, Motions, OneWay, Oscillation, Rotation
 from fenwear.case.names import Names, renamed
 from fenwear.case.quantities import Part
 from fenwear.case.thermal import Heat, diffusion_of

@@ -32,7 +32,7 @@ def info_command(
     from fenwear.bodies import kept
     from fenwear.bodies.ready import ready_geometries
     from fenwear.case.keys import find_keys
-    from fenwear.versions import versions
+    from fenwear.stack import versions
 
     geometries = ready_geometries()
     if key in geometries:
@@ -68,7 +68,7 @@ def info_command(
 
 def _list_file(path: Path, *, as_json: bool) -> None:
     """Print what a file of another program has."""
-    from fenwear.files.listing import listed_file
+    from fenwear.files.formats import listed_file
 
     text, content = on_root(MPI.COMM_WORLD, lambda: listed_file(path))
     if as_json:

@@ -126,7 +126,7 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
     from fenwear.cycle import stability_number
     from fenwear.heat.periodic import cycle_memory
     from fenwear.law_choice import choose_law, with_law
-    from fenwear.memory import memory_size
+    from fenwear.parallel import memory_size
     from fenwear.plausibility import fineness_text, initial_warnings
     from fenwear.run import level_of, position_warnings
 

@@ -26,11 +26,10 @@ from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
 from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
-from fenwear.errors import ConvergenceError
+from fenwear.errors import FULL_START, PIVOTS, SOFTER_START, ConvergenceError, Remedies
 from fenwear.interface import Interface
 from fenwear.interface.convolution import Convolution
 from fenwear.parallel import Team
-from fenwear.remedies import FULL_START, PIVOTS, SOFTER_START, Remedies
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"

@@ -14,12 +14,11 @@ from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
-from fenwear.errors import ConvergenceError
+from fenwear.errors import GRAZING, ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory, cycles_of
 from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
-from fenwear.memory import check_memory
-from fenwear.remedies import GRAZING
+from fenwear.parallel import check_memory
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
 

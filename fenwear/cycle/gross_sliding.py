@@ -48,10 +48,9 @@ from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.cycle.state import RunState, carried_by, known_pressures
 from fenwear.cycle.steady import SteadyState, steady_state
-from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.errors import MARCHED, SHORTER_JUMPS, CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.layers.between import PLASTIC
-from fenwear.remedies import MARCHED, SHORTER_JUMPS
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles

@@ -14,9 +14,8 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import Totals
-from fenwear.errors import ConvergenceError
+from fenwear.errors import SMALLER_STEPS, ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.wear import WornDepths
 
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle

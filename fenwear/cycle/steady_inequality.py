@@ -20,8 +20,8 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface.convolution import Convolution
 from fenwear.layers import Evolution
 from fenwear.layers.step import LayerEvolution
-from fenwear.memory import check_memory
 from fenwear.optimum import Optimum
+from fenwear.parallel import check_memory
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import StepWear
 

@@ -1,10 +1,12 @@
-"""Meshes that gmsh reads: UNV and CGNS with their groups, Nastran with its property numbers."""
+"""gmsh, opened quietly; and meshes that it reads: UNV and CGNS with groups, Nastran with its property numbers."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,7 +16,46 @@ from numpy.typing import NDArray
 
 from fenwear.errors import CaseError, InputError
 from fenwear.files.mesh import KINDS, Block, MeshFile, MeshSet
-from fenwear.files.session import gmsh_there
+from fenwear.stack import importing
+
+
+def _library() -> Any:
+    """Return gmsh.
+
+    Raises:
+        StackError: it is missing, or a library that it needs.
+    """
+    with importing():
+        import gmsh
+    return gmsh
+
+
+def gmsh_there() -> None:
+    """Look whether there is gmsh.
+
+    Raises:
+        StackError: it is missing, or a library that it needs.
+    """
+    _library()
+
+
+@contextmanager
+def gmsh_model() -> Iterator[Any]:
+    """Open gmsh quietly, and close it unless someone else had opened it."""
+    gmsh = _library()
+    was_open = gmsh.isInitialized()
+    if not was_open:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.add("fenwear")
+    try:
+        yield gmsh
+    finally:
+        if was_open:
+            gmsh.model.remove()
+        else:
+            gmsh.finalize()
+
 
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 LONGEST = 600  # s that gmsh may read

@@ -30,8 +30,7 @@ from fenwear.case.program import stages_of
 from fenwear.cycle import march
 from fenwear.errors import CaseError, InputError
 from fenwear.flash.heating import Course, Heating, Window, grid_of, past_of
-from fenwear.memory import check_memory
-from fenwear.parallel import on_root
+from fenwear.parallel import check_memory, on_root
 from fenwear.results import checkpoint
 from fenwear.stick.coulomb import Steps
 from fenwear.stick.records import TimeStepRecords

@@ -28,8 +28,7 @@ from scipy.sparse import csc_array, csr_array, hstack, vstack
 
 from fenwear.arrays import Array
 from fenwear.bodies import kept
-from fenwear.bodies.factor import Factor, entries, make_together
-from fenwear.bodies.schur import available
+from fenwear.bodies.factor import Factor, available, entries, make_together
 from fenwear.errors import HeatError
 from fenwear.heat.conduction import PREFIX, HeatBody, HeatStep, Surroundings
 from fenwear.heat.field import CHUNK, ModalField, ReducedBasis, ReducedField, modal_basis

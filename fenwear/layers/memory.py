@@ -30,7 +30,7 @@ import numpy as np
 import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.case.own_laws import WEAR, State, evaluate_of_state
+from fenwear.case.dependence import WEAR, State, evaluate_of_state
 from fenwear.errors import ConvergenceError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space

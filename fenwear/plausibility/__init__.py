@@ -4,10 +4,10 @@ rules     the table: what each rule looks at, the key it is about, and its messa
 monitor   applies the table to the first contact, to the blocks and stages of a run, and to steady states
 boundary  where a contact surface ends: rims, chamfers, thickness
 meshes    meshes that are too coarse for a contact, or in another unit
-stroke    strokes that the bodies take up elastically
-large     displacements beyond small strain
+elastic   displacements beyond small strain, and strokes that the bodies take up elastically
 """
 
+from fenwear.plausibility.elastic import TAKEN_UP, elastic_share, elastic_way
 from fenwear.plausibility.monitor import (
     HeatMonitor,
     StateMonitor,
@@ -25,7 +25,6 @@ from fenwear.plausibility.monitor import (
     uniques,
 )
 from fenwear.plausibility.rules import RULES, Made, Rule, Seen, remarks
-from fenwear.plausibility.stroke import TAKEN_UP, elastic_share, elastic_way
 
 __all__ = [
     "RULES",

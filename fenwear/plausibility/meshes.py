@@ -35,10 +35,10 @@ from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array
 from fenwear.assembly import Bodies, ContactSetup, Tribosystem
-from fenwear.bodies.constants import constants
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.mesh import find_geometry
+from fenwear.bodies.ready import constants
 from fenwear.case import Case, Reciprocating, Tabulated
 from fenwear.case.program import cycle_of, speeds_of
 from fenwear.compat import geometry_dofmap

@@ -23,9 +23,8 @@ from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.exchange import TERMS
 from fenwear.plausibility import meshes
 from fenwear.plausibility.boundary import Chamfers, Limits, contact_chamfers, contact_limits, opened, thickness
-from fenwear.plausibility.large import large
+from fenwear.plausibility.elastic import TAKEN_UP, elastic_share, elastic_way, large, stroke_amplitude
 from fenwear.plausibility.meshes import Fields
-from fenwear.plausibility.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_amplitude
 from fenwear.results import between
 from fenwear.results.shakedown import factor, shakedown_limit
 from fenwear.results.summary import net_of

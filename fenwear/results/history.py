@@ -31,7 +31,7 @@ from fenwear.results.quantity import Variable, computed
 from fenwear.results.registry import quantities_of
 from fenwear.results.scar import conforming
 from fenwear.results.surfaces import Column, on_mesh, part_columns, surface_columns
-from fenwear.versions import versions
+from fenwear.stack import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 # What runs and sweeps leave in their folders.

@@ -20,7 +20,7 @@ from fenwear.results.scar import conforming
 from fenwear.results.shakedown import shakedown_limit
 from fenwear.results.surfaces import at_places
 from fenwear.results.zone import ContactNet, contact_net, without_noise
-from fenwear.versions import versions
+from fenwear.stack import versions
 
 # Over a run, and when; at its end it is largest_temperature.
 HOTTEST, HOTTEST_AT = "largest_temperature_of_run", "largest_temperature_of_run_half_cycle"

@@ -13,7 +13,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
-from fenwear.memory import memory_size
+from fenwear.parallel import memory_size
 from fenwear.sliding.coating import coatings_of
 from fenwear.sliding.regions import regions_opposite
 from fenwear.stick.cycle import PartialSlipProblem

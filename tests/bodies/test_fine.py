@@ -389,8 +389,8 @@ def test_pressures_that_no_mesh_feels() -> None:
 
 def test_more_nodes_than_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are refused before they are made, with what they take in all positions of the strip."""
-    monkeypatch.setattr("fenwear.memory.free_memory", lambda: 1e6)
-    monkeypatch.setattr("fenwear.memory.SMALL", 0)
+    monkeypatch.setattr("fenwear.parallel.free_memory", lambda: 1e6)
+    monkeypatch.setattr("fenwear.parallel.SMALL", 0)
     monkeypatch.setattr("fenwear.bodies.mesh.check_memory", lambda *_: None)
     settings = [*BALL, "grid.nodes=33", "wear.strip.coefficient='1e-8 1/MPa'", "motion.positions=5"]
     with pytest.raises(

@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from fenwear import ConvergenceError, Tribosystem, assemble, march
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
+from fenwear.errors import SOFTER_START
 from fenwear.interface import Interface
-from fenwear.remedies import SOFTER_START
 from fenwear.sliding.wear import WornDepths
 from fenwear_verify.full_space import FullContact
 

@@ -15,7 +15,7 @@ from fenwear.contact import ContactState
 from fenwear.contact.inequality import Inequality
 from fenwear.cycle import Block
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
-from fenwear.remedies import FULL_START, MARCHED, PIVOTS, SHORTER_JUMPS, SMALLER_STEPS, SOFTER_START
+from fenwear.errors import FULL_START, MARCHED, PIVOTS, SHORTER_JUMPS, SMALLER_STEPS, SOFTER_START
 
 Assemble = Callable[..., Tribosystem]
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")

@@ -226,8 +226,8 @@ def test_heat_of_too_many_nodes_is_refused(
 ) -> None:
     """Before the memory runs out; without heat no such matrix is made."""
     system = assembled("example1-heat", "geometry.degree=2")
-    monkeypatch.setattr("fenwear.memory.free_memory", lambda: 1e3)
-    monkeypatch.setattr("fenwear.memory.SMALL", 0)
+    monkeypatch.setattr("fenwear.parallel.free_memory", lambda: 1e3)
+    monkeypatch.setattr("fenwear.parallel.SMALL", 0)
     with pytest.raises(CaseError, match=r"geometry.*with heat of \d+ contact nodes in 2 phases takes .* are free"):
         steady(system)
 
@@ -242,8 +242,8 @@ def test_maps_of_heat_that_do_not_fit_are_refused(
     maps = {id(one): one for phase in heat.cycle(np.ones((phases, n))).maps for one, _ in phase.steps}
     made = sum(one.propagator.nbytes + one.response.nbytes for one in maps.values())
     assert 0.4 * cycle_memory(heat.exchange) < made < 0.7 * cycle_memory(heat.exchange)
-    monkeypatch.setattr("fenwear.memory.free_memory", lambda: 1e3)
-    monkeypatch.setattr("fenwear.memory.SMALL", 0)
+    monkeypatch.setattr("fenwear.parallel.free_memory", lambda: 1e3)
+    monkeypatch.setattr("fenwear.parallel.SMALL", 0)
     for solved in (steady, lambda own: next(jump(own, 100, tolerance=0.1))):
         with pytest.raises(CaseError, match=r"(heat|geometry): .* are free"):
             solved(system)

@@ -12,9 +12,9 @@ import pytest
 from fenwear import CaseError
 from fenwear.bodies.mesh import write_msh
 from fenwear.case import Geometry
+from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import read_shapes
-from fenwear.files.listing import listed_file
-from fenwear.files.session import gmsh_model
+from fenwear.files.formats import listed_file
 
 FLAT = {"punch_body": "surface 1", "strip_body": "Face 2", "punch_contact": "y = 0 mm", "strip_contact": "y = 0 mm",
         "punch_top": "curve 3"}  # fmt: skip

@@ -83,7 +83,7 @@ def written(folder: Path, suffix: str) -> Path:
     sizes_of(folder / "d.inp")
     path = folder / f"d{suffix}"
     if suffix in (".unv", ".cgns", ".bdf"):
-        from fenwear.files.session import gmsh_model
+        from fenwear.files.by_gmsh import gmsh_model
 
         with gmsh_model() as gmsh:
             gmsh.merge(str(folder / "d.msh"))

@@ -178,8 +178,8 @@ def test_refused_without_memory(run: Callable[..., Path], monkeypatch: pytest.Mo
     folder = run(*BALL)
     for module in ("bodies.mesh", "assembly.grids"):  # of the same run set up again
         monkeypatch.setattr(f"fenwear.{module}.check_memory", lambda *_, **__: None)
-    monkeypatch.setattr("fenwear.memory.SMALL", 0)
-    monkeypatch.setattr("fenwear.memory.free_memory", lambda: 1e6)
+    monkeypatch.setattr("fenwear.parallel.SMALL", 0)
+    monkeypatch.setattr("fenwear.parallel.free_memory", lambda: 1e6)
     with pytest.raises(CaseError, match=r"grid\.nodes: .* takes about .* 1 MiB are free"):
         flash_temperatures(folder, STEEL)
 

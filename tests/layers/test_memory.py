@@ -12,7 +12,7 @@ from combinations import SMALL, STICK
 
 import fenwear
 from fenwear import Case, CaseError, ConvergenceError, State, Tribosystem, assemble, load_case, register_law, steady
-from fenwear.case.own_laws import forget_laws
+from fenwear.case.dependence import forget_laws
 from fenwear.cycle import Block, evolve, growth_rate
 
 PLAIN = (

@@ -139,7 +139,7 @@ def test_jumps_are_saved_long_before_a_block_of_them_is_full(tmp_path: Path, mon
         save(directory, system, state, extremes)
 
     monkeypatch.setattr("fenwear.run.BLOCK_SECONDS", 0.0)
-    monkeypatch.setattr("fenwear.run_monitor.LOOK", 0.0)
+    monkeypatch.setattr("fenwear.signals.LOOK", 0.0)
     monkeypatch.setattr(checkpoint, "save", noted)
     settings = (
         "run.half_cycles=400",

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-import fenwear.run_monitor
+import fenwear.signals
 from fenwear import ConvergenceError, load_case
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.errors import InterruptedRunError
@@ -132,8 +132,8 @@ def test_interrupted_within_a_step(tmp_path: Path, name: str, monkeypatch: pytes
         return looks == 12
 
     with monkeypatch.context() as patched:
-        patched.setattr(fenwear.run_monitor.RunMonitor, "look", look)
-        patched.setattr(fenwear.run_monitor, "LOOK", -1.0)
+        patched.setattr(fenwear.signals.RunMonitor, "look", look)
+        patched.setattr(fenwear.signals, "LOOK", -1.0)
         with pytest.raises(InterruptedRunError, match="to go on: --resume"):
             run(tmp_path / "cut", name, *how)
     reached = int(history(tmp_path / "cut").half_cycle[-1])

@@ -11,8 +11,8 @@ import pytest
 
 import fenwear
 from fenwear import Tribosystem, assemble, jump, load_case, make_case, march, steady
-from fenwear.case import Case, changed_case, own_laws
-from fenwear.case.own_laws import evaluate_law
+from fenwear.case import Case, changed_case, dependence
+from fenwear.case.dependence import evaluate_law
 from fenwear.cycle.stability import growth_rate
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.layers.closure import RoughClosure
@@ -241,7 +241,7 @@ def test_own_law_in_python(assembled: Assemble) -> None:
             with pytest.raises(CaseError, match=message):
                 next(march(own, 2))
     finally:
-        own_laws.forget_laws()
+        dependence.forget_laws()
     with pytest.raises(CaseError, match="expected a word"):
         fenwear.register_law("my law", abs)
     with pytest.raises(CaseError, match="expected a function"):
@@ -254,12 +254,12 @@ def test_own_law_in_python(assembled: Assemble) -> None:
 
 def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Once, after the first calls; here any time counts as slow."""
-    monkeypatch.setattr(own_laws, "SLOW", -1.0)
+    monkeypatch.setattr(dependence, "SLOW", -1.0)
     state = {"p": np.ones(5)}
     function = fenwear.register_law("slow", of=["p"])(lambda now: now["p"])
     assert function(state) is state["p"]  # the decorator gives it back
     try:
-        for _ in range(own_laws.FIRST - 1):
+        for _ in range(dependence.FIRST - 1):
             evaluate_law("slow", state, (5,))
         with pytest.warns(UserWarning, match=r"the law 'slow' takes .* s for 5 nodes.*arrays of numpy"):
             evaluate_law("slow", state, (5,))
@@ -267,7 +267,7 @@ def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
             warnings.simplefilter("error")
             evaluate_law("slow", state, (5,))
     finally:
-        own_laws.forget_laws()
+        dependence.forget_laws()
 
 
 def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:
@@ -295,7 +295,7 @@ def test_laws_are_asked_at_pressures_alone() -> None:
         system = assemble(load_case("fretting", ["wear.punch.coefficient={law='mine', unit='1/MPa'}"]))
         (*_, jumped), (*_, marched) = jump(system, 200, tolerance=0.02), march(system, 200)
     finally:
-        own_laws.forget_laws()
+        dependence.forget_laws()
     assert min(asked) == 0
     depth = marched.end.worn.punch
     np.testing.assert_allclose(jumped.end.worn.punch, depth, rtol=0, atol=0.01 * depth.max())

@@ -17,7 +17,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 from fenwear.report.style import COLOURS, panels
 from fenwear.results.history import CASE, free_directory, make_directory
-from fenwear.versions import versions
+from fenwear.stack import versions
 from fenwear_verify.validation.experiment import Comparison, Experiment, Finding, Scope, experiments
 
 DEFAULT, NUMBERS = Path("results") / "validation", "validation.json"

@@ -329,8 +329,8 @@ class Topography(Part):
     file: str | None = Field(
         default=None,
         description="a height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
-        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by SurfaceTopography or "
-        "surfalize, where one of them is installed",
+        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by SurfaceTopography, "
+        "where it is installed",
     )
     holes: Literal["reject", "fill", "keep"] = Field(
         default="reject",

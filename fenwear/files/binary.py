@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet
+from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet, known_nodes, read_as
 
 MED_KINDS = {"PO1": 15, "SE2": 1, "SE3": 8, "TR3": 2, "TR6": 9, "QU4": 3, "QU8": 16, "QU9": 10, "TE4": 4, "T10": 11,
              "HE8": 5, "H20": 17, "PE6": 6, "PY5": 7}  # fmt: skip
@@ -38,16 +37,8 @@ def read_med(path: Path) -> MeshFile:
     """
     import h5py
 
-    try:
-        with h5py.File(path) as file:
-            return _med(path.name, file)
-    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
-        raise _unreadable(path, "MED", error) from None
-
-
-def _unreadable(path: Path, kind: str, error: Exception) -> CaseError:
-    text = str(error).partition("\n")[0][:120] or type(error).__name__
-    return CaseError(InputError(path.name, f"cannot be read as {kind}: {text}. Write the file anew."))
+    with read_as(path, "MED"), h5py.File(path) as file:
+        return _med(path.name, file)
 
 
 def _med(name: str, file: Any) -> MeshFile:
@@ -66,9 +57,8 @@ def _med(name: str, file: Any) -> MeshFile:
             notes.append(f"elements of the kind {kind} are left out")
             continue
         number = MED_KINDS[kind]
-        nodes = np.asarray(part["NOD"], dtype=np.int64).reshape(KINDS[number].nodes, -1).T - 1
-        if nodes.size and not (nodes.min() >= 0 and nodes.max() < count):
-            raise ValueError(f"elements of the kind {kind} have nodes that do not exist")
+        table = np.asarray(part["NOD"], dtype=np.int64).reshape(KINDS[number].nodes, -1).T - 1
+        nodes = known_nodes(table, count, f"the kind {kind} of elements")
         blocks.append(Block.of(number, nodes[:, MED_ORDERS.get(number, list(range(nodes.shape[1])))]))
         families.append(np.asarray(part["FAM"] if "FAM" in part else np.zeros(len(nodes)), dtype=np.int64))
     if len(meshes) > 1:
@@ -108,7 +98,7 @@ def read_exodus(path: Path) -> MeshFile:
     Raises:
         CaseError: it cannot be read.
     """
-    try:
+    with read_as(path, "Exodus"):
         if path.read_bytes()[:3] == b"CDF":
             from scipy.io import netcdf_file
 
@@ -121,8 +111,6 @@ def read_exodus(path: Path) -> MeshFile:
         with h5py.File(path) as data:
             return _exodus(path.name, lambda name: data[name][()] if name in data else None,
                            lambda name: data[name].attrs.get("elem_type", b""))  # fmt: skip
-    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
-        raise _unreadable(path, "Exodus", error) from None
 
 
 def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any]) -> MeshFile:
@@ -140,9 +128,7 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
         key = (word[:3], nodes.shape[1])
         if key not in EXODUS_KINDS:
             raise ValueError(f"block {number} has elements {word} with {nodes.shape[1]} nodes")
-        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
-            raise ValueError(f"block {number} has nodes that do not exist")
-        kind = EXODUS_KINDS[key]
+        nodes, kind = known_nodes(nodes, len(points), f"block {number}"), EXODUS_KINDS[key]
         nodes = nodes[:, EXODUS_ORDERS[kind]] if kind in EXODUS_ORDERS else nodes
         blocks.append(Block.of(kind, nodes, start + 1))
         members = np.arange(start, start + len(nodes))
@@ -159,9 +145,8 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
     ids, names = get("ns_prop1"), _texts(get("ns_names"))
     for number in _numbered("node_ns", get):
         nodes = np.unique(np.asarray(get(f"node_ns{number}"), dtype=np.int64) - 1)
-        if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
-            raise ValueError(f"node set {number} has nodes that do not exist")
-        sets.append(MeshSet(_name(names, ids, number, "nodeset"), "nodes", nodes))
+        members = known_nodes(nodes, len(points), f"node set {number}")
+        sets.append(MeshSet(_name(names, ids, number, "nodeset"), "nodes", members))
     return MeshFile(name, points, tuple(blocks), tuple(sets))
 
 
@@ -186,8 +171,7 @@ def _numbered(stem: str, get: Callable[[str], Any]) -> Iterator[int]:
 
 
 def _text(value: Any) -> str:
-    raw = value if isinstance(value, bytes) else bytes(value) if isinstance(value, np.bytes_) else value
-    return raw.decode("utf-8", "replace").strip("\0 ") if isinstance(raw, bytes) else str(raw)
+    return value.decode("utf-8", "replace").strip("\0 ") if isinstance(value, bytes) else str(value)
 
 
 def _texts(value: Any) -> list[str]:

@@ -178,8 +178,8 @@ class _Deck:
         self.after: _Instance | None = None
         self.grammar: Mapping[str, Callable[[int, dict[str, str], list[tuple[int, str]]], None]] = {
             "NODE": self.node, "ELEMENT": self.element, "NSET": self.nset, "ELSET": self.elset, "NGEN": self.ngen,
-            "NFILL": self.nfill, "ELGEN": self.elgen, "NCOPY": self.ncopy, "SURFACE": self.surface, "PART": self.part,
-            "END PART": self.end, "ASSEMBLY": self.assembly, "END ASSEMBLY": self.end, "INSTANCE": self.instance,
+            "NFILL": self.nfill, "ELGEN": self.elgen, "SURFACE": self.surface, "PART": self.part,
+            "END PART": self.end, "ASSEMBLY": self.end, "END ASSEMBLY": self.end, "INSTANCE": self.instance,
             "END INSTANCE": self.end, "SYSTEM": self.set_system, "INCLUDE": self.include,
         }  # fmt: skip
 
@@ -310,8 +310,12 @@ class _Deck:
         self.scope.labels.append(labels)
         self.scope.points.append(points)
         self.scope.lines.append(lines)
-        if given.get("NSET"):
-            self.set_of(self.scope.nsets, given["NSET"], line).entries.append(_Entry(line, labels=labels))
+        self.enter(self.scope.nsets, given.get("NSET"), _Entry(line, labels=labels))
+
+    def enter(self, sets: dict[str, _Set], name: str | None, entry: _Entry) -> None:
+        """Add to the set of a name, if one is given."""
+        if name:
+            self.set_of(sets, name, entry.line).entries.append(entry)
 
     def input(self, line: int, given: Mapping[str, str], data: list[tuple[int, str]]) -> list[tuple[int, str]]:
         """Return the data of the file that a keyword names by INPUT, or its own."""
@@ -356,8 +360,7 @@ class _Deck:
             points = ends[0] * (1 - share) + ends[1] * share
             inner = slice(1, -1)
             self.add_nodes(labels[inner], points[inner], np.full(len(labels), number)[inner], {}, line)
-            if given.get("NSET"):
-                self.set_of(self.scope.nsets, given["NSET"], line).entries.append(_Entry(number, labels=labels))
+            self.enter(self.scope.nsets, given.get("NSET"), _Entry(number, labels=labels))
 
     def range(self, line: int, first: int, last: int, step: int) -> Ints:
         """Return the numbers from the first to the last."""
@@ -386,9 +389,7 @@ class _Deck:
                 points = ends[0] * (1 - share) + ends[1] * share
                 self.add_nodes(labels, points, np.full(len(labels), number), {}, line)
                 every.append(labels)
-            if given.get("NSET"):
-                entry = _Entry(number, labels=np.concatenate(every))
-                self.set_of(self.scope.nsets, given["NSET"], line).entries.append(entry)
+            self.enter(self.scope.nsets, given.get("NSET"), _Entry(number, labels=np.concatenate(every)))
 
     def nodes_now(self, line: int, name: str) -> Ints:
         """Return the numbers of a node set that is complete, in their order."""
@@ -400,22 +401,6 @@ class _Deck:
         if len(labels) < len(found.entries) or not labels:
             raise self.fail(line, f"the node set {name!r} is one of sets, which is not supported here")
         return np.concatenate(labels)
-
-    def ncopy(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
-        self.only(line, "NCOPY", given, ("CHANGE NUMBER", "OLD SET", "NEW SET", "SHIFT", "MULTIPLE"))
-        if "SHIFT" not in given or given.get("MULTIPLE", "1") not in ("", "1"):
-            raise self.fail(line, "*NCOPY is supported with SHIFT alone. Write the nodes out.")
-        old = self.nodes_now(line, given.get("OLD SET", ""))
-        rows = [[self.number(number, cell) for cell in _split(text)] for number, text in data]
-        shift = np.array(([*rows[0], 0.0, 0.0, 0.0] if rows else [0.0] * 3)[:3])
-        points = np.array([self.point(line, label) for label in old]) + shift
-        if len(rows) > 1 and any(rows[1]):
-            if len(rows[1]) < 7:
-                raise self.fail(data[1][0], "*NCOPY: expected two points of the axis and an angle")
-            turn, about = _turn(self.file, data[1][0], rows[1])
-            points = (points - about) @ turn.T + about
-        labels = old + self.whole(line, given.get("CHANGE NUMBER", ""))
-        self.add_nodes(labels, points, np.full(len(labels), line), {"NSET": given.get("NEW SET", "")}, line)
 
     def set_system(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         """Take the local coordinate system of the nodes that follow."""
@@ -461,8 +446,7 @@ class _Deck:
                 6 if kind == -15 else kind, name, nodes[:, :6] if kind == -15 else nodes, rows[:, 0], lines
             )
         self.scope.elements.append(block)
-        if given.get("ELSET"):
-            self.set_of(self.scope.elsets, given["ELSET"], line).entries.append(_Entry(line, labels=block.labels))
+        self.enter(self.scope.elsets, given.get("ELSET"), _Entry(line, labels=block.labels))
 
     def kind_of(self, line: int, name: str) -> int:
         """Return gmsh's number of a type of element; 0 of one without a shape."""
@@ -538,8 +522,7 @@ class _Deck:
             nodes = block.nodes[row] + shifts[1:, None]
             made = _Elements(block.kind, block.type, nodes, labels[1:], np.full(len(labels) - 1, number))
             self.scope.elements.append(made)
-            if given.get("ELSET"):
-                self.set_of(self.scope.elsets, given["ELSET"], line).entries.append(_Entry(number, labels=labels))
+            self.enter(self.scope.elsets, given.get("ELSET"), _Entry(number, labels=labels))
 
     def one_element(self, line: int, label: int) -> tuple[_Elements, int]:
         for block in self.scope.elements:
@@ -598,22 +581,16 @@ class _Deck:
         if kind not in ("ELEMENT", "NODE"):
             message = f"*SURFACE, TYPE={kind} is not supported. Give the surface by faces of elements, or by nodes."
             raise self.fail(line, message)
-        if kind == "NODE":
-            found = self.set_of(self.scope.nsets, given["NAME"], line)
-            for number, text in data:
-                cell = _split(text)[0]
-                labels = np.array([int(cell)] if cell.isdecimal() else [], dtype=np.int64)
-                found.entries.append(_Entry(number, () if cell.isdecimal() else (cell,), labels))
-            return
-        found = self.set_of(self.scope.surfaces, given["NAME"], line)
+        of_nodes = kind == "NODE"
+        found = self.set_of(self.scope.nsets if of_nodes else self.scope.surfaces, given["NAME"], line)
         for number, text in data:
             cells = _split(text)
-            side = cells[1].upper() if len(cells) > 1 else ""
-            if side and not re.fullmatch(r"S[1-6]|SPOS|SNEG|E[1-4]", side):
+            side = "" if of_nodes else "".join(cells[1:2]).upper() or "free"
+            if side and not re.fullmatch(r"S[1-6]|SPOS|SNEG|E[1-4]|free", side):
                 raise self.fail(number, f"the face {side} is not supported. Expected S1 to S6, SPOS or SNEG.")
             digit = cells[0].isdecimal()
             labels = np.array([int(cells[0])] if digit else [], dtype=np.int64)
-            found.entries.append(_Entry(number, () if digit else (cells[0],), labels, sides=side or "free"))
+            found.entries.append(_Entry(number, () if digit else (cells[0],), labels, sides=side))
 
     # ------------------------------------------------------------------------------------- parts, instances
 
@@ -624,10 +601,8 @@ class _Deck:
         self.scope = self.parts[_key(name)] = _Scope(name.strip('"'))
         self.system = None
 
-    def assembly(self, _line: int, _given: dict[str, str], _data: list[tuple[int, str]]) -> None:
-        self.scope, self.system = self.model, None
-
     def end(self, _line: int, _given: dict[str, str], _data: list[tuple[int, str]]) -> None:
+        """Go on outside of parts and instances."""
         self.scope, self.system = self.model, None
 
     def instance(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:

@@ -345,11 +345,15 @@ def _clusters(values: Array, close: float) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _from_instrument(path: Path) -> Raw:
-    """Return the map of an instrument's file by SurfaceTopography, or by surfalize."""
+    """Return the map of an instrument's file by SurfaceTopography."""
     try:
         from SurfaceTopography import open_topography
     except ImportError:
-        return _by_surfalize(path)
+        message = (
+            f"{path.suffix} files need a package: pip install SurfaceTopography. Or export the map as .csv with columns "
+            "x (mm), y (mm), height (um)"
+        )
+        raise ValueError(message) from None
     found = open_topography(str(path)).topography()
     unit = _unit(found.unit or "1", "the map")
     heights = found.heights()  # masked where there are holes
@@ -357,21 +361,6 @@ def _from_instrument(path: Path) -> Raw:
     z[np.broadcast_to(np.asarray(getattr(heights, "mask", False)), z.shape)] = np.nan
     axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, found.physical_sizes, strict=True)]
     return [axis * unit for axis in axes], z * unit, []
-
-
-def _by_surfalize(path: Path) -> Raw:
-    try:
-        from surfalize import Surface
-    except ImportError:
-        message = (
-            f"{path.suffix} files need one of two packages: pip install SurfaceTopography, or pip install surfalize. "
-            "Or export the map as .csv with columns x (mm), y (mm), height (um)"
-        )
-        raise ValueError(message) from None
-    found = Surface.load(str(path))
-    z = np.flipud(np.asarray(found.data, dtype=np.float64)).T * 1e-3  # µm, from above
-    axes = [np.arange(n) * step * 1e-3 for n, step in zip(z.shape, (found.step_x, found.step_y), strict=True)]
-    return axes, z, []
 
 
 MAPS: Mapping[str, Callable[[Path], Raw]] = {

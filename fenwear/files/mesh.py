@@ -7,9 +7,14 @@ order of their nodes are gmsh's; second-order quadrilaterals and hexahedra witho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import lzma
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -388,6 +393,36 @@ def in_plane(mesh: MeshFile) -> MeshFile:
     spread = ", ".join(f"{name} over {width:.4g}" for name, width in zip("xyz", thick, strict=True))
     message = f"its surface elements lie in no plane of x and y: they reach {spread}. Give a plane mesh, or solids."
     raise CaseError(InputError(mesh.name, message))
+
+
+BROKEN = (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError, MemoryError,
+          ArithmeticError, zlib.error, lzma.LZMAError, ElementTree.ParseError)  # fmt: skip
+
+
+@contextmanager
+def read_as(path: Path, kind: str) -> Iterator[None]:
+    """Let what readers raise on a broken file name the file.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    try:
+        yield
+    except BROKEN as error:
+        text = str(error).partition("\n")[0][:140] or type(error).__name__
+        message = f"cannot be read as {kind}: {text}. Write the file anew, or convert it to .msh."
+        raise CaseError(InputError(path.name, message)) from None
+
+
+def known_nodes(nodes: Ints, points: int, of: str) -> Ints:
+    """Return the nodes of elements or of a set, counted from 0.
+
+    Raises:
+        ValueError: one does not exist.
+    """
+    if nodes.size and not (nodes.min() >= 0 and nodes.max() < points):
+        raise ValueError(f"{of} has nodes that do not exist")
+    return nodes
 
 
 def wrong(file: str, line: int, message: str) -> CaseError:

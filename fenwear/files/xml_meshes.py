@@ -15,8 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet
+from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet, known_nodes, read_as
 
 VTK_KINDS = {1: 15, 3: 1, 21: 8, 5: 2, 22: 9, 9: 3, 23: 16, 28: 10, 10: 4, 24: 11, 12: 5, 25: 17, 13: 6, 14: 7}
 # VTK's nodes in gmsh's order, of kinds where they differ.
@@ -29,8 +28,6 @@ XDMF_KINDS = {"polyvertex": 15, "polyline": 1, "edge_3": 8, "triangle": 2, "tri_
 TYPES = {"Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4", "Int64": "i8",
          "UInt64": "u8", "Float32": "f4", "Float64": "f8"}  # fmt: skip
 MOST_VALUES = 1000  # of an array of cells that names sets
-BROKEN = (ElementTree.ParseError, KeyError, ValueError, IndexError, TypeError, AttributeError, OSError, zlib.error,
-          lzma.LZMAError, RuntimeError, MemoryError, OverflowError)  # fmt: skip
 
 
 def read_vtu(path: Path) -> MeshFile:
@@ -39,10 +36,8 @@ def read_vtu(path: Path) -> MeshFile:
     Raises:
         CaseError: it cannot be read.
     """
-    try:
+    with read_as(path, "VTU"):
         return _Vtu(path).mesh()
-    except BROKEN as error:
-        raise _unreadable(path, "VTU", error) from None
 
 
 def read_xdmf(path: Path) -> MeshFile:
@@ -51,16 +46,8 @@ def read_xdmf(path: Path) -> MeshFile:
     Raises:
         CaseError: it cannot be read.
     """
-    try:
+    with read_as(path, "XDMF"):
         return _xdmf(path)
-    except BROKEN as error:
-        raise _unreadable(path, "XDMF", error) from None
-
-
-def _unreadable(path: Path, kind: str, error: Exception) -> CaseError:
-    text = str(error).partition("\n")[0][:140] or type(error).__name__
-    message = f"cannot be read as {kind}: {text}. Write the file anew, or convert it to .msh."
-    return CaseError(InputError(path.name, message))
 
 
 class _Vtu:
@@ -104,8 +91,7 @@ class _Vtu:
                 number = VTK_KINDS[int(kind)]
                 count = KINDS[number].nodes
                 table = nodes[ends[own][:, None] - count + np.arange(count)]
-                if table.size and not (table.min() >= 0 and table.max() < len(part) // 3):
-                    raise ValueError("has cells on points that do not exist")
+                known_nodes(table, len(part) // 3, f"type {kind} of cells")
                 blocks.append(Block.of(number, start + table[:, VTK_ORDERS.get(number, list(range(count)))]))
                 kept.append(own)
             cells = np.concatenate(kept) if kept else np.zeros(0, np.int64)
@@ -183,8 +169,7 @@ def _xdmf(path: Path) -> MeshFile:
         raise ValueError(f"has cells of the kind {kind!r}; expected one of {', '.join(XDMF_KINDS)}")
     number = XDMF_KINDS[kind]
     nodes: Ints = _item(path, topology.find("DataItem")).astype(np.int64).reshape(-1, KINDS[number].nodes)
-    if nodes.size and not (nodes.min() >= 0 and nodes.max() < len(points)):
-        raise ValueError("has cells on points that do not exist")
+    known_nodes(nodes, len(points), "a cell")
     blocks = (Block.of(number, nodes[:, VTK_ORDERS.get(number, list(range(nodes.shape[1])))]),)
     arrays = {
         attribute.get("Name", ""): _item(path, attribute.find("DataItem")).ravel()

@@ -119,8 +119,6 @@ SAME: dict[str, Callable[[], str]] = {
         "101, 106, 1\n*NGEN, NSET=HI\n113, 118\n*NFILL\nLO, HI, 2, 6").replace(
         f"*ELEMENT, TYPE=CPE4, ELSET=PUNCH_BODY\n{E2}",
         "*ELEMENT, TYPE=CPE4\n101, 101, 102, 108, 107\n*ELGEN, ELSET=PUNCH_BODY\n101, 5, 1, 1, 2, 6, 5"),
-    "nodes copied": lambda: BASE.replace(N2, nodes([(x, y) for x, y in PUNCH[:12]], 101)
-        + "\n*NSET, NSET=ROW, GENERATE\n107, 112\n*NCOPY, OLD SET=ROW, CHANGE NUMBER=6, SHIFT\n0, 2, 0\n"),
     "clockwise elements": lambda: BASE.replace(E2, rows([row[::-1] for row in quads(5, 101)], 101)),
     "in the plane of x and z": lambda: BASE.replace(N1, nodes(STRIP, 1).replace(", -4\n", ", 0, -4\n").replace(
         ", -2\n", ", 0, -2\n").replace("33, 10, 0", "33, 10, 0, 0")).replace(

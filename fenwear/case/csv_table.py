@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fenwear.case.names import ROLES
 from fenwear.errors import CaseError, InputError
 from fenwear.files.table import TableError, check_names, heading, known_units, read_table
 
@@ -82,27 +81,6 @@ def headings(row: Sequence[str], columns: Mapping[str, str]) -> tuple[list[str],
     check_names(heads, columns, "")
     known_units(heads, columns)
     return [head.name for head in heads], [head.unit for head in heads]
-
-
-def with_profiles(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the tables of a case with the files of its bodies' profiles read into points.
-
-    Raises:
-        CaseError: a file cannot be read, or there are points besides.
-    """
-    found = dict(data)
-    for body in ROLES:
-        table = data.get(body)
-        profile = table.get("profile") if isinstance(table, Mapping) else None
-        if not isinstance(table, Mapping) or not isinstance(profile, Mapping) or "file" not in profile:
-            continue
-        key = f"{body}.profile.file"
-        if "points" in profile or not isinstance(profile["file"], str):
-            raise CaseError(InputError(key, "expected the name of a CSV file, and no points beside it"))
-        rest = {name: value for name, value in profile.items() if name != "file"}
-        path = Path(profile["file"]) if folder is None else folder / profile["file"]
-        found[body] = {**table, "profile": {**rest, **read_profile(path, key)}}
-    return found
 
 
 def read_profile(path: Path, key: str) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def _form(value: object) -> str:
     return "dependence" if isinstance(value, (Mapping, _State)) else "number"
 
 
-FORMS = ("expression", "table", "regions", "law")
+FORMS = {"expression": "an expression", "table": "a table", "regions": "regions", "law": "a law"}
 
 
 class Dependence(_State):
@@ -117,7 +117,7 @@ class Dependence(_State):
         default="", description="unit of the values; by default that of the key's bare numbers, which is told"
     )
 
-    one_of = (FORMS,)
+    one_of = (tuple(FORMS),)
 
     @property
     def form(self) -> str:
@@ -138,8 +138,9 @@ class Dependence(_State):
         others = [name for name in VARIABLES if name not in of and self.depends_on(name)]
         if others or self.form not in forms:
             known = "" if tuple(of) == VARIABLES else f" of {', '.join(of)} alone"
-            got = others[0] if others else self.form
-            raise ValueError(f"expected {' or '.join(forms)}{known}, got {got}")
+            got = others[0] if others else FORMS[self.form]
+            *words, last = (FORMS[form] for form in forms)
+            raise ValueError(f"expected {', '.join(words)} or {last}{known}, got {got}")
         if unit == "" and self.unit:
             raise ValueError(f"unit: expected none: its values are pure numbers, got {self.unit!r}")
         try:
@@ -250,14 +251,14 @@ def _of_unit(unit: str, pressure_exponent: float, speed_exponent: float) -> floa
     return convert(f"1 {unit}", WearLaw.coefficient_unit(pressure_exponent, speed_exponent))
 
 
-def _checked(value: Any, unit: str | None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = FORMS) -> Any:
+def _checked(value: Any, unit: str | None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = tuple(FORMS)) -> Any:
     if isinstance(value, Dependence):
         value.check(unit, of, forms)
     return value
 
 
 def constant_or_dependence(
-    constant: Any, unit: str | None = None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = FORMS
+    constant: Any, unit: str | None = None, of: Sequence[str] = VARIABLES, forms: Sequence[str] = tuple(FORMS)
 ) -> Any:
     """Return the type of a coefficient that is a constant of this type, or depends on the state, see `check`."""
     return Annotated[

@@ -27,7 +27,6 @@ from fenwear.case.bodies import CourseLoad
 from fenwear.case.csv_table import headings, read_csv
 from fenwear.case.quantities import Angle, AngularFrequency, Check, Length, Number, Part, Point, Speed, Time, Vector
 from fenwear.case.units import convert
-from fenwear.errors import CaseError, InputError
 
 AXES = ("x", "y", "z")
 TIMES = {"time": "s", "percent": ""}
@@ -65,40 +64,17 @@ class CycleCourse:
         return bool((self.shift == self.shift[0]).all() and (self.turn == self.turn[0]).all())
 
 
-def with_cycle(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the tables of a case with the files of its cycle, and of those of a program, read into columns and rows.
+def read_cycle(path: Path, key: str) -> dict[str, Any]:
+    """Return the table of a cycle in a CSV file: its columns with units, and rows.
 
     Raises:
-        CaseError: the file cannot be read, or there are rows besides; names column and row.
+        CaseError: it cannot be read; names column and row.
     """
-    found = dict(data)
-    if "motion" in data:
-        found["motion"] = _with_file(data["motion"], "motion", folder)
-    program = data.get("program")
-    if isinstance(program, Mapping) and isinstance(program.get("steps"), list | tuple):
-        steps = [
-            {**step, "motion": _with_file(step["motion"], f"program.steps.{number}.motion", folder)}
-            if isinstance(step, Mapping) and "motion" in step
-            else step
-            for number, step in enumerate(program["steps"])
-        ]
-        found["program"] = {**program, "steps": steps}
-    return found
-
-
-def _with_file(motion: Any, at: str, folder: Path | None) -> Any:
-    """Return a motion with the file of its cycle read into columns and rows; any other as it is."""
-    if not isinstance(motion, Mapping) or "file" not in motion or motion.get("kind") != "cycle":
-        return motion
-    key = f"{at}.file"
-    if "rows" in motion or "columns" in motion or not isinstance(motion["file"], str):
-        raise CaseError(InputError(key, "expected the name of a CSV file, and neither columns nor rows beside it"))
-    table = read_csv(Path(motion["file"]) if folder is None else folder / motion["file"], key, COLUMNS, least=2)
-    columns = [f"{name} ({COLUMNS[name]})" if COLUMNS[name] else name for name in table.names]
+    table = read_csv(path, key, COLUMNS, least=2)
     for number, message in row_problems(table.names, table.rows):
         raise table.wrong(f"row {table.lines[number]}: {message}" if number >= 0 else message)
-    rest = {name: value for name, value in motion.items() if name != "file"}
-    return {**rest, "columns": columns, "rows": table.rows}
+    columns = [f"{name} ({COLUMNS[name]})" if COLUMNS[name] else name for name in table.names]
+    return {"columns": columns, "rows": table.rows}
 
 
 def row_problems(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Iterator[tuple[int, str]]:

@@ -126,22 +126,6 @@ def _check_order(table: CsvTable) -> None:
         raise table.wrong(f"{name} ends at 0; expected a table that goes on")
 
 
-def with_program(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the tables of a case with the program's file read into steps.
-
-    Raises:
-        CaseError: the file cannot be read, or there are steps besides.
-    """
-    program = data.get("program")
-    if not isinstance(program, Mapping) or "file" not in program:
-        return dict(data)
-    if "steps" in program or not isinstance(program["file"], str):
-        raise CaseError(InputError("program.file", "expected the name of a CSV file, and no steps beside it"))
-    rest = {key: value for key, value in program.items() if key != "file"}
-    path = Path(program["file"]) if folder is None else folder / program["file"]
-    return {**data, "program": {**rest, "steps": read_program(path)}}
-
-
 @dataclass(frozen=True)
 class _Acting:
     """What acts over a step, from its begin to its end: `given` of the motion and the ambient temperature."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -12,13 +12,13 @@ from typing import Any, get_args
 
 import pydantic
 
-from fenwear.case.csv_table import with_profiles
+from fenwear.case.csv_table import read_profile
 from fenwear.case.keys import all_keys, find_keys
 from fenwear.case.laws import Dependence
-from fenwear.case.motions import with_cycle
+from fenwear.case.motions import read_cycle
 from fenwear.case.names import ROLES
 from fenwear.case.plausible import written
-from fenwear.case.program import check_length, half_cycles_of, with_program
+from fenwear.case.program import check_length, half_cycles_of, read_program
 from fenwear.case.removed import replacement
 from fenwear.case.schema import MADE, Case, Given, Written, part_models
 from fenwear.case.thermal import Heat
@@ -111,34 +111,56 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
 
 
-def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the tables with the files of profiles, program and cycle where they are: beside the case that names them.
+def _at_files(data: Any, change: Callable[[str, Mapping[str, Any]], Mapping[str, Any]], key: str = "") -> Any:
+    """Return tables of a case with those changed, by their keys, that name a file.
 
     The geometry's own file is left: ready ones have names without a place.
     """
-    if folder is None:
+    if isinstance(data, list | tuple) and any(isinstance(value, Mapping) for value in data):
+        return [_at_files(value, change, f"{key}.{number}") for number, value in enumerate(data)]
+    if not isinstance(data, Mapping) or key == "geometry":
         return data
-    found = dict(data)
-    for name, table in data.items():
-        if name in ("program", "motion"):
-            found[name] = _beside(table, folder)
-            if isinstance(table, dict) and isinstance(table.get("steps"), list):
-                found[name] = dict(found[name])
-                found[name]["steps"] = [
-                    {**step, "motion": _beside(step["motion"], folder)} if isinstance(step, dict) and "motion" in step
-                    else step
-                    for step in table["steps"]
-                ]  # fmt: skip
-        elif name in ROLES and isinstance(table, dict):
-            kept = {key: _beside(table[key], folder) for key in ("profile", "topography") if key in table}
-            found[name] = {**table, **kept}
-    return found
+    found = {name: _at_files(value, change, f"{key}.{name}" if key else name) for name, value in data.items()}
+    return change(key, found) if key and "file" in found else found
 
 
-def _beside(table: Any, folder: Path) -> Any:
-    if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
-        return table
-    return {**table, "file": str((folder / table["file"]).absolute())}
+def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the tables with their files where they are: beside the case that names them."""
+
+    def beside(_: str, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        at = table["file"]
+        return {**table, "file": str((folder / at).absolute())} if folder and isinstance(at, str) else table
+
+    return dict(_at_files(data, beside))
+
+
+# Tables that a CSV file may hold in place of some of their keys, by their names.
+IN_FILES: Mapping[str, tuple[tuple[str, ...], Callable[[Path, str], dict[str, Any]]]] = {
+    "motion": (("columns", "rows"), read_cycle),
+    "program": (("steps",), lambda path, _: {"steps": read_program(path)}),
+    "profile": (("points",), read_profile),
+}
+
+
+def _with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the tables of a case with the files of its program, cycles and profiles read.
+
+    Raises:
+        CaseError: a file cannot be read, or there is besides what it holds.
+    """
+
+    def read(key: str, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        name = key.rpartition(".")[2]
+        if name not in IN_FILES or (name == "motion" and table.get("kind") != "cycle"):
+            return table
+        (others, reader), file = IN_FILES[name], table["file"]
+        if not isinstance(file, str) or any(other in table for other in others):
+            message = f"expected the name of a CSV file, and no {' or '.join(others)} beside it"
+            raise CaseError(InputError(f"{key}.file", message))
+        rest = {name: value for name, value in table.items() if name != "file"}
+        return {**rest, **reader((folder or Path()) / file, f"{key}.file")}
+
+    return dict(_at_files(data, read))
 
 
 def _take_away(data: dict[str, Any], unset: Any) -> None:
@@ -205,7 +227,7 @@ def make_case(
     """
     given = Given(dict(meshes), dict(stresses))
     data = _on_meshes(data, given)
-    data = with_profiles(with_program(with_cycle(data, folder), folder), folder)
+    data = _with_files(data, folder)
     run = data.get("run", {})
     open_end = isinstance(data.get("program"), Mapping) and isinstance(run, Mapping) and "half_cycles" not in run
     if open_end:

@@ -349,10 +349,8 @@ def _from_instrument(path: Path) -> Raw:
     try:
         from SurfaceTopography import open_topography
     except ImportError:
-        message = (
-            f"{path.suffix} files need a package: pip install SurfaceTopography. Or export the map as .csv with columns "
-            "x (mm), y (mm), height (um)"
-        )
+        message = f"{path.suffix} files need pip install SurfaceTopography. Or export the map as .csv with columns "
+        message += "x (mm), y (mm), height (um)"
         raise ValueError(message) from None
     found = open_topography(str(path)).topography()
     unit = _unit(found.unit or "1", "the map")

@@ -183,8 +183,33 @@ def _way_on(reached: int | None) -> str:
     return f"mend the cause, then go on from the checkpoint of half-cycle {reached}: --resume"
 
 
+class NoLevel:
+    """Stands for the level of a quantity in a run that ends at none."""
+
+    reached = False
+
+    def see(self, _block: Block) -> int:
+        """Return 0: no block reaches it."""
+        return 0
+
+    def missed(self, _half_cycle: int) -> list[str]:
+        """Return no warnings."""
+        return []
+
+    def summary(self, _system: Tribosystem, _state: RunState, _log: Log) -> dict[str, Any]:
+        """Return no entries."""
+        return {}
+
+
 class _Run:
-    """A run in its folder: takes the blocks, keeps history and checkpoints."""
+    """A run in its folder: takes the blocks, keeps history and checkpoints.
+
+    Attributes:
+        writer: Of the history, on rank 0.
+    """
+
+    writer: HistoryWriter
+    _lookout: RunMonitor  # while it marches
 
     def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
@@ -213,7 +238,6 @@ class _Run:
             self.watch.move(system)
         self.system = system
         on_root(self.comm, lambda: write_case(directory, self.case))
-        self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
         self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
@@ -237,7 +261,6 @@ class _Run:
         if self.case.program is None:  # else the motion and surroundings of its stages are what counts
             self._see_heat(system, start)
         self._fields_at = frozenset(self.case.output.fields_at or ())
-        self._lookout: RunMonitor | None = None  # while it marches
 
     def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
         """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
@@ -260,8 +283,7 @@ class _Run:
 
     def _on_history(self, act: Callable[[HistoryWriter], None]) -> None:
         """Let rank 0 write; collective, so that every rank knows of an error."""
-        writer = self.writer
-        on_root(self.comm, lambda: None if writer is None else act(writer))
+        on_root(self.comm, lambda: act(self.writer))
 
     def march(self, progress: How, signals: Signals) -> None:
         """Compute all half-cycles; collective.
@@ -288,19 +310,18 @@ class _Run:
         Raises:
             InterruptedRunError: a signal has come.
         """
-        lookout = self._lookout
-        if lookout is None or lookout.too_soon:
+        if self._lookout.too_soon:
             return False
-        if lookout.look():
+        if self._lookout.look():
             raise InterruptedRunError(f"interrupted in the step after half-cycle {self.state.half_cycle}")
-        return lookout.block_over
+        return self._lookout.block_over
 
     def _blocks(self) -> Iterator[Block]:
         start, last = self.start, self._last
         while last:
             last, end = 0, last
             for block in follow_program(self.system, self._integrate, end, start):
-                at = 0 if self._level is None else self.comm.bcast(self._level.see(block))
+                at = self.comm.bcast(self._level.see(block))
                 reached = int(block.end.half_cycle)
                 if 0 < at < reached:  # a jump went beyond the level: made again, up to it
                     start, last = self.state if self.state.half_cycle else self.start, at
@@ -323,7 +344,7 @@ class _Run:
     ) -> Iterator[Block]:
         run = self.case.run
         course: dict[str, Any] = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
-        if self._level is not None:
+        if run.until:
             course["block"] = system.motion.half_cycles
         course["periodic_within"] = span.periodic_within(run.periodic_within)
         return integrate(system, run.integration, span, run.jump_tolerance, **course)
@@ -408,13 +429,7 @@ class _Run:
         if self.last is None:
             return []
         texts = unique_text(np.concatenate(self.unique)), sliding_text(self.last), passing_text(self.last)
-        found = [text for text in texts if text]
-        level = self._level
-        if level is not None and not level.reached:
-            found.append(
-                f"run.until: {self.case.run.until} is not reached by half-cycle {self.state.half_cycle:,}: it is "
-                f"{level.value:.4g} {level.quantity.level_unit}. Increase `run.half_cycles`"
-            )
+        found = [*(text for text in texts if text), *self._level.missed(self.state.half_cycle)]
         for warning in found:
             self.log(f"warning: {warning}")
         return found
@@ -423,7 +438,7 @@ class _Run:
         """Return how the half-cycles ended."""
         if failure is not None:
             return str(failure)
-        if self._level is not None and self._level.reached:
+        if self._level.reached:
             return f"{self.case.run.until} is reached"
         return "all half-cycles done" if self.state.half_cycle >= self._last else "periodic"
 
@@ -445,30 +460,12 @@ class _Run:
         self._save()
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
             self._write_fields(self.last)
-        if self._level is not None:
-            how = {**how, "until": self._until(self._level)}
-        reason = self._note_growth(self.last)
-        if reason:
-            how = {**how, "no_growth_rate": reason}
+        how |= self._level.summary(self.system, self.state, self.log)
+        if reason := self._note_growth(self.last):
+            how["no_growth_rate"] = reason
         summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         return summary
-
-    def _until(self, level: RunLevel) -> dict[str, Any]:
-        """Return when the level that ends the run is reached, and log it."""
-        half_cycle = self.state.half_cycle
-        found: dict[str, Any] = {
-            "level": self.case.run.until,
-            "reached": level.reached,
-            "value": level.value,
-            "cycles": half_cycle / self.system.motion.half_cycles,
-            "distance_mm": float(self.state.totals.of("distance")),
-            "time_s": float(self.system.time(np.array(half_cycle))),
-        }
-        if level.reached:
-            way = f"{found['distance_mm'] / 1e3:.5g} m, {found['time_s']:.5g} s"
-            self.log(f"{self.case.run.until} is reached after {found['cycles']:,.6g} cycles, {way}")
-        return found
 
     def tell_more(self, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
         """Tell the uncertainty of what is written, draw it, and return the summary with it; collective."""
@@ -514,10 +511,10 @@ class _Run:
         return reason
 
 
-def level_of(case: Case) -> RunLevel | None:
-    """Return what ends a run at a level of a quantity; None where nothing does."""
+def level_of(case: Case) -> RunLevel | NoLevel:
+    """Return what ends a run at a level of a quantity."""
     if not case.run.until:
-        return None
+        return NoLevel()
     from fenwear.run_until import RunLevel  # with all that studies need
 
     return RunLevel(case)

@@ -7,13 +7,17 @@ a cubic through values and rates at its ends meets the level.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
+from fenwear.cycle.state import RunState
 from fenwear.life.model import snapshot_of
 from fenwear.life.quantities import Quantity, crossing, of_case, parse_level
+from fenwear.progress import Log
 
 KEY = "run.until"
 
@@ -33,7 +37,8 @@ class RunLevel:
     """
 
     def __init__(self, case: Case) -> None:
-        self.quantity: Quantity = of_case(parse_level(case.run.until, KEY, case.names), case, KEY)
+        self.text = case.run.until
+        self.quantity: Quantity = of_case(parse_level(self.text, KEY, case.names), case, KEY)
         self._before = (0.0, 0.0, float("nan"))
         self.value = 0.0
 
@@ -41,6 +46,25 @@ class RunLevel:
     def reached(self) -> bool:
         """Whether the latest value is at the level or beyond."""
         return self.value >= self.quantity.level * (1 - 1e-12)
+
+    def missed(self, half_cycle: int) -> list[str]:
+        """Return the warning of a run that has ended at a half-cycle below the level; none of others."""
+        if self.reached:
+            return []
+        return [
+            f"run.until: {self.text} is not reached by half-cycle {half_cycle:,}: it is "
+            f"{self.value:.4g} {self.quantity.level_unit}. Increase `run.half_cycles`"
+        ]
+
+    def summary(self, system: Tribosystem, state: RunState, log: Log) -> dict[str, Any]:
+        """Return when the level that ends the run is reached, and log it."""
+        cycles = state.half_cycle / system.motion.half_cycles
+        distance, time = float(state.totals.of("distance")), float(system.time(np.array(state.half_cycle)))
+        if self.reached:
+            way = f"{distance / 1e3:.5g} m, {time:.5g} s"
+            log(f"{self.text} is reached after {cycles:,.6g} cycles, {way}")
+        found = {"level": self.text, "reached": self.reached, "value": self.value}
+        return {"until": {**found, "cycles": cycles, "distance_mm": distance, "time_s": time}}
 
     def see(self, block: Block) -> int:
         """Return the half-cycle at which a block reaches the level; 0 where it does not."""

@@ -38,6 +38,7 @@ from fenwear.sliding.regions import Regions, any_split, regions_opposite
 from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
+MIDDLE = -1  # in place of a phase: the middle position, at the mean speed
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
 OF_SIDES = 3  # times that an optimum is found anew, at the pressures beside nodes between regions
 
@@ -474,7 +475,7 @@ class ContactSetup:
 
     def conditions(
         self,
-        phase: int | None,
+        phase: int,
         pressure: Array | None = None,
         temperatures: tuple[Array, Array] | None = None,
         worn: WornDepths | None = None,
@@ -485,7 +486,7 @@ class ContactSetup:
         """Return what coefficients depend on in a phase.
 
         Args:
-            phase: Its number; None for the mean speed of the motion in the middle position.
+            phase: Its number; MIDDLE for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths, and states that laws remember; by default those at the start.
@@ -494,8 +495,8 @@ class ContactSetup:
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
         none, initial = self._none, self._initial
-        slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[phase or 0]
-        pair = self.pair if phase is None else self.pairs[phase]
+        slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[max(phase, 0)]
+        pair = (*self.pairs, self.pair)[phase]
         depths: tuple[Array, Array] = none, none
         if worn is not None:
             depths = worn.punch, pair.wear_interpolation @ worn.strip if self.strip_wears else none
@@ -506,9 +507,9 @@ class ContactSetup:
             edge = self.edges.distance(touching)
         return ContactConditions(
             np.full(len(none), self.rigid.mean_pressure) if pressure is None else pressure,
-            self._speeds[-1 if phase is None else phase],
+            self._speeds[phase],
             (initial, initial) if temperatures is None else temperatures,
-            self._places[-1 if phase is None else phase],
+            self._places[phase],
             depths,
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
@@ -527,7 +528,7 @@ class ContactSetup:
             direction: d, the sign of the sliding.
             pressure: (n,), MPa; by default the mean pressure.
         """
-        mu = self.friction.values(self.conditions(None, pressure))
+        mu = self.friction.values(self.conditions(MIDDLE, pressure))
         return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
 
     def phase_friction(self, phase: int, mu: Array) -> Array:

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.contact_setup import ContactSetup
+from fenwear.assembly.contact_setup import MIDDLE, ContactSetup
 from fenwear.assembly.creep import Creep, creep_of
 from fenwear.assembly.grids import check_felt
 from fenwear.assembly.resources import Resources, setup_resources
@@ -454,7 +454,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         expansions(system, in_middle=True),
         system.sliding.field,
         velocities,
-        heating_friction(system),
+        heating_friction(system, mean_friction(system)),
         system.bodies.punch.thickness,
     )
     return exchange.through(system.layer_conductance())
@@ -485,19 +485,23 @@ def friction_power(system: ContactSetup) -> float:
     return float(system.pair.weights @ slid) * system.rigid.mean_pressure / system.motion.period
 
 
-def heating_friction(system: ContactSetup, mu: Array | None = None, phase: int | None = None) -> Array:
+def mean_friction(system: ContactSetup) -> Array:
+    """Return mu at the mean pressure and speed (n,)."""
+    return system.friction.values(system.conditions(MIDDLE))
+
+
+def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Array:
     """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
 
     Args:
         system: The placed bodies.
-        mu: (n,); by default at the mean pressure and speed.
-        phase: Its number; None for the field of the whole motion.
+        mu: (n,).
+        phase: Its number; MIDDLE for the field of the whole motion.
     """
-    mu = system.friction.values(system.conditions(None)) if mu is None else mu
-    return mu * (node_rates(system.sliding.field, system.pair) if phase is None else system.sliding_ratio[phase])
+    return mu * (system.sliding_ratio[phase] if phase >= 0 else node_rates(system.sliding.field, system.pair))
 
 
 def heating_frictions(system: ContactSetup) -> Array:
     """Return the same in each phase (phases, n), at the mean pressure and speed."""
-    mu = system.friction.values(system.conditions(None))
+    mu = mean_friction(system)
     return np.array([heating_friction(system, mu, phase) for phase in range(len(system.motion.phases))])

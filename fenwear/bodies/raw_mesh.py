@@ -232,7 +232,7 @@ def _elements(gmsh: Any, dim: int, tag: int) -> tuple[Table, Table]:
     """Return corners (count, corners) and all nodes of a group's elements."""
     corners, every = [], []
     for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-        for kind, _, nodes in zip(*gmsh.model.mesh.getTable(dim, entity), strict=True):
+        for kind, _, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
             _, _, _, per_element, _, primary = gmsh.model.mesh.getElementProperties(kind)
             table = np.asarray(nodes, dtype=np.int64).reshape(-1, per_element)
             corners.append(table[:, :primary])
@@ -254,7 +254,7 @@ def _bad_volumes(gmsh: Any, tag: int) -> int:
     """Return how many volumes of a group are flat or turn inside out somewhere, as gmsh measures them."""
     bad = 0
     for entity in gmsh.model.getEntitiesForPhysicalGroup(3, tag):
-        elements = np.concatenate(gmsh.model.mesh.getTable(3, entity)[1])
+        elements = np.concatenate(gmsh.model.mesh.getElements(3, entity)[1])
         least, most, scaled = (
             np.asarray(gmsh.model.mesh.getElementQualities(elements, name))
             for name in ("minDetJac", "maxDetJac", "minSJ")

@@ -39,6 +39,16 @@ def grows(placed: ContactSetup) -> bool:
     return placed.bodies.punch.reach is not None
 
 
+def _grids(placed: ContactSetup) -> tuple[RegularGrid, RegularGrid, int]:
+    """Return a grid that grows, the largest that it may become, and how many nodes its case asks for across."""
+    grid, reach, wanted = placed.pair.punch.grid, placed.bodies.punch.reach, placed.case.grid
+    assert grid
+    assert reach
+    assert wanted
+    assert wanted.across
+    return grid, reach.grid, wanted.across
+
+
 def on_first_contact(system: Tribosystem) -> Tribosystem:
     """Return a system on a grid around its first contact, with as many nodes across as its case asks for; collective.
 
@@ -100,13 +110,13 @@ def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
         system: Placed bodies.
         touched: Nodes of the punch that touch or have worn (n,).
     """
-    case, grid, reach = system.case, system.pair.punch.grid, system.bodies.punch.reach
-    if grid is None or reach is None or case.grid is None or case.grid.across is None or not touched.any():
+    if not grows(system) or not touched.any():
         return None
+    grid, largest, across = _grids(system)
     low, high = _ends(grid, touched)
     width = high - low + 1
-    coarser = bool(width.max() >= 2 * case.grid.across)
-    first, last = _within(grid, reach.grid)  # of the largest grid, in places of this one
+    coarser = bool(width.max() >= 2 * across)
+    first, last = _within(grid, largest)  # of the largest grid, in places of this one
     beside = np.maximum(NEAR * width, 2.0)
     close = ((low < beside) & (first < 0)) | ((np.array(grid.counts) - 1 - high < beside) & (last >= grid.counts))
     if not coarser and not close.any():
@@ -115,7 +125,7 @@ def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
     wider = low - room, high + room
     if not coarser:  # what it has stays
         wider = np.minimum(wider[0], 0), np.maximum(wider[1], np.array(grid.counts) - 1)
-    return _part(grid, reach.grid, *wider, 2 if coarser else 1)
+    return _part(grid, largest, *wider, 2 if coarser else 1)
 
 
 def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float) -> RegularGrid | None:
@@ -138,11 +148,11 @@ def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float)
 
 def at_rim(system: ContactSetup, touched: Mask) -> bool:
     """Return whether some nodes of the punch lie on the rim of a grid that can still grow there."""
-    grid, reach = system.pair.punch.grid, system.bodies.punch.reach
-    if grid is None or reach is None or not touched.any():
+    if not grows(system) or not touched.any():
         return False
+    grid, largest, _ = _grids(system)
     low, high = _ends(grid, touched)
-    first, last = _within(grid, reach.grid)
+    first, last = _within(grid, largest)
     return bool((((low == 0) & (first < 0)) | ((high == np.array(grid.counts) - 1) & (last >= grid.counts))).any())
 
 
@@ -163,8 +173,8 @@ def node_maps(before: ContactSetup, after: ContactSetup) -> tuple[NDArray[np.int
     """Return the node before at the place of each node of the punch and of the strip after, -1 for none."""
     found = []
     for old, new in ((before.pair.punch, after.pair.punch), (before.pair.strip, after.pair.strip)):
-        assert old.grid is not None
-        assert new.grid is not None
+        assert old.grid
+        assert new.grid
         found.append(new.grid.of_other(old.grid))
     return found[0], found[1]
 
@@ -231,23 +241,19 @@ def _part(
 
 def _around_first(system: Tribosystem) -> RegularGrid | None:
     """Return a grid around the first contact with as many nodes across as asked for; None where it has them."""
-    wanted, grid, reach = system.case.grid, system.pair.punch.grid, system.bodies.punch.reach
-    assert wanted is not None
-    assert wanted.across is not None
-    assert grid is not None
-    assert reach is not None
+    grid, largest, across = _grids(system)
     contact = system.phase_contact((0,))
     contact.press(_first_load(system))
     touched = contact.solve(system.gap(0, system.unworn())).pressure[0] > 0
     low, high = _ends(grid, touched)
     steps, width = np.array(grid.spacing), high - low + 1
     longest = int(np.argmax(width * steps))
-    even = grid is not reach.grid
-    if even and abs(width[longest] - wanted.across) <= max(WITHIN * wanted.across, 1.0) and not at_rim(system, touched):
+    even = grid is not largest
+    if even and abs(width[longest] - across) <= max(WITHIN * across, 1.0) and not at_rim(system, touched):
         return None
-    spacing = float(width[longest] * steps[longest]) / wanted.across
-    middle = np.array(grid.corner) - reach.grid.middle + steps * (low + high) / 2
+    spacing = float(width[longest] * steps[longest]) / across
+    middle = np.array(grid.corner) - largest.middle + steps * (low + high) / 2
     half = (0.5 + ROOM) * width * steps
-    lattice = replace(reach.grid, corner=tuple(reach.grid.middle), spacing=(spacing,) * len(steps))
+    lattice = replace(largest, corner=tuple(largest.middle), spacing=(spacing,) * len(steps))
     first, last = (np.floor((middle + side * half) / spacing).astype(np.int64) for side in (-1, 1))
-    return _part(lattice, reach.grid, first, last, 1)
+    return _part(lattice, largest, first, last, 1)

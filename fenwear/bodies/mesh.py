@@ -132,7 +132,7 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
         CaseError: no such file, or not one that gmsh meshes.
     """
     ready = meshes_folder()
-    places = [Path(geometry.file)] if folder is None else [folder / geometry.file]
+    places = [(folder or Path()) / geometry.file]
     try:
         path = next((p for p in (*places, ready / geometry.file) if p.is_file()), None)
     except OSError:  # a name that no file can have

@@ -36,7 +36,7 @@ def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | N
         CaseError: a file cannot be read, has holes or does not reach over the grid, or the grid is too coarse.
     """
     if wanted.file is not None:
-        path = Path(wanted.file) if folder is None else folder / wanted.file
+        path = (folder or Path()) / wanted.file
         found = _interpolated(_measured(path, wanted, key), grid, f"{key}.file")
     elif wanted.wavelength is not None:
         found = _wave(wanted, grid, key)

@@ -184,10 +184,10 @@ class Load(Part):
     )
 
     checks = (
-        Check(lambda s: len(s.given("force", "traction")) > 1, "give either force or traction"),
-        Check(lambda s: not s.given("force", "traction", "moment"), "expected a force, a traction or a moment"),
+        Check(lambda s: len(s.present("force", "traction")) > 1, "give either force or traction"),
+        Check(lambda s: not s.present("force", "traction", "moment"), "expected a force, a traction or a moment"),
         Check(
-            lambda s: s.given("through") and not s.given("force"),
+            lambda s: s.present("through") and not s.present("force"),
             "through: expected a force, which acts through this point",
         ),
         Check(
@@ -210,7 +210,7 @@ class Load(Part):
     def moment_problems(self, key: str, model: str) -> list[str]:
         """Return what of it does not go with a plane, an axisymmetric or a solid model."""
         if model == "axisymmetric":
-            wrong = self.given("through", "moment")
+            wrong = self.present("through", "moment")
             return [f"{key}.{name}: expected none in rings: what acts on them is the same all around" for name in wrong]
         told = {"plane": (1, "[about y]"), "solid": (3, "[about x, about y, about z]")}[model]
         if self.moment is None or len(self.moment) == told[0]:
@@ -237,7 +237,7 @@ class Load(Part):
     def _scaled(self, factor: float) -> Load:
         scaled = {
             name: tuple(factor * component for component in getattr(self, name))
-            for name in self.given("force", "traction", "moment")
+            for name in self.present("force", "traction", "moment")
         }
         return self.model_copy(update={**scaled, "over_cycle": None})
 
@@ -358,7 +358,7 @@ class Topography(Part):
     together = (("rms", "longest"), ("amplitude", "wavelength"))
     checks = (
         Check(
-            lambda s: s.given("shortest") and s.longest and s.shortest >= s.longest,
+            lambda s: s.present("shortest") and s.longest and s.shortest >= s.longest,
             "shortest: expected less than longest",
         ),
     )

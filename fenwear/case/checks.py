@@ -59,7 +59,7 @@ CHECKS = (
     # Heat
     *(
         Check(
-            lambda c, key=key: c.heat and c.heat.given(key) and not one_way(c),
+            lambda c, key=key: c.heat and c.heat.present(key) and not one_way(c),
             f"heat.{key}: expected one-way sliding: to and fro the same material stays, and none enters",
         )
         for key in ("track", "inflow")
@@ -194,7 +194,7 @@ def material_problems(case: Case) -> Iterator[str]:
         if not case.heat:
             yield from (f"materials.{name}.{key}: {NO_HEAT}" for key in material.dependent)
         elif name in case.used_materials:
-            missing = [key for key in THERMAL if not material.given(key)]
+            missing = [key for key in THERMAL if not material.present(key)]
             yield from (f"materials.{name}.{key}: missing, but required with heat" for key in missing)
 
 
@@ -267,7 +267,7 @@ def coefficient_problems(case: Case) -> Iterator[str]:
             yield from (f"{key}.regions.{r}: no such region; known are {', '.join(regions)}" for r in unknown)
             yield from (f"{key}.regions.{r}: missing, but required" for r in missing)
     for body, law in case.wear.by_body.items():
-        if law and law.given("beta", "energy") and case.contact.friction == 0:
+        if law.present("beta", "energy") and case.contact.friction == 0:
             yield f"wear.{body}: expected friction where beta or energy gives the coefficient"
 
 
@@ -313,7 +313,7 @@ def step_problems(case: Case, step: Any, at: str) -> Iterator[str]:
     for name in step.load_factors or {}:
         if name not in groups:
             yield f"{at}.load_factors.{name}: no load of the case acts on it, but on {', '.join(groups) or 'none'}"
-    for key in step.given("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
+    for key in step.present("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
         known = key in type(motion).model_fields and not (key == "amplitude" and case.turns)
         if not known or isinstance(motion, Cycle):
             yield f"{at}.{key}: does not change with motion.kind = '{motion.kind}'"
@@ -326,7 +326,7 @@ def step_problems(case: Case, step: Any, at: str) -> Iterator[str]:
         yield from (f"{at}.{problem}" for problem in told)
         if any(depends_on(value, "s") for value in case.coefficients.values()):
             yield f"{at}.motion: expected no coefficient that depends on s: cycles slide different ways"
-    if step.given("ambient") and not case.heat:
+    if step.present("ambient") and not case.heat:
         yield f"{at}.ambient: expected a case with the table heat"
 
 

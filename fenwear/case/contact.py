@@ -68,12 +68,12 @@ class ThirdBody(Part):
 
     def asks(self, name: str) -> bool:
         """Return whether the loss depends on a variable of coefficients."""
-        return bool(name == "edge" and self.given("edge_life")) or depends_on(self.life, name)
+        return bool(name == "edge" and self.present("edge_life")) or depends_on(self.life, name)
 
     @property
     def varies(self) -> bool:
         """Whether the loss changes with more than the place."""
-        return bool(self.given("edge_life")) or varies(self.life)
+        return bool(self.present("edge_life")) or varies(self.life)
 
 
 class LinearLayer(Part):
@@ -170,7 +170,7 @@ class Lubrication(Part):
     @property
     def key(self) -> str:
         """The key of what tells the share."""
-        return self.given("asperity_share", "film")[0]
+        return self.present("asperity_share", "film")[0]
 
     @property
     def coefficient(self) -> Any:

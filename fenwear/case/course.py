@@ -91,12 +91,12 @@ class ProgramStep(Part):
     one_of = (("cycles", "distance", "time"),)
     checks = (
         *(
-            Check(lambda s, pair=pair: len(s.given(*pair)) > 1, f"{pair[0]}: give either {pair[0]} or {pair[1]}")
+            Check(lambda s, pair=pair: len(s.present(*pair)) > 1, f"{pair[0]}: give either {pair[0]} or {pair[1]}")
             for pair in (("load", "load_factor"), ("load", "load_factors"), ("angular_frequency", "period"))
         ),
         *(
             Check(
-                lambda s, key=key: s.given("distance") and s.given(key) and not any(getattr(s, key)),
+                lambda s, key=key: s.present("distance") and s.present(key) and not any(getattr(s, key)),
                 f"distance: expected time or cycles: {key} is zero, and nothing slides in this step",
             )
             for key in ("speed", "angular_speed")

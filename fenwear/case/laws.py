@@ -122,7 +122,7 @@ class Dependence(_State):
     @property
     def form(self) -> str:
         """The key of its form."""
-        return self.given(*FORMS)[0]
+        return self.present(*FORMS)[0]
 
     def check(self, unit: str | None, of: Sequence[str], forms: Sequence[str]) -> None:
         """Raise where it is no coefficient of a key.
@@ -361,9 +361,11 @@ class Coating(Part):
     one_of = (COEFFICIENTS,)
     together = (("archard", "hardness"),)
     checks = (
-        Check(lambda s: s.given("touching_from") and not s.given("per_area"), "touching_from: expected with per_area"),
         Check(
-            lambda s: s.given("coefficient") and not 0 < s.coefficient < math.inf,
+            lambda s: s.present("touching_from") and not s.present("per_area"), "touching_from: expected with per_area"
+        ),
+        Check(
+            lambda s: s.present("coefficient") and not 0 < s.coefficient < math.inf,
             "coefficient: expected a finite number above zero",
         ),
     )
@@ -454,11 +456,11 @@ class WearLaw(Part):
     together = (("archard", "hardness"),)
     checks = (
         Check(
-            lambda s: s.given("per_area") and (s.given("pressure_cap") or s.pressure_threshold > 0),
+            lambda s: s.present("per_area") and (s.present("pressure_cap") or s.pressure_threshold > 0),
             "per_area: expected without pressure_cap and pressure_threshold",
         ),
         Check(
-            lambda s: not s.given("per_area") and s.touching_from != type(s).model_fields["touching_from"].default,
+            lambda s: not s.present("per_area") and s.touching_from != type(s).model_fields["touching_from"].default,
             "touching_from: expected with per_area",
         ),
         *(
@@ -469,18 +471,18 @@ class WearLaw(Part):
             for key in ("coefficient", "beta")
         ),
         Check(
-            lambda s: s.given("pressure_cap") and s.pressure_cap <= s.pressure_threshold,
+            lambda s: s.present("pressure_cap") and s.pressure_cap <= s.pressure_threshold,
             "pressure_cap: expected more than pressure_threshold",
         ),
         *(
             Check(
-                lambda s, key=key: s.given(key) and s.exponents != (1.0, 1.0),
+                lambda s, key=key: s.present(key) and s.exponents != (1.0, 1.0),
                 f"{key}: expected with exponents of 1 only; give coefficient or beta",
             )
             for key in COEFFICIENTS[1:]
         ),
         Check(
-            lambda s: s.coating and not s.coating.given("coefficient") and s.exponents != (1.0, 1.0),
+            lambda s: s.coating and not s.coating.present("coefficient") and s.exponents != (1.0, 1.0),
             "coating: expected a coefficient with other exponents than 1",
         ),
     )
@@ -553,11 +555,11 @@ class Wear(Part):
     @property
     def laws(self) -> list[WearLaw]:
         """Those that there are."""
-        return [law for law in (self.punch, self.strip) if law is not None]
+        return list(self.by_body.values())
 
     @property
-    def by_body(self) -> dict[str, WearLaw | None]:
-        """The laws of both bodies by their roles; None where one does not wear."""
-        return {"punch": self.punch, "strip": self.strip}
+    def by_body(self) -> dict[str, WearLaw]:
+        """The laws of the bodies that wear, by their roles."""
+        return {body: getattr(self, body) for body in self.present("punch", "strip")}
 
     checks = (Check(lambda s: not s.laws, "expected the wear law of punch, strip or both"),)

@@ -108,5 +108,5 @@ class Creep(Part):
 
     together = (("per_decade", "onset"),)
     checks = (
-        Check(lambda s: not s.terms and not s.given("per_decade"), "expected terms, or per_decade with an onset"),
+        Check(lambda s: not s.terms and not s.present("per_decade"), "expected terms, or per_decade with an onset"),
     )

@@ -199,8 +199,8 @@ class _Along(Part):
     along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
 
     checks = (
-        Check(lambda s: s.given("along") and not any(s.along), "along: expected a direction, got zero"),
-        Check(lambda s: s.given("along") and s.axis != "x", "along: give either along or axis"),
+        Check(lambda s: s.present("along") and not any(s.along), "along: expected a direction, got zero"),
+        Check(lambda s: s.present("along") and s.axis != "x", "along: give either along or axis"),
     )
 
 

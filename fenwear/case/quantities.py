@@ -155,11 +155,11 @@ class Part(BaseModel):
     def _fits_together(self) -> Self:
         own = [vars(kind) for kind in type(self).__mro__]
         for keys in (keys for names in own for keys in names.get("one_of", ())):
-            if len(self.given(*keys)) != 1:
-                got = " and ".join(self.given(*keys)) or "none"
+            if len(self.present(*keys)) != 1:
+                got = " and ".join(self.present(*keys)) or "none"
                 raise ValueError(f"give one of {', '.join(keys[:-1])} and {keys[-1]}, got {got}")
         for keys in (keys for names in own for keys in names.get("together", ())):
-            given = self.given(*keys)
+            given = self.present(*keys)
             missing = [key for key in keys if key not in given]
             if given and missing:
                 raise ValueError(f"{missing[0]}: expected together with {' and '.join(given)}, and only then")
@@ -168,7 +168,7 @@ class Part(BaseModel):
                 raise ValueError(check.message.format(self))
         return self
 
-    def given(self, *keys: str) -> list[str]:
+    def present(self, *keys: str) -> list[str]:
         """Return those of the keys that are given."""
         return [key for key in keys if getattr(self, key) is not None]
 

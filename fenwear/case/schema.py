@@ -231,8 +231,8 @@ class Case(Part):
             found[f"contact.lubrication.{contact.lubrication.key}"] = contact.lubrication.coefficient
         if contact.third_body:
             found["contact.third_body.life"] = contact.third_body.life
-        laws = [(body, law) for body, law in self.wear.by_body.items() if law]
-        return found | {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in laws}
+        wear = self.wear.by_body.items()
+        return found | {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in wear}
 
     @property
     def passing_laws(self) -> list[str]:
@@ -284,8 +284,7 @@ class Case(Part):
             if self._folder is not None and heights is not None and heights.file is not None:
                 data[body]["topography"]["file"] = str((self._folder / heights.file).resolve())
         for body, law in self.wear.by_body.items():
-            if law is not None:
-                data["wear"][body] = law.resolved(data["wear"][body])
+            data["wear"][body] = law.resolved(data["wear"][body])
         if self.geometry.follow_wear is None:
             data["geometry"]["follow_wear"] = "never"
         return dict(renamed(data, self.names.by_name)) if self.names.given else data

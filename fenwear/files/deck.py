@@ -19,7 +19,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, Block, Ints, MeshFile, MeshSet, listed, wrong
+from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, listed, wrong
 
 DEEPEST = 20  # includes within each other, and sets of sets
 # Keywords that say nothing of nodes, elements and sets; those of a step are passed over with it.
@@ -55,9 +55,6 @@ LINES = re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|MAX|RB2D|RB3D|DC1D|PIPE2|PIPE3
 SHAPELESS = re.compile(r"(?:MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|DGAP|ITT|ITS|HEATCAP|DCOUP|DRAG|JOINTC|CAPACITY)\w*|D")
 FLAT_KINDS = {3: 2, 4: 3, 6: 9, 8: 16, 9: 10}
 SOLID_KINDS = {4: 4, 5: 7, 6: 6, 8: 5, 10: 11, 15: -15, 20: 17, 27: 12}
-# Abaqus' nodes in gmsh's order, of kinds where they differ.
-ORDERS = {11: [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
-          17: [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14]}  # fmt: skip
 
 
 @dataclass

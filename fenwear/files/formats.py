@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.errors import CaseError, InputError
-from fenwear.files import binary, by_gmsh, xml_meshes
+from fenwear.files import by_gmsh, exchange
 from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import entities, entities_text, read_shapes
 from fenwear.files.deck import read_deck
@@ -21,16 +21,16 @@ from fenwear.files.table import TableError, read_table
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".inp": ("Abaqus, CalculiX", read_deck),
-    ".med": ("Salome", binary.read_med),
+    ".med": ("Salome", exchange.read_med),
     ".unv": ("I-deas universal", by_gmsh.read),
     ".cgns": ("CGNS", by_gmsh.read),
     ".bdf": ("Nastran", by_gmsh.read_bulk),
     ".nas": ("Nastran", by_gmsh.read_bulk),
-    ".exo": ("Exodus", binary.read_exodus),
-    ".e": ("Exodus", binary.read_exodus),
-    ".ex2": ("Exodus", binary.read_exodus),
-    ".vtu": ("VTK", xml_meshes.read_vtu),
-    ".xdmf": ("XDMF", xml_meshes.read_xdmf),
+    ".exo": ("Exodus", exchange.read_exodus),
+    ".e": ("Exodus", exchange.read_exodus),
+    ".ex2": ("Exodus", exchange.read_exodus),
+    ".vtu": ("VTK", exchange.read_vtu),
+    ".xdmf": ("XDMF", exchange.read_xdmf),
 }
 MESHES = tuple(READERS)
 

@@ -94,6 +94,9 @@ KINDS: Mapping[int, Kind] = {  # by gmsh's number
 }
 SIDE_KINDS = {1: 15, 2: 1, 3: 2, 4: 3, 6: 9, 9: 10, 8: 16}  # by the number of nodes; three are a line in a plane
 FULL = {16: 10, 17: 12}  # the kinds with all middle nodes
+# Nodes of Abaqus and VTK in gmsh's order, of kinds where they differ.
+ORDERS = {11: [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
+          17: [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14]}  # fmt: skip
 USABLE = (2, 3, 4, 5, 9, 10, 11, 12)  # of which bodies are made
 
 

@@ -205,7 +205,7 @@ def above_hardness(seen: Seen) -> Fields:
     """Return the mean pressure of the contact where it is above a hardness."""
     pressure, when = _mean_pressure(seen)
     for body, law in seen.system.case.wear.by_body.items():
-        if law is not None and law.hardness is not None and pressure > law.hardness:
+        if law.hardness and pressure > law.hardness:
             return {"pressure": pressure, "when": when, "limit": law.hardness, "body": body}
     return {}
 

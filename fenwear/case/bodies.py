@@ -110,6 +110,12 @@ class Grid(Part):
         return data
 
 
+def _of_planes(key: str, default: object) -> Check:
+    """Return the check of a key that only plane models have."""
+    message = f"{key}: belongs to plane models, not with kind = '{{0.kind}}'"
+    return Check(lambda model: model.kind != "plane" and getattr(model, key) != default, message)
+
+
 class Model(Part):
     """Plane bodies in (x, z) with their thickness; rings in (x, z), x the radius; or solids in (x, y, z)."""
 
@@ -119,13 +125,7 @@ class Model(Part):
     plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
     thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
 
-    checks = tuple(
-        Check(
-            lambda s, key=key, default=default: s.kind != "plane" and getattr(s, key) != default,
-            f"{key}: belongs to plane models, not with kind = '{{0.kind}}'",
-        )
-        for key, default in (("plane", "stress"), ("thickness", 1.0))
-    )
+    checks = (_of_planes("plane", "stress"), _of_planes("thickness", 1.0))
 
     @property
     def law(self) -> Kind:

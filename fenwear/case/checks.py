@@ -42,6 +42,12 @@ def strip_track(case: Case) -> bool:
     return case.strip_changes and case.passes and not case.sticks
 
 
+def _of_one_way(key: str) -> Check:
+    """Return the check of a key of the heat that belongs to sliding one way."""
+    message = f"heat.{key}: expected one-way sliding: to and fro the same material stays, and none enters"
+    return Check(lambda case: case.heat and case.heat.present(key) and not one_way(case), message)
+
+
 CHECKS = (
     Check(
         lambda c: not (c.punch.loads or c.strip.loads or c.course_load or any(s.moves for s in supports(c))),
@@ -57,13 +63,8 @@ CHECKS = (
         "run.half_cycles: expected at least one whole cycle for cycle jumps",
     ),
     # Heat
-    *(
-        Check(
-            lambda c, key=key: c.heat and c.heat.present(key) and not one_way(c),
-            f"heat.{key}: expected one-way sliding: to and fro the same material stays, and none enters",
-        )
-        for key in ("track", "inflow")
-    ),
+    _of_one_way("track"),
+    _of_one_way("inflow"),
     Check(
         lambda c: c.heat and c.heat.conductance == "layer" and not c.contact.layer,
         "heat.conductance: expected a table contact.layer for 'layer'",

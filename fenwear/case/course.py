@@ -49,6 +49,17 @@ def _ramp(quantity: Any) -> Any:
     return Annotated[tuple[quantity, ...], Field(min_length=1, max_length=2), OneOrTwo(), listed] | None
 
 
+def _either(one: str, other: str) -> Check:
+    """Return the check of two keys of which at most one is given."""
+    return Check(lambda step: len(step.present(one, other)) > 1, f"{one}: give either {one} or {other}")
+
+
+def _slides(key: str) -> Check:
+    """Return the check of a step with a distance, in which something has to slide."""
+    message = f"distance: expected time or cycles: {key} is zero, and nothing slides in this step"
+    return Check(lambda step: step.distance and step.present(key) and not any(getattr(step, key)), message)
+
+
 class ProgramStep(Part):
     """A step of a test program: how long it takes, and what acts in it; [from, to] is a ramp."""
 
@@ -90,17 +101,11 @@ class ProgramStep(Part):
 
     one_of = (("cycles", "distance", "time"),)
     checks = (
-        *(
-            Check(lambda s, pair=pair: len(s.present(*pair)) > 1, f"{pair[0]}: give either {pair[0]} or {pair[1]}")
-            for pair in (("load", "load_factor"), ("load", "load_factors"), ("angular_frequency", "period"))
-        ),
-        *(
-            Check(
-                lambda s, key=key: s.present("distance") and s.present(key) and not any(getattr(s, key)),
-                f"distance: expected time or cycles: {key} is zero, and nothing slides in this step",
-            )
-            for key in ("speed", "angular_speed")
-        ),
+        _either("load", "load_factor"),
+        _either("load", "load_factors"),
+        _either("angular_frequency", "period"),
+        _slides("speed"),
+        _slides("angular_speed"),
     )
 
     @property

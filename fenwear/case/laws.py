@@ -371,6 +371,22 @@ class Coating(Part):
     )
 
 
+def _zero_or_more(key: str) -> Check:
+    """Return the check of a constant coefficient."""
+
+    def wrong(law: WearLaw) -> bool:
+        value = getattr(law, key)
+        return isinstance(value, float) and not 0 <= value < math.inf
+
+    return Check(wrong, f"{key}: expected a finite number, zero or larger")
+
+
+def _of_linear_laws(key: str) -> Check:
+    """Return the check of a coefficient that belongs to exponents of 1."""
+    message = f"{key}: expected with exponents of 1 only; give coefficient or beta"
+    return Check(lambda law: law.present(key) and law.exponents != (1.0, 1.0), message)
+
+
 class WearLaw(Part):
     """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
 
@@ -463,24 +479,12 @@ class WearLaw(Part):
             lambda s: not s.present("per_area") and s.touching_from != type(s).model_fields["touching_from"].default,
             "touching_from: expected with per_area",
         ),
-        *(
-            Check(
-                lambda s, key=key: isinstance(getattr(s, key), float) and not 0 <= getattr(s, key) < math.inf,
-                f"{key}: expected a finite number, zero or larger",
-            )
-            for key in ("coefficient", "beta")
-        ),
+        *map(_zero_or_more, ("coefficient", "beta")),
         Check(
             lambda s: s.present("pressure_cap") and s.pressure_cap <= s.pressure_threshold,
             "pressure_cap: expected more than pressure_threshold",
         ),
-        *(
-            Check(
-                lambda s, key=key: s.present(key) and s.exponents != (1.0, 1.0),
-                f"{key}: expected with exponents of 1 only; give coefficient or beta",
-            )
-            for key in COEFFICIENTS[1:]
-        ),
+        *map(_of_linear_laws, COEFFICIENTS[1:]),
         Check(
             lambda s: s.coating and not s.coating.present("coefficient") and s.exponents != (1.0, 1.0),
             "coating: expected a coefficient with other exponents than 1",

@@ -154,8 +154,8 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
     ids, names = get("ns_prop1"), _texts(get("ns_names"))
     for number in _numbered("node_ns", get):
         nodes = np.unique(np.asarray(get(f"node_ns{number}"), dtype=np.int64) - 1)
-        members = known_nodes(nodes, len(points), f"node set {number}")
-        sets.append(MeshSet(_name(names, ids, number, "nodeset"), "nodes", members))
+        known_nodes(nodes, len(points), f"node set {number}")
+        sets.append(MeshSet(_name(names, ids, number, "nodeset"), "nodes", nodes))
     return MeshFile(name, points, tuple(blocks), tuple(sets))
 
 

@@ -181,7 +181,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
             "wears a facet of its own, deeper for ever",
         )
     },
-    "flash/settings.py": {
+    "flash/temperatures.py": {
         "to and fro the same material stays": (PHYSICS, "`flash` with `heat.inflow` of a strip that goes to and fro")
     },
     "flash/source.py": {
@@ -270,8 +270,11 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "bodies/shape.py": ("has used up the elements",),
     "cycle/coupled.py": ("did not come together",),
     "cycle/stability.py": ("beyond all numbers", "did not come together"),
-    "flash/settings.py": ("its temperatures in its history", "expected one material where"),
-    "flash/temperatures.py": ("each instant of the long stroke",),
+    "flash/temperatures.py": (
+        "its temperatures in its history",
+        "expected one material where",
+        "each instant of the long stroke",
+    ),
     "interface/pair.py": ("the punch lies below",),
     "layers/between.py": ("Plastic flow did not converge"),
     "layers/debris.py": ("the conditions of the phases",),
@@ -290,7 +293,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "stick/cycle.py": ("did not come together",),
     "stick/final.py": ("did not come together",),
     "stick/fineness.py": ("too coarse",),
-    "stick/heated.py": ("did not come together",),
+    "stick/heat.py": ("did not come together",),
     "stick/interface.py": ("bodies with meshes",),
     "stick/setup.py": ("expected 'coulomb'",),
 }

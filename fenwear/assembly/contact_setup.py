@@ -153,7 +153,7 @@ class ContactSetup:
     @property
     def initial_temperature(self) -> float:
         """The temperature at which bodies fit, K; 0 without heat."""
-        return 0.0 if self.heat is None else self.heat.initial
+        return self.case.initial_temperature
 
     @property
     def isothermal(self) -> Isothermal:

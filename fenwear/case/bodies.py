@@ -48,35 +48,39 @@ class Geometry(Part):
 
     file: str = Field(
         default="punch_on_strip.geo",
-        description="beside the case file, or one of the ready geometries: .geo or .msh of gmsh; a mesh of another "
-        "program (.inp, .med, .unv, .cgns, .bdf, .exo, .vtu, .xdmf); a shape from CAD (.step, .iges, .brep)",
+        description="geometry beside the case file, or a ready one: .geo or .msh of gmsh; a mesh of another program "
+        "(.inp, .med, .unv, .cgns, .bdf, .exo, .vtu, .xdmf); a shape from CAD (.step, .iges, .brep)",
     )
     groups: dict[str, str | tuple[str, ...]] = Field(
         default={},
-        description='names of the file by fenwear\'s groups: punch_contact = "Group_3", a list of names, "face 3" of a '
-        'shape from CAD, a plane "y = 0 mm" of a mesh, or "" to leave a group out; case and spaces do not count',
+        description='names in the file of fenwear\'s groups: punch_contact = "Group_3", a list of names, "face 3" of a '
+        'shape from CAD, a plane "y = 0 mm" of a mesh, or "" to leave a group out; case and spaces do not '
+        "count",
     )
     unit: str | None = Field(
-        default=None, description="of the lengths in a mesh of another program, or a .brep: mm (default), m, in"
+        default=None, description="unit of the lengths in a mesh of another program, or a .brep: mm (default), m, in"
     )
     size: Annotated[Length, Field(gt=0)] | None = Field(
-        default=None, description="largest elements in a shape from CAD; by default a fifteenth of the smaller body"
+        default=None,
+        description="size of the largest elements in a shape from CAD; by default a fifteenth of the smaller body",
     )
     sizes: dict[str, Annotated[Length, Field(gt=0)]] = Field(
-        default={}, description='of elements at groups of a shape from CAD: punch_contact = "0.2 mm"'
+        default={}, description='size of elements at groups of a shape from CAD: punch_contact = "0.2 mm"'
     )
     parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
         default={}, description="values of parameters of the .geo, by their names"
     )
-    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements, 1 to 8")
+    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(
+        default=4, description="polynomial degree of the elements, 1 to 8"
+    )
     order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
-        default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
+        default=1, description="order of the elements' shape from a .geo; 2 follows curved boundaries"
     )
     follow_wear: Annotated[
         Annotated[Number, Field(gt=0)] | None, BeforeValidator(lambda value: None if value == "never" else value)
     ] = Field(
         default=0.5,
-        description="worn depth over the elements' height above which the mesh follows the worn surface; or never",
+        description="worn depth over the elements' height above which the mesh follows the worn surface, or never",
     )
 
 
@@ -84,20 +88,20 @@ class Grid(Part):
     """A regular grid of contact nodes in the tangent plane of the contact, whatever the meshes are there."""
 
     nodes: Annotated[int, Field(ge=5, le=2049, strict=True)] | None = Field(
-        default=None, description="along the longer side of a grid that stays; by default 65"
+        default=None, description="nodes along the longer side of a constant grid; by default 65"
     )
     across: Annotated[int, Field(ge=8, le=1024, strict=True)] | None = Field(
         default=None,
-        description="in place of nodes: along the longer side of the first contact, such as 64; the grid begins "
+        description="in place of nodes: nodes along the longer side of the first contact, such as 64; the grid begins "
         "around it, grows with the scar up to size, and coarsens where there are twice as many",
     )
     size: Annotated[tuple[Annotated[Length, Field(gt=0)], ...], Field(min_length=1, max_length=2)] | None = Field(
         default=None,
-        description="its sides, [x] in the plane and [x, y] in solids, or with across the largest; by default those of "
-        "the contact, less a spacing at each end",
+        description="sides of the grid, [x] in the plane and [x, y] in solids; with across the largest sides; by "
+        "default those of the contact, less a spacing at each end",
     )
     middle: Annotated[tuple[Length, ...], Field(min_length=1, max_length=2)] | None = Field(
-        default=None, description="where its middle is; by default that of the contact surface"
+        default=None, description="middle of the grid; by default that of the contact surface"
     )
 
     @model_validator(mode="before")
@@ -123,7 +127,9 @@ class Model(Part):
         default="plane", description="plane bodies, rings, or solids"
     )
     plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
-    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
+    thickness: Annotated[Length, Field(gt=0)] = Field(
+        default=1.0, description="thickness of plane bodies, out of their plane"
+    )
 
     checks = (_of_planes("plane", "stress"), _of_planes("thickness", 1.0))
 
@@ -142,7 +148,9 @@ class Support(Part):
     """Displacement components held, at zero or at what is prescribed, on a named group or at a point."""
 
     on: str | None = Field(default=None, description="group of the geometry")
-    at: Point | None = Field(default=None, description="or a point [x, z], in a solid [x, y, z], at a mesh node")
+    at: Point | None = Field(
+        default=None, description="in place of on: a point [x, z], in a solid [x, y, z], at a mesh node"
+    )
     fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero, or moved by")
     by: Annotated[tuple[Length, ...], Field(min_length=1)] | None = Field(
         default=None,
@@ -170,13 +178,16 @@ class Load(Part):
     """
 
     on: str = Field(description="group of the geometry")
-    force: Forces | None = Field(default=None, description="resultant [x, z], in a solid [x, y, z], spread evenly")
-    traction: Stresses | None = Field(default=None, description="or the traction itself")
+    force: Forces | None = Field(
+        default=None, description="resultant force [x, z], in a solid [x, y, z], spread evenly"
+    )
+    traction: Stresses | None = Field(default=None, description="in place of force: the traction itself")
     through: Point | None = Field(
-        default=None, description="point [x, z], in a solid [x, y, z], that the force acts through; else the centroid"
+        default=None,
+        description="point [x, z], in a solid [x, y, z], through which the force acts; by default the centroid",
     )
     moment: Moments | None = Field(
-        default=None, description="a moment besides, or alone: [about y], in a solid [about x, y, z]"
+        default=None, description="additional moment, or the moment alone: [about y], in a solid [about x, y, z]"
     )
     over_cycle: OverCycle | None = Field(
         default=None,
@@ -295,7 +306,7 @@ class Prescribed(Part):
     """A temperature held on a named group of the boundary."""
 
     on: str = Field(description="group of the geometry")
-    temperature: Temperature = Field(default=0.0, description="theta held there")
+    temperature: Temperature = Field(default=0.0, description="held temperature theta")
 
 
 class Profile(Part):
@@ -304,14 +315,15 @@ class Profile(Part):
     points: Annotated[
         tuple[Annotated[tuple[Length, ...], Field(min_length=2, max_length=4)], ...], Field(min_length=2)
     ] = Field(
-        description="[x, depth] of plane bodies and rings (x the radius), of solids [x, y, depth]; [s, depth] of "
-        "curves that have several places at one x, and [x, y, z, depth] of such surfaces of solids, as bores; positive "
-        "where the surface lies deeper. In place of them file = a CSV file with these columns and their units"
+        description="[x, depth] of plane bodies and rings (x the radius), [x, y, depth] of solids; [s, depth] of "
+        "curves with several places at one x, and [x, y, z, depth] of such surfaces of solids, as bores; "
+        "positive where the surface lies deeper; in their place file = a CSV file with these columns and "
+        "their units"
     )
     along: Literal["x", "arc"] = Field(
         default="x",
-        description="what the first number of points of a plane body is: x, or the arc length s, which is x in the "
-        "middle of the curve and grows with x there; a file says it by its heading",
+        description="meaning of the first number of points of a plane body: x, or the arc length s, which is x in the "
+        "middle of the curve and grows with x there; the heading of a file states it",
     )
 
 
@@ -328,31 +340,37 @@ class Topography(Part):
 
     file: str | None = Field(
         default=None,
-        description="a height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
-        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by SurfaceTopography, "
-        "where it is installed",
+        description="height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
+        ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by "
+        "SurfaceTopography or surfalize, where one of them is installed",
     )
     holes: Literal["reject", "fill", "keep"] = Field(
         default="reject",
-        description="of a map: points without a number, fill values such as -9999 and spikes; fill: by their "
+        description="points of a map without a number, fill values such as -9999 and spikes; fill: from their "
         "neighbours; keep: heights far beyond the others are real",
     )
     level: Annotated[int, BeforeValidator(_degree), Field(ge=0, le=8)] | None = Field(
         default=None,
-        description="what is taken off a map: plane, or a polynomial of this degree; by default nothing",
+        description="form to remove from a map: plane, or a polynomial of this degree; by default none",
     )
-    rms: Positive | None = Field(default=None, description="Sq of a made self-affine surface, mean zero")
-    hurst: Annotated[Number, Field(gt=0, le=1)] = Field(default=0.8, description="H: the spectrum falls by q^-2(1+H)")
-    longest: Positive | None = Field(default=None, description="wave length from which on it has roughness")
-    shortest: Positive | None = Field(default=None, description="down to which; by default 8 spacings of the grid")
+    rms: Positive | None = Field(default=None, description="Sq of a generated self-affine surface, mean zero")
+    hurst: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.8, description="Hurst exponent H: the spectrum falls by q^-2(1+H)"
+    )
+    longest: Positive | None = Field(default=None, description="longest wave length of the roughness")
+    shortest: Positive | None = Field(
+        default=None, description="shortest wave length; by default 8 spacings of the grid"
+    )
     seed: Annotated[int, Field(ge=0, strict=True)] = Field(
-        default=0, description="of its phases: the same surface again"
+        default=0, description="seed of the phases: the same seed gives the same surface"
     )
-    amplitude: Positive | None = Field(default=None, description="or of a wave, half of peak to valley")
+    amplitude: Positive | None = Field(
+        default=None, description="in place of rms: amplitude of a wave, half of peak to valley"
+    )
     wavelength: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=2)] | None = Field(
-        default=None, description="of the wave along the grid, [x] or [x, y]; of two the product of both cosines"
+        default=None, description="wave length along the grid, [x] or [x, y]; of two the product of both cosines"
     )
-    height_factor: Number = Field(default=1.0, description="by which all heights are taken")
+    height_factor: Number = Field(default=1.0, description="factor of all heights")
 
     one_of = (("file", "rms", "amplitude"),)
     together = (("rms", "longest"), ("amplitude", "wavelength"))
@@ -369,20 +387,20 @@ class Body(Part):
 
     name: str | None = Field(
         default=None,
-        description="what the body is called in messages, results and reports, such as 'pad'; its groups in the "
-        "geometry may start with it, pad_contact. By default punch or strip",
+        description="name of the body in messages, results and reports, such as 'pad'; its groups in the geometry may "
+        "start with it, pad_contact; by default punch or strip",
     )
     regions: dict[str, str] = Field(default={}, description="name of the material of each region")
-    supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
+    supports: tuple[Support, ...] = Field(default=(), description="places where displacement is held")
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
-    temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
+    temperatures: tuple[Prescribed, ...] = Field(default=(), description="places where temperature is held")
     insulated: tuple[str, ...] = Field(
-        default=(), description="groups of the geometry that lose no heat, such as a plane of symmetry"
+        default=(), description="groups of the geometry without heat loss, such as a plane of symmetry"
     )
     pivot: Point | None = Field(
         default=None,
-        description="the point O of lambda_F and lambda_M; by default the first support's centre, of each part that "
-        "points hold its own, or the origin",
+        description="the point O of lambda_F and lambda_M; by default the centre of the first support (for parts with "
+        "point supports their own), or the origin",
     )
     no_turning_about: tuple[Axis, ...] = Field(
         default=(),
@@ -390,20 +408,20 @@ class Body(Part):
     )
     operator: str = Field(
         default=AUTO,
-        description="how its contact surface answers to forces: condensed: as its mesh does; half-space: as one of its "
-        "material, or half-plane, without supports and other boundaries, fast for many nodes; fine: as a half-space "
-        "and what its mesh does otherwise, on a grid finer than the mesh; auto: with the table grid fine, where the "
-        "contact is far enough from edges, else condensed; or one made in Python",
+        description="answer of the contact surface to forces: condensed: by the mesh; half-space: by a half-space or "
+        "half-plane of its material, without supports and other boundaries, fast for many nodes; fine: by "
+        "a half-space corrected by the mesh, on a grid finer than the mesh; auto: fine with the table "
+        "grid where the contact is far enough from edges, else condensed; or an operator made in Python",
     )
     topography: Topography | None = Field(
-        default=None, description="roughness or waves on top of its shape, measured or made; needs the table grid"
+        default=None, description="roughness or waves on top of its shape, measured or generated; needs the table grid"
     )
     creep: Creep | None = Field(
         default=None,
-        description="growth of its compliance under load, as of polymers, all of it alike; by default none",
+        description="growth of the compliance of the whole body under load, as of polymers; by default none",
     )
     profile: Profile | None = Field(
-        default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"
+        default=None, description="difference of the contact surface from the mesh: a measured or machined shape"
     )
 
     @property

@@ -39,29 +39,29 @@ class ThirdBody(Part):
     """
 
     share: Annotated[Number, Field(ge=0, le=1)] = Field(
-        description="of what both bodies lose at a place, by volume, that stays there as debris; the rest is ejected "
+        description="share of the worn volume of both bodies that stays at its place as debris; the rest is ejected "
         "at once"
     )
     life: constant_or_dependence(Annotated[Length, Field(gt=0)], "mm", forms=("expression", "table", "law")) = Field(  # type: ignore[valid-type]
-        description="sliding distance over which 1 - 1/e of what lies at a place is ejected; an expression, a table or "
-        "a registered law of what coefficients may depend on, debris (its own thickness, mm) and edge among it: a law "
-        "of loss, t / life over sliding distance"
+        description="sliding distance over which 1 - 1/e of the debris at a place is ejected; an expression, a table "
+        "or a registered law of the variables of coefficients, debris (its own thickness, mm) and edge "
+        "among them: a law of loss, t / life over sliding distance"
     )
     edge_life: Annotated[Length, Field(gt=0)] | None = Field(
         default=None,
-        description="the same of what lies at an edge of the contact, where surfaces part or the punch's ends, besides "
-        "life; by default edges lose as any place does",
+        description="life of debris at an edge of the contact, where surfaces part or the punch's surface ends, in "
+        "addition to life; by default edges lose as any place does",
     )
     edge_length: Annotated[Length, Field(gt=0)] | None = Field(
-        default=None, description="with edge_life: distance from the edge over which that loss falls e times"
+        default=None, description="with edge_life: distance from the edge over which that loss falls by a factor of e"
     )
     initial: Annotated[Length, Field(ge=0)] = Field(
         default=0.0, description="thickness at the start, such as of a powder or a solid lubricant"
     )
     carried_by: str = Field(
         default="punch",
-        description="body whose surface it lies on and moves with, by its name: on the strip it passes through the "
-        "contact and comes back, or lies along a closed track",
+        description="name of the body that carries the debris; on the strip it passes through the contact and comes "
+        "back, or lies along a closed track",
     )
 
     together = (("edge_life", "edge_length"),)
@@ -79,7 +79,7 @@ class ThirdBody(Part):
 class LinearLayer(Part):
     """A layer that closes by p / stiffness, after Winkler."""
 
-    kind: Literal["linear"] = Field(description="closes in proportion to the pressure")
+    kind: Literal["linear"] = Field(description="closure proportional to the pressure")
     stiffness: of_place(Annotated[float, *quantity(STIFFNESS), Field(gt=0)], STIFFNESS) = Field(  # type: ignore[valid-type]
         description="pressure over closure"
     )
@@ -91,15 +91,15 @@ class LinearLayer(Part):
 class PowerLayer(Part):
     """A layer that closes by reference (p / pressure)^exponent, as ground joints of machine tools do."""
 
-    kind: Literal["power"] = Field(description="closes by a power of the pressure")
+    kind: Literal["power"] = Field(description="closure as a power of the pressure")
     reference: of_place(Annotated[Length, Field(gt=0)], "mm") = Field(  # type: ignore[valid-type]
         description="closure at the pressure"
     )
     pressure: of_place(Annotated[Stress, Field(gt=0)], "MPa") = Field(  # type: ignore[valid-type]
-        description="that closes it by the reference"
+        description="pressure that closes it by the reference"
     )
     exponent: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.5, description="of the pressure; 0.5 of ground joints"
+        default=0.5, description="exponent of the pressure; 0.5 of ground joints"
     )
 
     units: ClassVar[Mapping[str, str]] = {"reference": "mm", "pressure": "MPa"}
@@ -108,9 +108,10 @@ class PowerLayer(Part):
 class ExponentialLayer(Part):
     """A layer whose pressure grows by p = pressure (exp(closure / length) - 1)."""
 
-    kind: Literal["exponential"] = Field(description="its pressure grows by an exponential of the closure")
+    kind: Literal["exponential"] = Field(description="pressure that grows exponentially with the closure")
     length: of_place(Annotated[Length, Field(gt=0)], "mm") = Field(  # type: ignore[valid-type]
-        description="closure by which the pressure grows e times, as of rough surfaces: 0.3 to 0.5 of their rms height"
+        description="closure by which the pressure grows by a factor of e, as of rough surfaces: 0.3 to 0.5 of their "
+        "rms height"
     )
     pressure: of_place(Annotated[Stress, Field(gt=0)], "MPa") = Field(  # type: ignore[valid-type]
         description="scale of the pressure, reached at 0.69 lengths"
@@ -130,7 +131,7 @@ class RoughLayer(Part):
         description="mean radius of the asperities' tips"
     )
     asperity_density: of_place(Annotated[float, *quantity(DENSITY), Field(gt=0)], DENSITY) = Field(  # type: ignore[valid-type]
-        description="asperities on an area"
+        description="number of asperities on an area"
     )
     modulus: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None, description="E* of the asperities; by default that of the materials at the contact"
@@ -149,10 +150,11 @@ class Lubrication(Part):
     """
 
     asperity_share: constant_or_dependence(_Share, "", OF, ("expression", "table")) = Field(  # type: ignore[valid-type]
-        default=None, description="of the pressure that asperities carry, from 0 to 1: of p, v, T and the place"
+        default=None,
+        description="share of the pressure that asperities carry, from 0 to 1; a function of p, v, T and the place",
     )
     film: constant_or_dependence(_Film, "mm", OF, ("expression", "table")) = Field(  # type: ignore[valid-type]
-        default=None, description="film thickness of p, v, T and the place, in place of asperity_share"
+        default=None, description="film thickness as a function of p, v, T and the place, in place of asperity_share"
     )
     roughness: Annotated[Length, Field(gt=0)] | None = Field(
         default=None, description="rms height of both surfaces together, with film: lambda = film / roughness"
@@ -198,19 +200,20 @@ class Contact(Part):
 
     law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_own_or_registered)] = Field(
         default="auto",
-        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
-        "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically and "
-        "nothing goes against it, else gross-sliding",
+        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, as "
+        "in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically "
+        "and the case supports it, else gross-sliding",
     )
     friction: constant_or_dependence(Annotated[Number, Field(ge=0)], "") = Field(  # type: ignore[valid-type]
         default=0.0, description="coefficient of friction mu"
     )
     friction_temperature: str = Field(
         default="mean",
-        description="T of friction and of lubrication: mean or hotter of both surfaces, or that of a body, by its name",
+        description="temperature T of friction and of lubrication: mean or hotter of both surfaces, or that of a "
+        "body, by its name",
     )
     transverse_friction: Number = Field(
-        default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
+        default=0.0, description="mu_d of the traction -mu_d p across the sliding direction, equation (5)"
     )
     lubrication: Lubrication | None = Field(
         default=None, description="mixed lubrication; without this table asperities carry all"
@@ -220,10 +223,11 @@ class Contact(Part):
     )
     hardness: Hardness | None = Field(
         default=None,
-        description="H: no pressure is beyond it; what would be flows, to a plastic depth that stays, apart from wear",
+        description="H, the largest pressure; beyond it the surface flows, to a plastic depth apart from wear",
     )
     layer: Annotated[Layers, Field(discriminator="kind")] | None = Field(
-        default=None, description="what gives way between the bodies beside their own elasticity, such as roughness"
+        default=None,
+        description="compliant layer between the bodies in addition to their elasticity, such as roughness",
     )
 
     def asks(self, name: str, wear: Iterable[WearLaw | None]) -> bool:

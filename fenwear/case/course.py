@@ -14,22 +14,24 @@ from fenwear.case.quantities import AngularFrequency, Check, Force, Length, Numb
 class Run(Part):
     """How far a run goes and how it integrates the wear."""
 
-    half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="how many at most")
+    half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="largest number of half-cycles")
     integration: Literal["explicit", "implicit", "jump"] = Field(
-        default="explicit", description="of the wear; jump: over many cycles at once"
+        default="explicit", description="integration of the wear, explicit or implicit; jump: over many cycles at once"
     )
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=3e-3,
-        description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
+        description="error of one cycle jump: of its depths, and of the place of the contact force, and of "
+        "temperatures",
     )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
         default=None,
-        description="stop when pressure repeats within this fraction of its scale; of a program within its last step",
+        description="fraction of its scale within which a repeating pressure ends the run; with a program within its "
+        "last step",
     )
     until: str = Field(
         default="",
-        description='stop at a level: "depth 0.1 mm", "depth of both 5 um", "volume of strip 2 mm^3", "depth in left '
-        '10 um" of a named contact, "approach 0.05 mm" of the bodies',
+        description='level that ends the run: "depth 0.1 mm", "depth of both 5 um", "volume of strip 2 mm^3", "depth '
+        'in left 10 um" of a named contact, "approach 0.05 mm" of the bodies',
     )
 
 
@@ -63,40 +65,42 @@ def _slides(key: str) -> Check:
 class ProgramStep(Part):
     """A step of a test program: how long it takes, and what acts in it; [from, to] is a ramp."""
 
-    cycles: Annotated[int, Field(ge=1, strict=True)] | None = Field(default=None, description="how long it takes")
-    distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or: of sliding")
-    time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or: how long")
+    cycles: Annotated[int, Field(ge=1, strict=True)] | None = Field(
+        default=None, description="length of the step in cycles"
+    )
+    distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or its sliding distance")
+    time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or its time")
     load: _ramp(Annotated[Force, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="normal force, its mean over a cycle: all loads of the case change in its proportion"
+        default=None, description="normal force, its mean over a cycle; all loads of the case change in this proportion"
     )
     load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="or: all loads of the case times this"
+        default=None, description="or a factor of all loads of the case"
     )
     load_factors: dict[str, Annotated[Number, Field(gt=0)]] | None = Field(
         default=None,
-        description="or: single loads of the case by the group that they act on, each times a factor of its own",
+        description="or factors of single loads of the case, by the group that they act on",
     )
     speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of one-way sliding; 0: a rest"
+        default=None, description="speed of one-way sliding; 0: a rest"
     )
     angular_speed: _ramp(Annotated[AngularFrequency, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of a rotation; 0: a rest"
+        default=None, description="angular speed of a rotation; 0: a rest"
     )
     amplitude: _ramp(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of reciprocating sliding"
+        default=None, description="amplitude of reciprocating sliding"
     )
     angular_frequency: _ramp(Annotated[AngularFrequency, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of reciprocating sliding or an oscillation"
+        default=None, description="angular frequency of reciprocating sliding or an oscillation"
     )
     period: _ramp(Annotated[Time, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="or: of a whole cycle"
+        default=None, description="or the period of a whole cycle"
     )
     motion: Cycle | None = Field(
         default=None,
-        description="of a cycle that is a table: another one from here on, with kind = 'cycle' and all that it has",
+        description="another table of a cycle from here on, with kind = 'cycle' and its keys",
     )
     ambient: _ramp(Temperature) = Field(  # type: ignore[valid-type]
-        default=None, description="heat.ambient"
+        default=None, description="temperature of the surroundings, heat.ambient"
     )
 
     one_of = (("cycles", "distance", "time"),)
@@ -118,13 +122,13 @@ class ProgramStep(Part):
 class Program(Part):
     """A test program: steps one after the other. What a step does not name stays as it was."""
 
-    steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="in their order")
+    steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="steps in their order")
     radius: Annotated[Length, Field(gt=0)] | None = Field(
-        default=None, description="of the wear track, at which a distance is slid where the strip turns"
+        default=None, description="radius of the wear track, for sliding distances where the strip turns"
     )
     levels: Annotated[int, Field(ge=1, le=10000, strict=True)] = Field(
         default=20,
-        description="that a ramp of motion or ambient temperature is cut into; loads change continuously",
+        description="number of levels of a ramp of motion or ambient temperature; loads change continuously",
     )
 
 
@@ -133,10 +137,10 @@ class Output(Part):
 
     every: Annotated[int, Field(ge=1, strict=True)] = Field(
         default=1,
-        description="keep every k-th cycle in history.nc, and always the last one; with jumps each one computed",
+        description="keep every k-th cycle in history.nc, and always the last cycle; with jumps each computed cycle",
     )
     fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
-        default=None, description="half-cycles whose fields are written; by default the last one, [] for none"
+        default=None, description="half-cycles whose fields are written; by default the last, [] for none"
     )
     checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
     report: bool = Field(default=True, description="draw figures and report.html when the run has ended")
@@ -155,5 +159,5 @@ class Setup(Part):
 
     reproducible: bool = Field(
         default=False,
-        description="results equal to the last bit on any number of ranks: each body is on one, so that two work",
+        description="results equal to the last bit on any number of ranks: each body is on one rank, so that two work",
     )

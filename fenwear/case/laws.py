@@ -107,14 +107,14 @@ class Dependence(_State):
         | None
     ) = Field(
         default=None,
-        description="of each material region of the body, of the punch for friction: a number, or a table with "
+        description="value of each material region of the body, of the punch for friction: a number, or a table with "
         "expression or table; all in the same unit",
     )
     law: Annotated[str, AfterValidator(_registered)] | None = Field(
         default=None, description="name of a law registered in Python"
     )
     unit: str = Field(
-        default="", description="unit of the values; by default that of the key's bare numbers, which is told"
+        default="", description="unit of the values; by default that of the key's bare numbers, which commands report"
     )
 
     one_of = (tuple(FORMS),)
@@ -299,11 +299,12 @@ class Stick(Part):
 
     force: Annotated[Force, Field(gt=0)] | None = Field(
         default=None,
-        description="largest tangential force on the strip, which then follows the course of the motion in place of "
-        "its displacement",
+        description="largest tangential force on the strip; it follows the course of the motion in place of the "
+        "displacement",
     )
     bulk_stress: Stress = Field(
-        default=0.0, description="largest bulk stress along x in the strip, as in fretting fatigue, with the motion"
+        default=0.0,
+        description="largest bulk stress along x in the strip, as in fretting fatigue; it follows the motion",
     )
     bulk_over_cycle: OverCycle | None = Field(
         default=None,
@@ -311,15 +312,15 @@ class Stick(Part):
         "motion",
     )
     steps: Annotated[int, Field(ge=2, le=1000, strict=True)] = Field(
-        default=20, description="time steps of a half-cycle, at least"
+        default=20, description="smallest number of time steps of a half-cycle"
     )
     step_tolerance: Annotated[Number, Field(gt=0)] = Field(
         default=0.02,
-        description="change of force and friction's work of the first cycle by which the steps are fine enough; they "
-        "are doubled until then",
+        description="change of force and friction work of the first cycle below which the steps are fine enough; "
+        "their number doubles until then",
     )
     load_steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
-        default=5, description="in which the loads rise at the start"
+        default=5, description="steps in which the loads rise at the start"
     )
 
 
@@ -330,32 +331,32 @@ class Coating(Part):
     """A coating above the base of a body: it wears by its own coefficient until it is worn through at a place."""
 
     thickness: of_place(Annotated[Length, Field(ge=0)], "mm") = Field(  # type: ignore[valid-type]
-        description="above the base, on the body's own material; of the place where it is uneven; 0 where there is none"
+        description="thickness above the base, on the body's own material; a function of the place where it is "
+        "uneven; 0 without a coating"
     )
     coefficient: Annotated[float | None, Unit("")] = Field(
-        default=None, description="beta~ of the coating, in the unit of that of the base, whose exponents it has"
+        default=None, description="beta~ of the coating, in the unit and with the exponents of the base"
     )
     archard: Annotated[Number, Field(gt=0)] | None = Field(default=None, description="K of the coating")
     hardness: Hardness | None = Field(default=None, description="H of the coating, with archard")
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(gt=0)] | None = Field(
-        default=None, description="volume of the coating worn over the energy of friction"
+        default=None, description="worn volume of the coating over the energy of friction"
     )
     per_area: Annotated[Number, Field(gt=0)] | None = Field(
         default=None, description="k_A of the coating, depth over length wherever surfaces touch; above any base"
     )
     touching_from: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None,
-        description="with per_area: pressure from which on a place of the coating counts as touching; by default that "
-        "of the base",
+        description="with per_area: pressure above which a place of the coating touches; by default that of the base",
     )
     modulus: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None,
-        description="M of a coating that gives way beside the base: of c that is left c (1 - exp(-p / M)) is closed; "
-        "E (1 - nu) / ((1 + nu) (1 - 2 nu)) of a thin coating; by default it gives way no more than its base",
+        description="M of a compliant coating: its remaining thickness c closes by c (1 - exp(-p / M)); E (1 - nu) / "
+        "((1 + nu) (1 - 2 nu)) of a thin coating; by default as stiff as its base",
     )
     friction: Annotated[Number, Field(ge=0)] | None = Field(
         default=None,
-        description="mu of the coating, which over its last tenth goes over to contact.friction; by default that",
+        description="mu of the coating, which changes to contact.friction over its last tenth; by default that",
     )
 
     one_of = (COEFFICIENTS,)
@@ -398,31 +399,37 @@ class WearLaw(Part):
     coefficient: constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
     )
-    beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")
-    archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
+    beta: Annotated[float | None, Unit("")] = Field(
+        default=None, description="beta in the same unit; beta~ = beta mu^b"
+    )
+    archard: Annotated[Number, Field(ge=0)] | None = Field(
+        default=None, description="Archard's K; beta~ = K / hardness"
+    )
     hardness: Hardness | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
-        default=None, description="volume worn over the energy of friction; beta~ = energy mu"
+        default=None, description="worn volume over the energy of friction; beta~ = energy mu"
     )
     per_area: constant_or_dependence(Annotated[Number | None, Field(ge=0)], "") = Field(  # type: ignore[valid-type]
         default=None,
-        description="k_A, depth worn over the length slid wherever surfaces touch, whatever the pressure, as of "
+        description="k_A, worn depth over the sliding length wherever surfaces touch, whatever the pressure, as of "
         "polyethylene; in place of a law of the pressure",
     )
     touching_from: Annotated[Stress, Field(gt=0)] = Field(
         default=0.1,
-        description="with per_area: pressure from which on a place counts as touching; below it in proportion",
+        description="with per_area: pressure above which a place touches; below it the wear is proportional to the "
+        "pressure",
     )
-    pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="exponent b of the pressure")
     pressure_threshold: Annotated[Stress, Field(ge=0)] = Field(
-        default=0.0, description="p_0: nothing wears below it, and above it (p - p_0)^b does"
+        default=0.0, description="p_0, below which nothing wears; above it the wear follows (p - p_0)^b"
     )
     pressure_cap: Annotated[Stress, Field(gt=0)] | None = Field(
-        default=None, description="such as the hardness: more pressure than it wears no more"
+        default=None, description="pressure above which wear grows no more, such as the hardness"
     )
-    speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
+    speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="exponent a of the speed")
     coating: Coating | None = Field(
-        default=None, description="above this base, which wears where it is worn through; by default none"
+        default=None,
+        description="coating above this base, which wears where the coating is worn through; by default none",
     )
 
     @staticmethod

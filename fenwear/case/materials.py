@@ -42,10 +42,10 @@ class Material(Part):
         default=None, description="thermal conductivity k; 1 W/(m K) = 1"
     )
     heat_capacity: _of_temperature(_HeatCapacity, "heat_capacity") = Field(  # type: ignore[valid-type]
-        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
+        default=None, description="specific heat capacity c; 1 J/(kg K) = 1e6: better give the unit"
     )
     density: Annotated[float, *quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
-        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
+        default=None, description="density rho; 1 kg/m³ = 1e-12: better give the unit"
     )
     expansion: _of_temperature(_Expansion, "expansion") = Field(  # type: ignore[valid-type]
         default=None,
@@ -53,7 +53,8 @@ class Material(Part):
     )
 
     yield_stress: Annotated[Stress, Field(gt=0)] | None = Field(
-        default=None, description="in tension; where it is given pressures beyond the shakedown limit are told"
+        default=None,
+        description="yield stress in tension; with it commands report pressures beyond the shakedown limit",
     )
 
     @property
@@ -88,8 +89,12 @@ class Material(Part):
 class Retarded(Part):
     """One term of the compliance, compliance (1 - exp(-t / time)), a spring and a dashpot side by side (Kelvin)."""
 
-    compliance: Annotated[Number, Field(ge=0)] = Field(description="that it comes to in the end, over the one at once")
-    time: Annotated[Time, Field(gt=0)] = Field(description="retardation time, after which 1 - 1/e of it is there")
+    compliance: Annotated[Number, Field(ge=0)] = Field(
+        description="final growth of the compliance, over the instantaneous compliance"
+    )
+    time: Annotated[Time, Field(gt=0)] = Field(
+        description="retardation time, after which 1 - 1/e of the growth has occurred"
+    )
 
 
 class Creep(Part):
@@ -98,12 +103,12 @@ class Creep(Part):
     J(t) / J(0) = 1 + sum of compliance (1 - exp(-t / time)) + per_decade log10(1 + t / onset).
     """
 
-    terms: tuple[Retarded, ...] = Field(default=(), description="terms that each come to an end (Prony's series)")
+    terms: tuple[Retarded, ...] = Field(default=(), description="terms of bounded growth (Prony's series)")
     per_decade: Annotated[Number, Field(gt=0)] | None = Field(
-        default=None, description="growth for each decade of time, over the compliance at once, without an end"
+        default=None, description="growth for each decade of time, over the instantaneous compliance, without a bound"
     )
     onset: Annotated[Time, Field(gt=0)] | None = Field(
-        default=None, description="time from which on it grows with the logarithm of time, with per_decade"
+        default=None, description="time after which it grows with the logarithm of time, with per_decade"
     )
 
     together = (("per_decade", "onset"),)

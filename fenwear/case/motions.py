@@ -193,8 +193,8 @@ class _Along(Part):
 
     axis: Literal["x", "y"] = Field(
         default="x",
-        description="x: along the contact; y: out of the plane, "
-        "as of bodies that are endless along y: with heat, no cold material comes in",
+        description="direction of sliding, x: along the contact; y: out of the plane, with bodies that are endless "
+        "along y: with heat, no cold material enters",
     )
     along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
 
@@ -207,7 +207,7 @@ class _Along(Part):
 class _About(Part):
     """What rotations of the strip share."""
 
-    axis: Vector = Field(default=(0.0, 0.0, 1.0), description="of the rotation")
+    axis: Vector = Field(default=(0.0, 0.0, 1.0), description="axis of the rotation")
     centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")
 
     checks = (Check(lambda s: not any(s.axis), "axis: expected a direction, got zero"),)
@@ -216,9 +216,9 @@ class _About(Part):
 class _ToAndFro(Part):
     positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
         default=None,
-        description="of the strip under the punch in each half-cycle; 1: opposite each other throughout; "
-        "by default 1 unless the strip wears or has a profile or topography, then as many as contact "
-        "nodes ask for, 9 to 61; on grids and with heat 9",
+        description="positions of the strip under the punch in each half-cycle; 1: opposite each other throughout; by "
+        "default 1 unless the strip wears or has a profile or topography, then as many as contact nodes "
+        "require, 9 to 61; on grids and with heat 9",
     )
 
 
@@ -230,14 +230,14 @@ class _Profile(_ToAndFro):
     """
 
     angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = Field(
-        default=None, description="omega; a half-cycle takes pi / omega"
+        default=None, description="angular frequency omega; a half-cycle takes pi / omega"
     )
     period: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or the time of a whole cycle")
     profile: Literal["sinusoidal", "triangular", "trapezoidal"] = Field(
-        default="sinusoidal", description="speed over a half-cycle; triangular: constant speed"
+        default="sinusoidal", description="course of the speed over a half-cycle; triangular: constant speed"
     )
     ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = Field(
-        default=None, description="trapezoidal: fraction of the half-cycle in which the speed rises, and falls"
+        default=None, description="with trapezoidal: fraction of the half-cycle in which the speed rises, and falls"
     )
 
     one_of = (("angular_frequency", "period"),)
@@ -272,9 +272,9 @@ class OneWay(_Along):
     """Steady sliding in one direction, counted in steps of `duration`."""
 
     kind: Literal["one-way"] = Field(description="steadily in one direction")
-    direction: Literal["leftward", "rightward"] = Field(description="of the strip")
-    speed: Annotated[Speed, Field(gt=0)] = Field(description="of the strip")
-    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
+    direction: Literal["leftward", "rightward"] = Field(description="direction of the strip")
+    speed: Annotated[Speed, Field(gt=0)] = Field(description="speed of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="duration of a step, which counts as a half-cycle")
     track: Annotated[Length, Field(gt=0)] | None = Field(
         default=None, description="length of the closed track over which the strip's wear spreads"
     )
@@ -285,18 +285,22 @@ class Rotation(_About):
 
     kind: Literal["rotation"] = Field(description="turning steadily")
     direction: Literal["counterclockwise", "clockwise"] = Field(
-        default="counterclockwise", description="seen against the axis"
+        default="counterclockwise", description="direction seen against the axis"
     )
-    angular_speed: Annotated[AngularFrequency, Field(gt=0)] = Field(description="of the strip")
-    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
+    angular_speed: Annotated[AngularFrequency, Field(gt=0)] = Field(description="angular speed of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="duration of a step, which counts as a half-cycle")
 
 
 class Tabulated(_Along, _ToAndFro):
     """The strip's position over one cycle, straight lines between the given times; every stroke is a half-cycle."""
 
     kind: Literal["table"] = Field(description="the strip's position over a cycle")
-    times: Annotated[tuple[Time, ...], Field(min_length=3)] = Field(description="rising from 0 to the cycle's end")
-    displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(description="of the strip, towards +x")
+    times: Annotated[tuple[Time, ...], Field(min_length=3)] = Field(
+        description="times from 0 to the cycle's end, rising"
+    )
+    displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(
+        description="displacements of the strip, towards +x"
+    )
 
     checks = (
         Check(
@@ -321,11 +325,15 @@ NO_PLACE = {  # beginnings of columns of a cycle that a model has no place for
 class CycleLoad(Part):
     """Where the force and the moment of a cycle's table act on the punch."""
 
-    on: str = Field(description="group of the geometry that force and moment are spread over")
-    through: Point | None = Field(default=None, description="point that the force acts through; else the centroid")
-    factor: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="of all forces and moments of the table")
+    on: str = Field(description="group of the geometry over which force and moment are spread")
+    through: Point | None = Field(
+        default=None, description="point through which the force acts; by default the centroid"
+    )
+    factor: Annotated[Number, Field(gt=0)] = Field(
+        default=1.0, description="factor of all forces and moments of the table"
+    )
     frame: Literal["space", "punch"] = Field(
-        default="space", description="space: force and moment stand in space; punch: they turn with the punch"
+        default="space", description="space: force and moment are fixed in space; punch: they turn with the punch"
     )
 
 
@@ -335,24 +343,25 @@ class Cycle(Part):
     kind: Literal["cycle"] = Field(description="a table of places and loads over a cycle")
     columns: Annotated[tuple[str, ...], Field(min_length=2)] = Field(
         description="headings with units: time (s), or percent of the cycle; shift_x (mm), and rotation_x (rad) of a "
-        "rotation vector or angle_x (deg) in an order, of the strip; the same of the punch as punch_shift_x; force_x "
-        "(N) and moment_x (N*mm) on the punch. In place of columns and rows file = a CSV file"
+        "rotation vector or angle_x (deg) in an order, of the strip; punch_shift_x and so on of the "
+        "punch; force_x (N) and moment_x (N*mm) on the punch. In place of columns and rows file = a CSV "
+        "file"
     )
     rows: Annotated[tuple[tuple[Number, ...], ...], Field(min_length=2)] = Field(
-        description="numbers under the headings; the last row has the place of the first"
+        description="numbers below the headings; the last row has the position of the first"
     )
-    period: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="of the cycle, with percent")
+    period: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="period of the cycle, with percent")
     order: Annotated[str, Field(pattern=r"^(?:[xyz]{1,3}|[XYZ]{1,3})$")] = Field(
         default="xyz",
-        description="of angles: about which axes the body is turned first, second, third: XYZ those that turn along, "
-        "xyz those of space",
+        description="order of angles: the axes of the first, second and third turn; XYZ turn with the body, xyz are "
+        "fixed in space",
     )
-    centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="point that bodies turn about")
-    load: CycleLoad | None = Field(default=None, description="where force and moment act")
+    centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="point about which bodies turn")
+    load: CycleLoad | None = Field(default=None, description="place of force and moment")
     positions: Literal["middle", "steps"] | None = Field(
         default=None,
-        description="middle: the strip's material stays where it is meshed; steps: it moves, in each step to its "
-        "place in the middle of it; by default middle unless the strip wears or is uneven",
+        description="middle: the strip's material stays at its place in the mesh; steps: it moves, in each step to "
+        "its place in the middle of it; by default middle unless the strip wears or is uneven",
     )
 
     @model_validator(mode="after")

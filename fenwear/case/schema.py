@@ -63,22 +63,24 @@ NOTHING_GIVEN = Given()
 class Case(Part):
     """A problem: the root of the case file."""
 
-    title: str = Field(default="", description="shown with the results")
+    title: str = Field(default="", description="title in the results")
     geometry: Geometry = Field(default=Geometry(), description="the meshes")
-    model: Model = Field(default=Model(), description="of the plane")
-    materials: Annotated[dict[str, Material], Field(min_length=1)] = Field(description="by their names")
+    model: Model = Field(default=Model(), description="kind and thickness of the model")
+    materials: Annotated[dict[str, Material], Field(min_length=1)] = Field(description="materials by their names")
     punch: Body = Field(description="the body above, body 1")
     strip: Body = Field(description="the body below, which slides, body 2")
-    grid: Grid | None = Field(default=None, description="contact nodes of its own, finer than the mesh")
-    contact: Contact = Field(default=Contact(), description="between the two")
-    stick: Stick = Field(default=Stick(), description="of contact with stick: what the rig imposes, time steps")
-    wear: Wear = Field(description="of punch, strip or both")
-    motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
-    heat: Heat | None = Field(default=None, description="without this table there is no temperature")
-    program: Program | None = Field(default=None, description="loads, motion and ambient temperature that change")
-    setup: Setup = Field(default=Setup(), description="how the bodies are condensed, and by which ranks")
-    run: Run = Field(description="how far, and how")
-    output: Output = Field(default=Output(), description="what is kept")
+    grid: Grid | None = Field(default=None, description="contact grid, finer than the mesh")
+    contact: Contact = Field(default=Contact(), description="contact between the two bodies")
+    stick: Stick = Field(default=Stick(), description="contact with stick: load of the rig, time steps")
+    wear: Wear = Field(description="wear of punch, strip or both")
+    motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="motion of the strip under the punch")
+    heat: Heat | None = Field(default=None, description="heat; without this table there is no temperature")
+    program: Program | None = Field(default=None, description="course of loads, motion and ambient temperature")
+    setup: Setup = Field(
+        default=Setup(), description="condensation of the bodies, and division of this work among ranks"
+    )
+    run: Run = Field(description="length and method of the run")
+    output: Output = Field(default=Output(), description="results to keep")
 
     def __repr__(self) -> str:
         """Say in a line what it is; `to_toml` has all of it."""

@@ -46,16 +46,16 @@ class Track(Part):
     """The rest of a disc or ring whose material passes under the punch, warms up and comes back."""
 
     volume: Annotated[float, *quantity("mm^3"), Field(ge=0)] = Field(
-        default=0.0, description="of what is not meshed: its heat capacity is that of the strip's material"
+        default=0.0, description="volume outside the mesh; its heat capacity is that of the strip's material"
     )
     area: Annotated[float, *quantity("mm^2"), Field(ge=0)] = Field(
-        default=0.0, description="of its free surface, which loses heat by heat.convection"
+        default=0.0, description="free surface of that volume, which loses heat by heat.convection"
     )
     heat_capacity: Annotated[float, *quantity("N*mm/K"), Field(ge=0)] = Field(
-        default=0.0, description="of what is not meshed, in place of volume; 1 J/K = 1000"
+        default=0.0, description="heat capacity outside the mesh, in place of volume; 1 J/K = 1000"
     )
     loss: Annotated[float, *quantity("N*mm/(s*K)"), Field(ge=0)] = Field(
-        default=0.0, description="to the surroundings, beside that of area; 1 W/K = 1000"
+        default=0.0, description="heat loss to the surroundings, in addition to that of area; 1 W/K = 1000"
     )
 
     checks = (
@@ -69,45 +69,49 @@ class Heat(Part):
     partition: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=0.5, description="kappa, the punch's share of the friction heat"
     )
-    debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
+    debris: Annotated[Number, Field(ge=0, lt=1)] = Field(
+        default=0.0, description="gamma_d, share of the heat that debris carries off"
+    )
     conductance: PerfectOrConductance = Field(
         default="perfect",
-        description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; "
-        "by default 0 where partition is given; that of the asperities of contact.layer by 'layer'",
+        description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; by default 0 where partition "
+        "is given; 'layer': that of the asperities of contact.layer",
     )
     conductance_per_pressure: tuple[Annotated[float, *quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
     )
     conducting: Literal["closed", "nominal"] = Field(
-        default="closed", description="the nodes that conduct: those in contact, or the whole nominal interface"
+        default="closed", description="nodes that conduct: those in contact, or the whole nominal interface"
     )
     convection: Annotated[Conductance, Field(ge=0)] = Field(
         default=0.0, description="h on all other boundaries and on the two faces of the plane model, 1 W/(m² K) = 0.001"
     )
-    convecting_faces: bool = Field(default=True, description="whether the faces of the plane model convect, too")
-    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings, from any zero")
+    convecting_faces: bool = Field(default=True, description="whether the faces of the plane model also convect")
+    ambient: Temperature = Field(default=0.0, description="temperature theta_a of the surroundings, from any zero")
     inflow: Temperature | None = Field(
         default=None,
-        description="of the strip's material that enters through free ends, sliding one way; by default the ambient",
+        description="temperature of the strip's material that enters through free ends, sliding one way; by default "
+        "the ambient",
     )
     track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
-    initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
+    initial: Temperature = Field(default=0.0, description="temperature at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] | None = Field(
         default=None,
-        description="in each half-cycle; by default as many as step_tolerance asks for, or where nothing passes 5",
+        description="time steps of each half-cycle; by default as many as step_tolerance requires, or 5 where nothing "
+        "passes",
     )
     step_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.005,
-        description="change of contact temperatures by halving the steps, relative, to which they are chosen",
+        description="largest relative change of contact temperatures by halving the steps",
     )
     coupling: Literal["implicit", "split"] = Field(
-        default="implicit", description="heat and contact together, or in turn by the operator split"
+        default="implicit", description="solution of heat and contact: together, or in turn by the operator split"
     )
     split_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=1e-4, description="change of the gap volume that ends the operator split, equation (30)"
     )
     relaxation: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.5, description="of the pressure in the operator split, equation (29)"
+        default=0.5, description="relaxation of the pressure in the operator split, equation (29)"
     )
     operator: Literal["reduced", "full"] = Field(
         default="reduced", description="temperatures on a small basis, or on the whole mesh"
@@ -122,17 +126,17 @@ class Heat(Part):
 
     property_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.02,
-        description="change of a material's property with the temperature, over itself, after which the bodies are "
-        "made anew with it",
+        description="relative change of a material's property with the temperature after which the bodies are "
+        "assembled again",
     )
     # Finer than 1e-8 the basis, found by squares, would be made of rounding.
     reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
-        default=3e-5, description="of the reduced operator's basis, relative"
+        default=3e-5, description="relative tolerance of the reduced operator's basis"
     )
     reduction_difference: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=2e-3,
-        description="of contact temperatures and thermal gap from those of the whole mesh, relative: over it the "
-        "basis is enlarged, and then a run warns",
+        description="largest relative difference of contact temperatures and thermal gap from those of the whole "
+        "mesh: above it the basis is enlarged, and then a run warns",
     )
 
     @model_validator(mode="before")

@@ -61,7 +61,7 @@ class _State(Part):
         "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
     )
     table: Annotated[Pairs, rising("at least two pairs [argument, value] with rising arguments")] | None = Field(
-        default=None, description="[argument, value] pairs; beyond its ends the end values hold"
+        default=None, description="[argument, value] pairs; the end values hold beyond the ends"
     )
     of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm"] = Field(
         default="T", description="argument of the table"

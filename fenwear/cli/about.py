@@ -28,7 +28,7 @@ def info_command(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Print the versions of the stack and the built-in cases; explain a key of cases; or list what a file has."""
+    """Print the versions of the stack and the built-in cases; explain a key of cases; or list the content of a file."""
     from fenwear.bodies import kept
     from fenwear.bodies.ready import ready_geometries
     from fenwear.case.keys import find_keys

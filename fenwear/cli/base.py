@@ -43,11 +43,11 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help='Override a key: --set motion.amplitude="2 mm"; take one away: --set unset=heat.inflow',
+        help='Override a key: --set motion.amplitude="2 mm"; remove a key: --set unset=heat.inflow',
         autocompletion=suggestions.settings,
     ),
 ]
-FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Ignore the set-ups that earlier runs have kept on disk.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Remove the results in the folder of -o first.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 

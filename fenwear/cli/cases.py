@@ -46,7 +46,7 @@ WARNING = "warning: "
 @app.callback(invoke_without_command=True)
 def main(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and end.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     """Run the built-in Example 1 where no command is given."""
     if version:
@@ -60,9 +60,9 @@ def run(
     case: CaseArgument = DEFAULT_CASE,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
     settings: SetOption = [],  # noqa: B006  (typer wants a list)
-    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Print a line of progress for every block.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print errors only.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume from the checkpoint in the folder.")] = False,
     overwrite: OverwriteOption = False,
     fresh: FreshOption = False,
     as_json: JsonOption = False,
@@ -96,15 +96,15 @@ def check_command(
     case: CaseArgument,
     settings: SetOption = [],  # noqa: B006
     accuracy: Annotated[
-        bool, typer.Option("--accuracy", help="Estimate how uncertain the numbers of the run will be.")
+        bool, typer.Option("--accuracy", help="Estimate the numerical uncertainty of the run.")
     ] = False,
     full: Annotated[bool, typer.Option("--full", help="Print the case with all defaults, as a case file.")] = False,
     heat_seconds: Annotated[
-        float, typer.Option("--heat-seconds", help="How long it may take to look at the heat.")
+        float, typer.Option("--heat-seconds", help="Longest time for the checks of the heat.")
     ] = HEAT_SECONDS,
     as_json: JsonOption = False,
 ) -> None:
-    """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
+    """Validate a case with its geometry, and print its size, its free motions and warnings."""
     if not as_json:
         _check(case, settings, heat_seconds, accuracy=accuracy, full=full)
         return
@@ -239,7 +239,7 @@ def new_command(
         str | None,
         typer.Argument(
             metavar="TEST",
-            help="Such as block-on-ring; without it all are listed.",
+            help="Name of a test, such as block-on-ring; without it all tests are listed.",
             autocompletion=suggestions.tests,
         ),
     ] = None,
@@ -249,9 +249,9 @@ def new_command(
     settings: Annotated[
         list[str], typer.Option("--set", metavar="DIMENSION=VALUE", help='A dimension: --set load="50 N"; repeatable.')
     ] = [],  # noqa: B006
-    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and end.")] = False,
+    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and exit.")] = False,
 ) -> None:
-    """Write a commented case of a usual test, with its dimensions, to go on from."""
+    """Write a commented case of a usual test, with its dimensions."""
     from fenwear.case.templates import all_text, dimensions_text, write_case_of
 
     if template is None:
@@ -304,9 +304,13 @@ def import_command(
     output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
     groups: Annotated[
         list[str],
-        typer.Option("--group", metavar="GROUP=SET", help="Such as punch_contact=PAD_LOW; may be repeated."),
+        typer.Option(
+            "--group",
+            metavar="GROUP=SET",
+            help="Name in the file of a group, such as punch_contact=PAD_LOW; repeatable.",
+        ),
     ] = [],  # noqa: B006
-    unit: Annotated[str | None, typer.Option(help="Of the file's lengths, such as m; by default mm.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of the file's lengths, such as m; by default mm.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a mesh of another program, or a shape from CAD, as a .msh file; geometry.file takes both without it."""

@@ -15,9 +15,13 @@ from fenwear.parallel import on_root
 @app.command("plot")
 def plot_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
-    formats: Annotated[str, typer.Option("--format", help="Of the figures: png, pdf, svg, with commas.")] = "png",
-    width: Annotated[str, typer.Option(help='Of the figures, such as "85 mm" for a column of a paper.')] = "178 mm",
-    axis: Annotated[str, typer.Option(help="What a run is drawn over: cycles, distance or time.")] = "cycles",
+    formats: Annotated[
+        str, typer.Option("--format", help="Formats of the figures: png, pdf, svg, with commas.")
+    ] = "png",
+    width: Annotated[
+        str, typer.Option(help='Width of the figures, such as "85 mm" for a column of a paper.')
+    ] = "178 mm",
+    axis: Annotated[str, typer.Option(help="Horizontal axis of the figures: cycles, distance or time.")] = "cycles",
 ) -> None:
     """Draw a run: figures with captions, pictures of the bodies and report.html, into its folder."""
     from fenwear.report.chosen import chosen_formats, chosen_look
@@ -36,10 +40,13 @@ def export_command(
         Path | None, typer.Option("-o", "--output", help="The folder of the CSV files; by default DIR/export.")
     ] = None,
     at: Annotated[
-        str, typer.Option(metavar="NUMBERS", help="Kept half-cycles of the profiles, first and last too, with commas.")
+        str,
+        typer.Option(
+            metavar="NUMBERS", help="Kept half-cycles of the profiles, with commas; first and last are allowed."
+        ),
     ] = "first,last",
     worn: Annotated[
-        bool, typer.Option("--worn", help="The worn surfaces at one half-cycle instead: profile, STL and VTK.")
+        bool, typer.Option("--worn", help="Write the worn surfaces at one half-cycle instead: profile, STL and VTK.")
     ] = False,
 ) -> None:
     """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
@@ -70,7 +77,7 @@ def flash_command(
     ] = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Tell how hot the contact of a run on a grid gets: flash temperatures by moving sources, one way."""
+    """Compute flash temperatures of a run on a contact grid, by moving sources."""
     from fenwear.flash.temperatures import flash_temperatures
     from fenwear.flash.told import dataset, numbers, text
     from fenwear.report.draw import DPI
@@ -105,7 +112,7 @@ def compare_command(
     ),
     as_json: JsonOption = False,
 ) -> None:
-    """Put several runs in one figure and one table, with the differences of their cases."""
+    """Compare several runs in one figure and one table, with the differences of their cases."""
     from fenwear.report.compare import compare, draw_comparison
 
     comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))

@@ -25,12 +25,12 @@ def shape_command(
         typer.Option(
             "--load",
             metavar="FACTOR[:SHARE]",
-            help="Of all loads of the case, and its share of the sliding; repeatable, for loads that take turns.",
+            help="Factor of all loads, and its share of the sliding; repeatable, for loads that take turns.",
         ),
     ] = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Find the shape to machine: that of the steady state, of a program in its last step. Nothing is left to run in."""
+    """Find the shape to machine: that of the steady state (of a program: in its last step), without run-in."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.assembly.variants import with_case
     from fenwear.cycle import held

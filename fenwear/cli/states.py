@@ -26,7 +26,7 @@ StepOption = Annotated[
     typer.Option(
         "--step",
         min=1,
-        help="Of a test program: the step whose end acts for ever, counted from 1; by default the last.",
+        help="Step of a test program whose end is held constant, counted from 1; by default the last.",
     ),
 ]
 
@@ -43,7 +43,8 @@ def steady_command(
     fresh: FreshOption = False,
     as_json: JsonOption = False,
     accuracy: Annotated[
-        bool, typer.Option("--accuracy", help="Estimate how uncertain its largest pressures and temperature are.")
+        bool,
+        typer.Option("--accuracy", help="Estimate the numerical uncertainty of the largest pressures and temperature."),
     ] = False,
 ) -> None:
     """Solve for the cyclic steady state directly."""

@@ -25,13 +25,15 @@ from fenwear.errors import CaseError, InputError, StackError
 
 QuantitiesOption = Annotated[
     list[str],
-    typer.Option("--of", metavar="QUANTITY", help='Such as largest_depth, "steady largest_pressure"; may be repeated.'),
+    typer.Option(
+        "--of", metavar="QUANTITY", help='Quantity, such as largest_depth, "steady largest_pressure"; may be repeated.'
+    ),
 ]
 OutputOption = Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")]
-OnlyOption = Annotated[list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")]
-ListOption = Annotated[bool, typer.Option("--list", help="Print the names of the cases and end.")]
+OnlyOption = Annotated[list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; repeatable.")]
+ListOption = Annotated[bool, typer.Option("--list", help="Print the names of the cases and exit.")]
 KeysOption = Annotated[
-    list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
+    list[str], typer.Option("--to", metavar="KEY", help="Key, such as wear.punch.coefficient; repeatable.")
 ]
 
 
@@ -42,7 +44,7 @@ def verify_command(
     list_cases: ListOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
+    """Solve problems with known answers, and compare: a table, a page, and exit status 1 where they differ."""
     verification = _beside("command")
     cases, paper = verification.choose(only)
     if list_cases:
@@ -64,7 +66,7 @@ def validate_command(
     output: OutputOption = None,
     only: OnlyOption = [],  # noqa: B006
     list_cases: ListOption = False,
-    short: Annotated[bool, typer.Option("--short", help="On coarse meshes: a fifth of the time.")] = False,
+    short: Annotated[bool, typer.Option("--short", help="Use coarse meshes, in a fifth of the time.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compute measured experiments and compare: numbers with their uncertainty, and a figure of each."""
@@ -109,7 +111,9 @@ def sensitivity_command(
     quantities: QuantitiesOption,
     keys: KeysOption,
     spread: Annotated[float, typer.Option(help="Relative change of the keys in the tornado plot; 0 for none.")] = 0.1,
-    differences: Annotated[bool, typer.Option("--differences", help="By differences of runs throughout.")] = False,
+    differences: Annotated[
+        bool, typer.Option("--differences", help="Take all derivatives by differences of runs.")
+    ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
@@ -130,20 +134,22 @@ def calibrate_command(
     case: CaseArgument,
     data: Annotated[list[Path], typer.Argument(metavar="DATA.csv...", help="Files of measurements.")],
     unknowns: Annotated[
-        list[str], typer.Option("--unknown", metavar="KEY[=LOW..HIGH]", help="A key to find; may be repeated.")
+        list[str], typer.Option("--unknown", metavar="KEY[=LOW..HIGH]", help="Key to find; repeatable.")
     ],
     baseline: Annotated[
-        list[str], typer.Option(metavar="NAME", help="offset or tilt of each trace, to find too; may be repeated.")
+        list[str], typer.Option(metavar="NAME", help="Also find the offset or tilt of each trace; repeatable.")
     ] = [],  # noqa: B006
     each: Annotated[
         bool, typer.Option("--each", help="Fit every file alone, and print the scatter between them.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Take the trials of an interrupted fit in -o DIR.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Resume an interrupted fit from its trials in -o DIR.")
+    ] = False,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Find keys of the case from measurements, with standard errors and what the data cannot tell."""
+    """Fit keys of the case to measurements, with standard errors and what the data cannot determine."""
     from fenwear.life import commands
 
     loaded = load(case, settings)
@@ -184,15 +190,15 @@ def life_command(
     calibration: Annotated[
         Path | None, typer.Option("--from", metavar="DIR", help="Folder of a calibration whose result scatters.")
     ] = None,
-    samples: Annotated[int, typer.Option(help="Size of the sample: so many runs.")] = 200,
-    seed: Annotated[int, typer.Option(help="Of the sample.")] = 0,
-    wanted: Annotated[str | None, typer.Option(help='A life whose reliability is asked for: "1e6 cycles".')] = None,
+    samples: Annotated[int, typer.Option(help="Number of samples; each is a run.")] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the sample.")] = 0,
+    wanted: Annotated[str | None, typer.Option(help='Life whose reliability is computed: "1e6 cycles".')] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the samples in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume with the samples in the folder.")] = False,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
-    """Print how long until a level: one life, or with --scatter the distribution of the lives of many parts."""
+    """Print the life until a level, or with --scatter the distribution of the lives of many parts."""
     from fenwear.life import commands
 
     loaded = load(case, settings)
@@ -208,14 +214,20 @@ def sweep_command(
     case: CaseArgument,
     over: Annotated[
         list[str],
-        typer.Option(metavar="KEY=VALUES", help="0.1:0.3:9 is nine values; or a list: 10 mm,12 mm; may be repeated."),
+        typer.Option(
+            metavar="KEY=VALUES", help="Key and values: 0.1:0.3:9 is nine values; or a list: 10 mm,12 mm; repeatable."
+        ),
     ] = [],  # noqa: B006
-    of: Annotated[str, typer.Option(metavar="WHAT", help="steady, optimum or run.")] = "steady",
-    zipped: Annotated[bool, typer.Option("--zip", help="First values together, second ones, and so on.")] = False,
+    of: Annotated[str, typer.Option(metavar="WHAT", help="Result of each variant: steady, optimum or run.")] = "steady",
+    zipped: Annotated[
+        bool, typer.Option("--zip", help="Combine the first values of all keys, the second values, and so on.")
+    ] = False,
     table: Annotated[Path | None, typer.Option(help="CSV of variants: a heading of keys, then rows.")] = None,
-    processes: Annotated[int | None, typer.Option(help="Local processes; by default cores, where that pays.")] = None,
+    processes: Annotated[
+        int | None, typer.Option(help="Local processes; by default as many as cores, where that pays.")
+    ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Compute what the folder lacks.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Compute the missing variants of the folder.")] = False,
     overwrite: OverwriteOption = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
     settings: SetOption = [],  # noqa: B006

@@ -321,17 +321,14 @@ class ContactSetup:
         conditions: Sequence[ContactConditions],
         worn: WornDepths | None = None,
         phases: Sequence[int] | None = None,
-    ) -> Evolution | None:
-        """Return what phases of the motion, by default all, do to the states that laws remember; None without.
+    ) -> Evolution:
+        """Return what phases of the motion, by default all, do to the states that laws remember.
 
         Args:
             conditions: Of these phases.
             worn: Depths; by default none.
             phases: Their numbers.
         """
-        memory = self.layers.memory
-        if memory is None:
-            return None
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
         durations = np.array([self.motion.phases[k].duration for k in chosen])
 
@@ -341,7 +338,7 @@ class ContactSetup:
             return np.asarray(taken / durations[k])
 
         depth = np.zeros(len(self.pair.strip.weights)) if worn is None else worn.strip
-        return Evolution(memory, conditions, durations, [self.pairs[k] for k in chosen], wearing, depth)
+        return Evolution(self.layers.memory, conditions, durations, [self.pairs[k] for k in chosen], wearing, depth)
 
     def rested(self, conditions: Sequence[ContactConditions]) -> WornDepths:
         """Return no depths, with the states of laws that cycles at conditions of the phases leave as they are.
@@ -349,10 +346,8 @@ class ContactSetup:
         Raises:
             ConvergenceError: a state goes on as long as it slides.
         """
-        evolution, unworn = self.evolution(conditions), self.unworn()
-        if evolution is None:
-            return unworn
-        return self.layers.with_held(unworn, evolution.rest(self.layers.held(unworn)))
+        unworn = self.unworn()
+        return self.layers.with_held(unworn, self.evolution(conditions).rest(self.layers.held(unworn)))
 
     @property
     def position_spacing(self) -> float:

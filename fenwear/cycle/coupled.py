@@ -35,7 +35,7 @@ DISAGREE = (
 # Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None for none, from a start.
 SolveContact = Callable[[Array, Array | None, ContactState], ContactState]
 # Takes friction and wear at the conditions of the phases, and what these do to the states that laws remember.
-Take = Callable[[Sequence[ContactConditions], Evolution | None], None]
+Take = Callable[[Sequence[ContactConditions], Evolution], None]
 
 
 def cycle_heat(system: Tribosystem) -> CycleHeat:
@@ -373,11 +373,9 @@ class Coupled:
             lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries and passing is not None
             facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.pairs]
             conditions = [replace(one, debris=own) for one, own in zip(conditions, facing, strict=True)]
-        evolution = system.evolution(conditions, worn)
-        if evolution is not None:
-            evolution = replace(evolution, near=self.held)
-            conditions = list(self._remembering(evolution, passing))
-            evolution = replace(evolution, near=self.held)
+        evolution = replace(system.evolution(conditions, worn), near=self.held)
+        conditions = list(self._remembering(evolution, passing))
+        evolution = replace(evolution, near=self.held)
         self._take(conditions, evolution)
         if debris is not None:
             self._passing = system.passing(system.wear.phases(conditions), None, evolution, conditions)

@@ -144,8 +144,6 @@ def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> flo
 
 def _state_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
     """Return the largest difference of a state that laws remember over its size; 0 without."""
-    if system.layers.memory is None:
-        return 0.0
     first, one, other = (system.layers.held(state.worn) for state in (before, whole, halves))
     return max(
         float((weights @ np.abs(a - b).T / np.maximum(size, 1e-300)).max(initial=0.0))

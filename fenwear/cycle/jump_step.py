@@ -167,7 +167,7 @@ class Stepper:
             None  # the last attempt as one step: see `finer`
         )
         follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
-        follows = follows or system.layers.memory is not None
+        follows = follows or bool(system.layers.memory.names)
         self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
         laws = [law for law in system.sliding.wear if law is not None]
         self._wear_follows = follows or (self._follows and any(law.beta or law.energy for law in laws))
@@ -278,8 +278,7 @@ class Stepper:
             for k, pressure in enumerate(pressures)
         ]
         evolution = system.evolution(conditions, state.worn)
-        if evolution is not None:
-            conditions = evolution.around(system.layers.held(state.worn))
+        conditions = evolution.around(system.layers.held(state.worn))
         return system.wear.phases(conditions).begun(state.worn).worn(pressures)
 
     def _solve_to(self, share: float) -> None:
@@ -429,7 +428,7 @@ class Stepper:
         """Return what creeps in a stage."""
         return self.system.creep.stage(worn.crept, cycles, self.ratios, self._load)
 
-    def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None) -> None:
+    def take(self, conditions: Sequence[ContactConditions], evolution: Evolution) -> None:
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
         self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
@@ -475,9 +474,9 @@ class Stepper:
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
-        evolution = None if self.evolution is None else self.evolution.some(phases)
         conditions = [self.conditions[k] for k in phases]
-        return self.system.passing(self.wear.some(phases), phases, evolution, conditions).worn(pressures, now)
+        passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
+        return passing.worn(pressures, now)
 
     def _phase_record(
         self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals

@@ -28,7 +28,6 @@ from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution
 from fenwear.layers.closure import Law
 from fenwear.layers.debris import DebrisCycle
-from fenwear.layers.memory import Held
 from fenwear.sliding.friction import ContactConditions, FollowingFriction
 from fenwear.sliding.ways import CycleShear
 from fenwear.sliding.wear import WornDepths
@@ -325,9 +324,8 @@ class PhaseStep:
         """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""
         system = self.system
         evolution = system.evolution([conditions], worn, [self.phase])
-        end: Held | None = None
-        if evolution is not None:  # coefficients are those of the states in the middle of the phase
-            (conditions,), end, _ = evolution.through(system.layers.held(worn))
+        # Coefficients are those of the states in the middle of the phase.
+        (conditions,), end, _ = evolution.through(system.layers.held(worn))
         # Once the phase has ended its friction is known, but for one that has followed the pressure.
         changes = not system.friction.constant and (self._follows or not ended)
         if changes:

@@ -250,7 +250,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
         ConvergenceError: debris has no thickness at which as much is lost as comes.
     """
     layers = system.layers
-    if layers.memory is None and layers.debris is None:
+    if not layers.memory.names and layers.debris is None:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if states:

@@ -367,7 +367,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: He
         conductances=solved.conductances,
         debris=system.passing(problem.wear, conditions=problem.conditions).resting(contact.pressure),
         crept=system.creep.depth(crept),
-        states={} if held is None or system.layers.memory is None else system.layers.memory.by_name(held),
+        states={} if held is None else system.layers.memory.by_name(held),
     )
 
 

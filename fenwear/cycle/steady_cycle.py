@@ -92,7 +92,7 @@ def _cycle(
     latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
     each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(phase_pressure)]
     states = [system.conditions(k, p, latest, None, None) for k, p in each]
-    if system.layers.memory is not None:
+    if system.layers.memory.names:
         rest = system.rested(states)
         states = [system.conditions(k, p, latest, rest, None) for k, p in each]
     adds = phase_totals(system, phase_pressure, states)

@@ -15,7 +15,7 @@ compliance of the bodies (`fenwear.interface.Interface`), so that every study ha
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -38,7 +38,7 @@ from fenwear.layers.closure import (
     SharedClosure,
 )
 from fenwear.layers.debris import LIFE, Debris
-from fenwear.layers.memory import Held, Memory
+from fenwear.layers.memory import FORGETFUL, Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
 from fenwear.sliding.friction import asperity_share
 from fenwear.sliding.wear import NOTHING, WornDepths
@@ -63,8 +63,8 @@ class Layers:
         debris: Of the third body; None without.
         hardness: Largest pressure, MPa.
         softness: By how much surfaces give way in a solve, over the pressure beyond the hardness, mm/MPa.
-        memory: States of laws of one's own; None without.
-        begun: These at the start; None without.
+        memory: States of laws of one's own.
+        begun: These at the start.
         strip_carries: Whether debris lies on the strip's material.
         soft: Coatings of punch and strip that may give way beside their base; none where no law of wear is known.
     """
@@ -75,15 +75,15 @@ class Layers:
     debris: Debris | None = None
     hardness: float = np.inf
     softness: float = 0.0
-    memory: Memory | None = None
-    begun: Held | None = None
+    memory: Memory = FORGETFUL
+    begun: Held = field(default_factory=lambda: Held(NOTHING, NOTHING))
     strip_carries: bool = False
     soft: tuple[SoftCoating, ...] = ()
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows of the state: of debris and of what has flown, mm each, and of what laws remember."""
-        remembered = () if self.memory is None else tuple(map(row_of_state, self.memory.contact))
+        remembered = map(row_of_state, self.memory.contact)
         flown = (PLASTIC,) if self.hardness < np.inf else ()
         return (*(() if self.debris_here is None else DEBRIS), *flown, *remembered)
 
@@ -160,12 +160,10 @@ class Layers:
             lies = carried[0] if self.strip_carries else state[self.row(DEBRIS[0])]
             lies[:] = self.debris.initial
         found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state, carried=carried)
-        return found if self.begun is None else self.with_held(found, self.begun)
+        return self.with_held(found, self.begun)
 
     def held(self, worn: WornDepths) -> Held:
         """Return what laws remember at these depths; what they do at the start where that is not told."""
-        if self.begun is None:
-            return Held(worn.between[len(self.rows) :], worn.carried[len(self.carried_rows) :])
         first = len(self.rows) - len(self.begun.contact)
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)
@@ -222,13 +220,13 @@ class Layers:
             worn: With the states; by default those at the start.
             held: The states, where they are not those.
         """
-        if self.memory is None or self.begun is None:
-            return {}, {}
         held = held or (self.begun if worn is None else self.held(worn))
         return self.memory.known(held.at_contact(pair))
 
     def with_held(self, worn: WornDepths, held: Held) -> WornDepths:
         """Return the depths with other states of laws."""
+        if not self.memory.names:
+            return worn
         first = len(self.rows) - len(held.contact)
         lies = len(self.carried_rows)
         carried = np.concatenate([worn.carried[:lies], held.strip]) if lies else held.strip
@@ -255,7 +253,7 @@ class Layers:
         if not len(state):
             return 0.0
         found = np.zeros(self.nodes) if self.debris_here is None else -state[self.row(DEBRIS[0])]
-        if self.memory is not None and self.memory.filling:
+        if self.memory.filling:
             found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 
@@ -312,9 +310,7 @@ class Layers:
 
     def settled(self, worn: WornDepths) -> WornDepths:
         """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
-        found = worn
-        if self.memory is not None:
-            found = self.with_held(worn, self.memory.bounded(self.held(worn)))
+        found = self.with_held(worn, self.memory.bounded(self.held(worn)))
         if self.strip_carries:
             return replace(found, carried=_settled(found.carried, 0, 1)) if len(worn.carried) else found
         if self.debris is None or not len(worn.between):
@@ -384,14 +380,14 @@ def layers_of(
         debris = Debris(third.share, life, third.initial, third if third.varies else None)
     hardness = np.inf if contact.hardness is None else contact.hardness
     memory = memory_of(contact.friction, wear, temperature)
-    begun = None if memory is None else memory.beginning(pair)
+    begun = memory.beginning(pair)
     on_strip = debris is not None and strip_carries
     soft = soft_coatings(pair, (wear[0], wear[1]))
     return Layers(n, closure, winkler, debris, hardness, 0.0, memory, begun, on_strip, soft)
 
 
-def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory | None:
-    """Return what the laws of friction and wear remember, and where; None for nothing.
+def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory:
+    """Return what the laws of friction and wear remember, and where.
 
     Args:
         friction: The coefficient.
@@ -405,8 +401,6 @@ def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: flo
     own = {name: state for name, state in strip.items() if not state.fills}
     filling = {name: state for name, state in strip.items() if state.fills}
     contact = {**punch, **filling, **{name: state for name, state in both.items() if name not in own or name in punch}}
-    if not contact and not own:
-        return None
     return Memory(contact, own, frozenset(punch), temperature)
 
 

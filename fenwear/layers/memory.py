@@ -163,6 +163,9 @@ class Memory:
         return least, Held(*(np.array([one.most for one in own], dtype=float)[:, None] for own in both))
 
 
+FORGETFUL = Memory({}, {}, frozenset())  # of laws that remember nothing
+
+
 @dataclass(frozen=True)
 class Held:
     """States of the contact (q, n) and of the strip (q_s, n_s), or changes of them."""
@@ -290,6 +293,9 @@ class Evolution:
             CaseError: a rate fails, or is not finite.
             ConvergenceError: a state changes too fast within a phase.
         """
+        if not self.memory.names:
+            nothing = (np.zeros((rows.shape[1], 0, 0)) for rows in (start.contact, start.strip))
+            return list(self.conditions), start, _Slopes(*nothing)
         q, held, middles, slopes = len(self.memory.contact), start, [], None
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
             begin = held.at_contact(pair)

@@ -73,9 +73,9 @@ class LayerEvolution:
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
         found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
-        return (
-            found if self.evolution is None else self.layers.with_held(found, self._evolved(pressure, before, cycles))
-        )
+        if self.evolution is None or not self.layers.memory.names:
+            return found
+        return self.layers.with_held(found, self._evolved(pressure, before, cycles))
 
     def _evolved(self, pressure: Array, before: WornDepths, cycles: float | None) -> Held:
         """Return by how much the states of laws change, as `worn`."""
@@ -91,7 +91,7 @@ class LayerEvolution:
     def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array | None:
         """Return the gap that the states of laws fill more (n,), mm, as `worn`; None where they fill none."""
         memory = self.layers.memory
-        if self.evolution is None or memory is None or not memory.filling:
+        if self.evolution is None or not memory.filling:
             return None
         return memory.fills @ self._evolved(pressure, before, cycles).contact
 
@@ -322,5 +322,4 @@ class LayerStep:
     @property
     def _fills(self) -> bool:
         """Whether states of laws fill a part of the gap."""
-        memory = self.passing.layers.memory
-        return memory is not None and memory.filling
+        return self.passing.layers.memory.filling

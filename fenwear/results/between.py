@@ -46,22 +46,19 @@ def variables(placed: ContactSetup) -> dict[str, Variable]:
 
 def _of_states(placed: ContactSetup) -> dict[str, Variable]:
     memory, found = placed.layers.memory, dict[str, Variable]()
-    if memory is not None:
-        for states, over, end, body in (
-            (memory.contact, "x", "", ""),
-            (memory.strip, "x_strip", "_strip", " of the strip"),
-        ):
-            for name, state in states.items():
-                text = f"{name}{body}, a state that a law remembers, at the end"
-                found[f"{STATE}{name}{end}"] = (("half_cycle", over), state.unit, text)
+    for states, over, end, body in (
+        (memory.contact, "x", "", ""),
+        (memory.strip, "x_strip", "_strip", " of the strip"),
+    ):
+        for name, state in states.items():
+            text = f"{name}{body}, a state that a law remembers, at the end"
+            found[f"{STATE}{name}{end}"] = (("half_cycle", over), state.unit, text)
     return found
 
 
 def _states(block: Block) -> dict[str, Array]:
     """Return the states of laws by the names of their variables (k, n), on the strip's material (k, n_strip)."""
     layers = block.system.layers
-    if layers.memory is None:
-        return {}
     first, own = len(layers.rows) - len(layers.memory.contact), len(layers.carried_rows)
     found = {f"{STATE}{name}": block.between[:, first + k] for k, name in enumerate(layers.memory.contact)}
     return found | {f"{STATE}{name}_strip": block.carried[:, own + k] for k, name in enumerate(layers.memory.strip)}

@@ -238,7 +238,7 @@ class Remembered:
         """Return those of a cycle, behind so many depths; None without."""
         layers, pair, memory = problem.interface.layers, problem.interface.middle.pair, problem.interface.layers.memory
         evolution = problem.losses.evolution(now.records, _begun(now))
-        if memory is None or evolution is None:
+        if evolution is None:
             return None
         n, n_strip = len(pair.weights), len(pair.strip.weights)
         between = depths + now.worn.between.size

@@ -129,7 +129,7 @@ def _rate(
     worn = problem.interface.layers.flown_as(worn, at.worn)
     at = problem.shaped(at, worn)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    constant = own.layers.memory is None and not own.creep.creeps and not problem.conditions.asks_cycle
+    constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
     settled = heat is None and constant
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = problem.half_cycle(at)

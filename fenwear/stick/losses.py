@@ -365,7 +365,7 @@ class StepLosses:
     def evolution_of(self, slips: StepSlips, before: PartialSlipState) -> Evolution | None:
         """Return what steps that begin at a state do to the states that laws remember; None without."""
         memory, laws = self.layers.memory, self.conditions.laws
-        if memory is None or laws is None:
+        if not memory.names or laws is None:
             return None
         parts = self.unended(before.worn)
 

@@ -26,8 +26,7 @@ from fenwear.sliding.friction import Friction
 from fenwear.sliding.wear import PhasesWear
 from fenwear.stick.equations import Step
 from fenwear.stick.final import final_shape
-from fenwear.stick.fineness import fine_enough
-from fenwear.stick.setup import with_steps
+from fenwear.stick.setup import fine_enough, with_steps
 
 COMM = MPI.COMM_WORLD
 several = pytest.mark.skipif(COMM.size == 1, reason="needs several ranks: mpirun -n 2 python3 -m pytest -m mpi")

@@ -49,8 +49,20 @@ from fenwear.assembly.tribosystem import (
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.variants import assemble, in_parts, place_case, renewed, set_up_by, vary, with_case
-from fenwear.assembly.warmed import properties_outdated, property_change, taken_at, warmed_system, warming_key
+from fenwear.assembly.variants import (
+    assemble,
+    in_parts,
+    place_case,
+    properties_outdated,
+    property_change,
+    renewed,
+    set_up_by,
+    taken_at,
+    vary,
+    warmed_system,
+    warming_key,
+    with_case,
+)
 
 __all__ = [
     "Bodies",

@@ -32,9 +32,8 @@ from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.sliding.coating import coatings_of, covering
 from fenwear.sliding.field import SlidingField, node_rates
-from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.friction import ContactConditions, Friction, Regions, any_split, regions_opposite
 from fenwear.sliding.motion import Motion
-from fenwear.sliding.regions import Regions, any_split, regions_opposite
 from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 

@@ -197,7 +197,7 @@ class Dependence(_State):
         On the way to a solution, whose own values are, they need not be `checked`.
 
         Args:
-            state: The variables of laws by their names, and those of `fenwear.sliding.regions`.
+            state: The variables of laws by their names, and those of `fenwear.sliding.friction`.
             shape: Of the values.
             factor: Unit of the coefficient.
             key: The case's key.
@@ -227,7 +227,7 @@ class Dependence(_State):
         return values if factor == 1 else values * factor
 
     def _of_regions(self, state: Mapping[str, Any], shape: tuple[int, ...], effect: Callable[[Array], Array]) -> Array:
-        """Return the coefficient of nodes of one or several regions (shape), see `fenwear.sliding.regions`."""
+        """Return the coefficient of nodes of one or several regions (shape), see `fenwear.sliding.friction`."""
         found, effects = np.zeros(shape), state["regions"].effects(np.broadcast_to(state["p"], shape), effect)
         for name, given in (self.regions or {}).items():
             share = state[f"region {name}"] * effects.get(name, 1.0)

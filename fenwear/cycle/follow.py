@@ -5,7 +5,7 @@ both meshes move by the depths worn so far, all operators are made anew, and tem
 place in space: theta(x + s) = theta + grad theta . s at a node that moves by s.
 
 Where properties of materials depend on the temperature, the bodies are made anew, on the same meshes, at the end of a
-cycle after which one has changed by more than heat.property_tolerance: see `fenwear.assembly.warmed`.
+cycle after which one has changed by more than heat.property_tolerance: see `fenwear.assembly.variants`.
 
 When all that happens is found by thresholds. A run may be told instead when another one did, so that what comes of it
 is a smooth function of what the two differ by.

@@ -27,10 +27,9 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.half_space import extent_along
 from fenwear.case import Case, Heat, Material, OneWay, Rotation, changed_case, heat_of, load_case
 from fenwear.errors import CaseError, InputError
-from fenwear.flash.heating import Heating, Past
 from fenwear.flash.partition import NO_BULK, Bulk, HeatedSide, bulk_of, mean_power, shared, spots_of
 from fenwear.flash.response import Instants, Periodic, Response, cell_integrals, history_kernel
-from fenwear.flash.source import heating_of
+from fenwear.flash.source import Heating, Past, heating_of
 from fenwear.results.history import CASE
 
 NEEDED = ("conductivity", "heat_capacity", "density")

@@ -44,11 +44,20 @@ from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.cycle import PartialSlipProblem, on_other_grid
 from fenwear.stick.final import FinalShape, final_shape
-from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.jump import first_cycle, jumped
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
-from fenwear.stick.setup import heated, placed_by_slip, touches, unheated_problem
+from fenwear.stick.setup import (
+    Ends,
+    Fineness,
+    fine_enough,
+    heated,
+    placed_by_slip,
+    same_steps,
+    touches,
+    unheated_problem,
+    with_ends,
+)
 from fenwear.stick.state import PartialSlipState
 
 

@@ -1,12 +1,22 @@
-"""From a case to bodies with stick that are ready to be driven, with as many time steps as they need."""
+"""From a case to bodies with stick that are ready to be driven, with as many time steps as they need.
+
+Time steps of a cycle as fine as they need to be, and where they need to be.
+
+The first cycle is computed with its steps and with each of them in halves. Where force and work of friction differ by
+more than the tolerance, the steps that make most of the difference are halved (Doerfler's marking), until they do not.
+Heat wants equal steps: there all are halved.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.assembly import Bodies, build_bodies, make_sliding
 from fenwear.assembly.bodies import edges_of
 from fenwear.bodies.contact_surface import ContactSurface
@@ -15,12 +25,13 @@ from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import memory_size
 from fenwear.sliding.coating import coatings_of
-from fenwear.sliding.regions import regions_opposite
+from fenwear.sliding.field import Screw
+from fenwear.sliding.friction import regions_opposite
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.losses import CoatedBodies
-from fenwear.stick.program import far_enough, make_program, passes
+from fenwear.stick.program import Program, far_enough, make_program, passes, steps_of
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.wear import LocalLaws
 
@@ -188,3 +199,151 @@ def _slips_far(problem: PartialSlipProblem) -> bool:
         return passes(cycle.slip_amplitude(pair.weights, problem.program.half_cycles), pair.punch)
 
     return problem.led(found)
+
+
+HALVINGS = 4  # of a step at most
+WHOLE = 2 ** (HALVINGS + 1)  # of the finest steps in a step: the halves of the last ones are compared with, too
+SHARE = 0.9  # of the difference that the halved steps make
+Ends = NDArray[np.int64]  # of steps, as numbers of the finest ones
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How fine the time steps are.
+
+    Attributes:
+        steps: Of a half-cycle, on average.
+        change: By halving every step, of the largest force and, in all steps together, of friction's work; shares of
+            the first cycle's.
+        enough: Whether that is within the case's tolerance.
+        ends: Of the steps, as numbers of the finest ones.
+    """
+
+    steps: int
+    change: float
+    enough: bool
+    ends: Ends
+
+    def text(self) -> str:
+        """Return what is to be said of steps that are too coarse; "" of others."""
+        if self.enough:
+            return ""
+        return (
+            f"the time steps are too coarse: with {self.steps} in a half-cycle force or friction's work of the first "
+            f"cycle still change by {100 * self.change:.2g} %; expected more stick.steps"
+        )
+
+
+def fine_enough(problem: PartialSlipProblem, case: Case) -> tuple[PartialSlipProblem, Fineness]:
+    """Return the rig with steps that are halved until the first cycle changes little; collective.
+
+    Args:
+        problem: With the case's steps.
+        case: Gives their number and the tolerance.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    whole, finest = WHOLE, _finest(case)
+    ends = np.arange(whole - 1, len(finest.steps), whole)
+    while True:
+        halves, of = _halved(ends)
+        fine = _driven(problem, case, finest, halves)
+        splits = np.diff(ends, prepend=-1) > 2
+        change, marked = problem.led(partial(_judged, problem, fine, of, splits, case.stick.step_tolerance))
+        if marked is None:
+            enough = change <= case.stick.step_tolerance
+            return problem, Fineness(round(len(ends) / finest.half_cycles), change, enough, ends)
+        if case.heat is not None:
+            marked[:] = True
+        ends = halves[marked[of] | _last(of)]
+        problem = _driven(problem, case, finest, ends)
+
+
+def with_ends(problem: PartialSlipProblem, case: Case, ends: Ends) -> PartialSlipProblem:
+    """Return the rig with steps that end at these of the finest ones; collective."""
+    return _driven(problem, case, _finest(case), ends)
+
+
+def same_steps(one: Case, other: Case) -> bool:
+    """Return whether time steps chosen for one case are steps of the other: both ask for as many, as fine."""
+    return one.stick == other.stick and len(_finest(one).steps) == len(_finest(other).steps)
+
+
+def _finest(case: Case) -> Program:
+    return make_program(case, steps_of(case) * WHOLE)
+
+
+def _judged(
+    problem: PartialSlipProblem, fine: PartialSlipProblem, of: Ends, splits: NDArray[np.bool_], tolerance: float
+) -> tuple[float, NDArray[np.bool_] | None]:
+    """Return what halving all steps changes, and which are to be halved; None where that is to end."""
+    after, coarse = problem.cycle(problem.beginning())
+    begin = fine.beginning()
+    if after.pressures is not None and after.trials is not None:  # second halves end where their steps do
+        known = np.where(_last(of)[:, None], after.pressures[of], np.nan)
+        begin = replace(begin, pressures=known, trials=after.trials[of])
+    halves = TimeStepRecords.joined(fine.cycle(begin)[1])
+    local, change = _compare(TimeStepRecords.joined(coarse), halves, of, problem.weights)
+    if change <= tolerance or local[~splits].sum() > tolerance:  # the finest steps alone are too coarse
+        return change, None
+    return change, _marked(local, splits)
+
+
+def merged(finest: Program, ends: Ends) -> Program:
+    """Return a program whose steps end where these of another one do."""
+    found, begin, place = [], 0, finest.steps[-1].displacement
+    for end in ends:
+        last = finest.steps[end]
+        duration = sum(step.duration for step in finest.steps[begin : end + 1])
+        middle, first = last.offset, finest.steps[begin].way
+        if first is not None and last.way is not None:
+            way = Screw(first.first, last.way.last)
+            found.append(replace(last, duration=duration, offset=way.at(0.5), way=way))
+            begin = end + 1
+            continue
+        if place is not None and last.displacement is not None:
+            middle = (place + last.displacement) / 2
+        found.append(replace(last, duration=duration, offset=middle))
+        begin, place = end + 1, last.displacement
+    return replace(finest, steps=tuple(found))
+
+
+def _driven(problem: PartialSlipProblem, case: Case, finest: Program, ends: Ends) -> PartialSlipProblem:
+    """Return the rig with the steps that end there; the way to the beginning stays."""
+    if case.heat is not None:
+        return with_steps(problem, case, len(ends) // finest.half_cycles)
+    return problem.driven(replace(merged(finest, ends), lead_in=problem.program.lead_in))
+
+
+def _halved(ends: Ends) -> tuple[Ends, Ends]:
+    """Return the ends of the halves of all steps, and the step that each is of."""
+    begins = np.append(-1, ends[:-1])
+    return np.stack([(begins + ends) // 2, ends], axis=1).ravel(), np.repeat(np.arange(len(ends)), 2)
+
+
+def _last(of: Ends) -> NDArray[np.bool_]:
+    """Return which halves are the last of their steps."""
+    return np.append(of[1:] != of[:-1], True)
+
+
+def _compare(coarse: TimeStepRecords, fine: TimeStepRecords, of: Ends, weights: Array) -> tuple[Array, float]:
+    """Return what the halves change in each step, and what they change in the cycle, as shares."""
+    force = max(float(np.abs(fine.force).max()), 1e-300)
+    full_stick = 1e-6 * force * float(np.ptp(fine.displacement))  # no work but rounding
+    work = max(fine.energy(weights), full_stick, 1e-300)
+    by_step = coarse.dissipated @ weights - np.bincount(of, fine.dissipated @ weights)
+    pulled = np.diff(coarse.force - fine.force[_last(of)], prepend=0.0)
+    # Differences of either sign do not make up for each other: that would be by chance.
+    change = max(abs(float(np.abs(coarse.force).max()) - force) / force, float(np.abs(by_step).sum()) / work)
+    return np.abs(by_step) / work + np.abs(pulled) / force, change
+
+
+def _marked(local: Array, splits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the steps that make most of the difference, of those that can be halved."""
+    able = np.where(splits, local, 0.0)
+    order = np.argsort(-able)
+    count = int(np.searchsorted(np.cumsum(able[order]), SHARE * able.sum())) + 1
+    marked = np.zeros(len(local), dtype=bool)
+    marked[order[:count]] = True
+    return marked & splits

@@ -20,9 +20,8 @@ from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
 from fenwear.sliding.coating import CoatedBody, covering
-from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.friction import ContactConditions, Friction, Regions, any_split
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.regions import Regions, any_split
 from fenwear.sliding.ways import CycleShear
 from fenwear.sliding.wear import WornDepths, coefficient, stays
 

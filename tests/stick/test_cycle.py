@@ -12,12 +12,11 @@ from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.cycle import evolve
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.fineness import HALVINGS, fine_enough
 from fenwear.stick.jump import first_cycle as begin_cycle
 from fenwear.stick.jump import jumped
 from fenwear.stick.program import make_program
 from fenwear.stick.records import TimeStepRecords
-from fenwear.stick.setup import partial_slip_problem, with_steps
+from fenwear.stick.setup import HALVINGS, fine_enough, partial_slip_problem, with_steps
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
 SMALL = (*COARSE, "motion.amplitude='3 um'")

@@ -18,7 +18,6 @@ from __future__ import annotations
 import ast
 import math
 import operator
-import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -135,7 +134,6 @@ def evaluate(function: Function, state: Now, shape: tuple[int, ...]) -> Array:
 F = TypeVar("F", bound=Function)
 BELOW: Any = object()  # in place of a function that follows a decorator
 WEAR = "wear"  # worn off both bodies at a node, mm/s: rates of states may depend on it
-FIRST, SLOW = 3, 0.02  # calls of a law that are timed, and seconds of each that are told
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,6 @@ class _Law:
 
 
 NO_STATES: Mapping[str, State] = MappingProxyType({})
-_CALLS: dict[str, list[float]] = {}  # CPU seconds of the first ones, by the law's name
 _LAWS: dict[str, _Law] = {}  # by their names: those of this process
 _STATES: dict[str, State] = {}
 
@@ -227,13 +224,12 @@ def register_law(
         _check_state(word, state, (*VARIABLES, WEAR, *known))
     _STATES.update(own)
     _LAWS[name] = _Law(function, frozenset({*of, *own}))
-    _CALLS.pop(name, None)
     return function
 
 
 def forget_laws() -> None:
     """Forget all laws and states."""
-    for known in (_LAWS, _STATES, _CALLS):
+    for known in (_LAWS, _STATES):
         known.clear()
 
 
@@ -295,18 +291,6 @@ def check_law(name: str) -> None:
         )
 
 
-def _tell_slow(name: str, seconds: float, nodes: int) -> None:
-    """Warn once of a law whose fastest of its first calls takes long: it is called some ten times in a half-cycle."""
-    calls = _CALLS.setdefault(name, [])
-    calls.append(seconds)
-    if len(calls) == FIRST and min(calls) > SLOW:
-        warnings.warn(
-            f"the law {name!r} takes {min(calls):.2g} s for {nodes} nodes, and a half-cycle calls it some ten times: "
-            "make it faster, with arrays of numpy in place of loops",
-            stacklevel=2,
-        )
-
-
 def evaluate_law(name: str, now: Now, shape: tuple[int, ...]) -> Array:
     """Return the values (shape) of a registered law.
 
@@ -315,12 +299,7 @@ def evaluate_law(name: str, now: Now, shape: tuple[int, ...]) -> Array:
     """
     check_law(name)
     law = _LAWS[name]
-    if len(_CALLS.get(name, ())) >= FIRST:
-        return _called(f"the law {name!r}", law.function, law.of, now, shape)
-    begin = time.thread_time()
-    found = _called(f"the law {name!r}", law.function, law.of, now, shape)
-    _tell_slow(name, time.thread_time() - begin, shape[0] if shape else 1)
-    return found
+    return _called(f"the law {name!r}", law.function, law.of, now, shape)
 
 
 def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:

@@ -7,7 +7,6 @@ the keyword and its line. Sets may name what comes later; they add up; names do 
 
 from __future__ import annotations
 
-import codecs
 import re
 import warnings
 from collections import Counter
@@ -20,6 +19,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, listed, wrong
+from fenwear.files.table import TableError, decoded
 
 DEEPEST = 20  # includes within each other, and sets of sets
 # Keywords that say nothing of nodes, elements and sets; those of a step are passed over with it.
@@ -126,17 +126,9 @@ def deck_text(path: Path) -> str:
         CaseError: it cannot be read, or is no text.
     """
     try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise CaseError(InputError(path.name, f"cannot be read: {error.strerror}")) from None
-    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return raw.decode("utf-16", "replace")
-    if b"\0" in raw[:4096]:
-        raise CaseError(InputError(path.name, "is not a text file: expected an input deck with lines such as *NODE"))
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
+        return decoded(path)[0]
+    except TableError as error:
+        raise CaseError(InputError(path.name, str(error))) from None
 
 
 def _key(name: str) -> str:

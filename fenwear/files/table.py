@@ -169,7 +169,7 @@ def read_table(
     Raises:
         TableError: it cannot be read; names the line, what was expected and what to do.
     """
-    text, encoding = _decoded(path)
+    text, encoding = decoded(path)
     given, comments, body = _parted(text, [*directives, "missing"] if directives else ["missing"])
     if not body:
         example = ", ".join(f"{name} (unit)" for name in [*known][:2]) or "x (mm), depth (um)"
@@ -195,7 +195,7 @@ def read_table(
     )  # fmt: skip
 
 
-def _decoded(path: Path) -> tuple[str, str]:
+def decoded(path: Path) -> tuple[str, str]:
     """Return the text of a file, and its encoding."""
     try:
         raw = path.read_bytes()
@@ -208,7 +208,9 @@ def _decoded(path: Path) -> tuple[str, str]:
     if max(nulls) > 0.4 * min(len(raw), 2000) / 2 and len(raw) > 1:
         return raw.decode("utf-16-le" if nulls[1] > nulls[0] else "utf-16-be", "replace"), "UTF-16"
     if b"\0" in raw:
-        raise TableError("", "is no text: expected a table such as 'x (mm), depth (um)' with rows of numbers")
+        raise TableError(
+            "", "is no text: expected a table such as 'x (mm), depth (um)' with rows of numbers, or an input deck"
+        )
     try:
         return raw.decode("utf-8"), "UTF-8"
     except UnicodeDecodeError:

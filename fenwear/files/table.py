@@ -208,9 +208,7 @@ def decoded(path: Path) -> tuple[str, str]:
     if max(nulls) > 0.4 * min(len(raw), 2000) / 2 and len(raw) > 1:
         return raw.decode("utf-16-le" if nulls[1] > nulls[0] else "utf-16-be", "replace"), "UTF-16"
     if b"\0" in raw:
-        raise TableError(
-            "", "is no text: expected a table such as 'x (mm), depth (um)' with rows of numbers, or an input deck"
-        )
+        raise TableError("", "is no text: expected a table such as 'x (mm), depth (um)' and numbers, or an input deck")
     try:
         return raw.decode("utf-8"), "UTF-8"
     except UnicodeDecodeError:

@@ -84,7 +84,7 @@ def values_of(last: Block) -> Values:
     system, found = last.system, Values()
     depths, surfaces = (last.wear[-1], last.wear_strip[-1]), (system.pair.punch, system.pair.strip)
     for body, law, depth, surface in zip(BODIES, system.sliding.wear, depths, surfaces, strict=True):
-        if law is not None:
+        if law.wears:
             found[Quantity("largest_depth", body)] = _largest(depth, surface)
             found[Quantity("worn_volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
     found |= _pressures(system, last)

@@ -22,7 +22,7 @@ from fenwear.bodies.operators import check_operators
 from fenwear.bodies.regions import contact_density, contact_regions
 from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
-from fenwear.case.names import told_by_name
+from fenwear.case.names import ROLES, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
@@ -41,7 +41,7 @@ def check_coatings(case: Case, punch: ElasticBody, strip: ElasticBody) -> None:
     Raises:
         CaseError: one is, or it is negative somewhere.
     """
-    for body, law, elastic in (("punch", case.wear.punch, punch), ("strip", case.wear.strip, strip)):
+    for body, law, elastic in zip(ROLES, case.wear.of_bodies, (punch, strip), strict=True):
         thickness = coating_thickness(law, elastic.surface.unworn, body)
         there, thickest = _height(elastic), float(thickness.max(initial=0.0))
         if thickest >= there:

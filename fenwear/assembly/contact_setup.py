@@ -169,7 +169,7 @@ class ContactSetup:
     @property
     def strip_wears(self) -> bool:
         """Whether the strip has a wear law."""
-        return self.sliding.wear[1] is not None
+        return self.sliding.wear[1].wears
 
     @cached_property
     def sliding_ratio(self) -> Array:
@@ -221,7 +221,7 @@ class ContactSetup:
         """The wear rule of both bodies over the phases of the motion."""
         slid = []
         for law in self.sliding.wear:
-            a, b = (1.0, 1.0) if law is None else (law.speed_exponent, law.pressure_exponent)
+            a, b = law.speed_exponent, law.pressure_exponent
             rates = self.sliding_ratio if a == b else self._rates(a / b)
             slid.append(self.motion.sliding(a)[:, None] * rates**a)
         split = any_split(self._regions, self.sliding.wear)

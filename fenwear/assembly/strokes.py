@@ -27,7 +27,7 @@ class Sliding:
         motion: The phases of a cycle.
         field: The velocity of the counter-body over the contact.
         friction: The law of friction.
-        wear: The wear laws of punch and strip; None where a body does not wear.
+        wear: The wear laws of punch and strip; `NoWear` where a body does not wear.
         track: What closes the track that a strip which wears runs on: its length, mm, or 2 pi rad; None for none.
         to_and_fro: Whether the strip's worn track passes to and fro under the punch.
     """
@@ -35,7 +35,7 @@ class Sliding:
     motion: Motion
     field: SlidingField
     friction: Friction
-    wear: tuple[WearLaw | None, WearLaw | None]
+    wear: tuple[WearLaw, WearLaw]
     track: float | None = None
     to_and_fro: bool = False
 
@@ -63,7 +63,7 @@ def make_sliding(case: Case, *, positions: int = DEFAULT_POSITIONS) -> Sliding:
         motion,
         sliding_field,
         friction_of(case, sliding_field),
-        (case.wear.punch, case.wear.strip),
+        case.wear.of_bodies,
         _closed_track(case),
         case.passes and not one_way,
     )
@@ -71,8 +71,7 @@ def make_sliding(case: Case, *, positions: int = DEFAULT_POSITIONS) -> Sliding:
 
 def friction_of(case: Case, field: SlidingField) -> Friction:
     """Return the law of friction of a case, with that of its coatings."""
-    laws = (case.wear.punch, case.wear.strip)
-    punch, strip = (None if law is None or law.coating is None else law.coating.friction for law in laws)
+    punch, strip = (law.coating.friction if law.coating else None for law in case.wear.of_bodies)
     temperature = case.names.role_of(case.contact.friction_temperature)
     return Friction(case.contact, field, (punch, strip), temperature)
 

@@ -230,13 +230,13 @@ class Contact(Part):
         description="compliant layer between the bodies in addition to their elasticity, such as roughness",
     )
 
-    def asks(self, name: str, wear: Iterable[WearLaw | None]) -> bool:
+    def asks(self, name: str, wear: Iterable[WearLaw]) -> bool:
         """Return whether friction, these wear laws or the loss of debris depend on a variable of coefficients."""
         lost = self.third_body is not None and self.third_body.asks(name)
         wear = tuple(wear)
         if name == "p" and any(self.splits_pressure(law) for law in wear):
             return True
-        given = (law.given_coefficient for law in wear if law is not None)
+        given = (law.given_coefficient for law in wear)
         return lost or self.friction_asks(name) or any(depends_on(one, name) for one in given)
 
     @property
@@ -244,9 +244,9 @@ class Contact(Part):
         """Share of the pressure that asperities carry; None where it depends on anything."""
         return 1.0 if self.lubrication is None else self.lubrication.uniform_share
 
-    def splits_pressure(self, law: WearLaw | None) -> bool:
+    def splits_pressure(self, law: WearLaw) -> bool:
         """Return whether a share of the pressure that is not uniform stands in a law that is more than a power."""
-        return law is not None and self.uniform_share is None and (law.pressure_threshold > 0 or law.cap < float("inf"))
+        return self.uniform_share is None and (law.pressure_threshold > 0 or law.cap < float("inf"))
 
     def friction_asks(self, *names: str, of_share: bool = True) -> bool:
         """Return whether friction, or that of asperities alone, depends on one of these variables of coefficients."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
@@ -432,6 +432,8 @@ class WearLaw(Part):
         description="coating above this base, which wears where the coating is worn through; by default none",
     )
 
+    wears: ClassVar[bool] = True
+
     @staticmethod
     def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
         """Return the unit of beta~ for the exponents b and a."""
@@ -557,6 +559,15 @@ class WearLaw(Part):
         return data
 
 
+class NoWear(WearLaw):
+    """Stands for the law of a body that does not wear."""
+
+    wears: ClassVar[bool] = False
+
+
+NO_WEAR = NoWear.model_construct(coefficient=0.0)
+
+
 class Wear(Part):
     """The wear law of each body that wears."""
 
@@ -567,6 +578,11 @@ class Wear(Part):
     def laws(self) -> list[WearLaw]:
         """Those that there are."""
         return list(self.by_body.values())
+
+    @property
+    def of_bodies(self) -> tuple[WearLaw, WearLaw]:
+        """The laws of punch and strip."""
+        return self.by_body.get("punch", NO_WEAR), self.by_body.get("strip", NO_WEAR)
 
     @property
     def by_body(self) -> dict[str, WearLaw]:

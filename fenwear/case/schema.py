@@ -244,7 +244,7 @@ class Case(Part):
     @property
     def varies(self) -> bool:
         """Whether a coefficient depends on the state, or a load on the time in the cycle."""
-        laws = [law.given_coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
+        laws = [law.given_coefficient for law in self.wear.laws]
         mixed = self.contact.lubrication is not None and self.contact.lubrication.varies
         dependent = mixed or any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
         return dependent or not all(load.steady for body in ("punch", "strip") for load in self.loads_of(body))

@@ -169,8 +169,8 @@ class Stepper:
         follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
         follows = follows or bool(system.layers.memory.names)
         self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
-        laws = [law for law in system.sliding.wear if law is not None]
-        self._wear_follows = follows or (self._follows and any(law.beta or law.energy for law in laws))
+        by_friction = any(law.beta or law.energy for law in system.sliding.wear)
+        self._wear_follows = follows or (self._follows and by_friction)
 
     def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate, list[HalfCycle]]:
         """Return the state `cycles` cycles later, by two steps, an estimate of its error, and the last cycle.

@@ -299,7 +299,7 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
 
 def _any_shape_stays(problem: SteadyInequality, contact: ContactState) -> bool:
     """Return whether all that touches is pressed beyond a cap, so that what was found is one of many shapes."""
-    if any(law is not None and law.per_area is not None for law in problem.system.sliding.wear):
+    if any(law.per_area is not None for law in problem.system.sliding.wear):
         return False
     pressed = contact.pressure[contact.pressure > 0]
     return bool(pressed.min(initial=np.inf) >= (1 - 1e-9) * problem.wear.cap)
@@ -314,7 +314,7 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     keys = [
         f"wear.{body}.{'pressure_cap' if law.per_area is None else 'touching_from'}"
         for body, law in laws
-        if law is not None and law.cap == cap
+        if law.cap == cap
     ]
     why = (
         "the mean pressure is beyond it, all that is pressed so wears alike, and any shape stays"

@@ -60,7 +60,7 @@ class SteadyInequality:
         self.conditions: Sequence[ContactConditions] | None = None
         self.p_scale = interface.pressure_scale
         self.gap_scale = self.p_scale * interface.elastic_length
-        above = max((law.pressure_threshold for law in system.sliding.wear if law is not None), default=0.0)
+        above = max(law.pressure_threshold for law in system.sliding.wear)
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale + above)).max()) / m
         self.lengths = system.mode_lengths
         self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()

@@ -24,7 +24,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.case import Case, Contact, Dependence, Material, WearLaw
 from fenwear.case.contact import STIFFNESS, ExponentialLayer, LinearLayer, Lubrication, PowerLayer, RoughLayer
-from fenwear.case.laws import depends_on, place_values
+from fenwear.case.laws import NO_WEAR, depends_on, place_values
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
@@ -337,7 +337,7 @@ def layers_of(
     contact: Contact,
     pair: ContactPair,
     modulus: float | Array,
-    wear: Sequence[WearLaw | None] = (None, None),
+    wear: Sequence[WearLaw] = (NO_WEAR, NO_WEAR),
     temperature: float = 0.0,
     *,
     strip_carries: bool = False,
@@ -386,7 +386,7 @@ def layers_of(
     return Layers(n, closure, winkler, debris, hardness, 0.0, memory, begun, on_strip, soft)
 
 
-def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory:
+def memory_of(friction: object, wear: Sequence[WearLaw], temperature: float) -> Memory:
     """Return what the laws of friction and wear remember, and where.
 
     Args:
@@ -394,7 +394,7 @@ def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: flo
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
     """
-    given = [None if law is None else law.given_coefficient for law in wear]
+    given = [law.given_coefficient for law in wear]
     punch, strip, both = (
         dict(one.states) if isinstance(one, Dependence) else {} for one in (given[0], given[1], friction)
     )

@@ -34,8 +34,7 @@ def differentiable(system: Tribosystem) -> bool:
         return False
     if system.layers.closure is not None:
         return False
-    laws = [law for law in system.sliding.wear if law is not None]
-    if not all(PressureLaw.of(law).power for law in laws):
+    if not all(PressureLaw.of(law).power for law in system.sliding.wear):
         return False
     return system.constant_coefficients and not system.exchange.by_pressure
 

@@ -87,8 +87,8 @@ def _axes(dim: int) -> tuple[str, ...]:
 def _coated(system: ContactSetup, body: str, thickness: Array) -> CoatedBody:
     """Return a coating with the mean ratio of both coefficients at the start."""
     law = system.sliding.wear[list(BODIES).index(body)]
-    above = None if law is None else law.of_coating
-    if law is None or above is None:
+    above = law.of_coating
+    if above is None:
         return CoatedBody(thickness, np.ones_like(thickness))
     conditions = system.conditions(0)
     base, coating = (coefficient(one, system.friction, conditions, f"wear.{body}").mean() for one in (law, above))

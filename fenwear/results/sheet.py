@@ -206,7 +206,7 @@ def quantities(placed: ContactSetup) -> list[Quantity]:
 def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
     """Return the quantities of a body that wears; none of another."""
     number = list(BODIES).index(body)
-    if placed.sliding.wear[number] is None:
+    if not placed.sliding.wear[number].wears:
         return []
     geometry = scar_geometry(placed, surface := getattr(placed.pair, body))
     weighed = placed.bodies.densities[number] is not None

@@ -68,7 +68,7 @@ def covered(thickness: Array, depth: Array) -> Array:
     return np.where(thick, np.minimum(left_of(thickness, depth) / np.where(thick, FADES * thickness, 1.0), 1.0), 0.0)
 
 
-def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array:
+def coating_thickness(law: WearLaw, x: Array, key: str) -> Array:
     """Return the thickness of a body's coating at its contact nodes (n,), mm; 0 without.
 
     Args:
@@ -79,14 +79,14 @@ def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array:
     Raises:
         CaseError: it is negative somewhere.
     """
-    if law is None or law.coating is None:
+    if law.coating is None:
         return np.zeros(len(x))
     place = dict(zip("xyz", in_space(x).T, strict=True))
     name = f"wear.{key}.coating.thickness"
     return np.asarray(place_values(law.coating.thickness, place, len(x), "mm", name, 0.0))
 
 
-def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[Array, Array]:
+def coatings_of(pair: ContactPair, laws: tuple[WearLaw, WearLaw]) -> tuple[Array, Array]:
     """Return the thickness of the coatings of punch and strip at their own contact nodes, mm; 0 without.
 
     Raises:
@@ -116,14 +116,13 @@ class SoftCoating:
         return left_of(self.thickness, depth)
 
 
-def soft_coatings(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[SoftCoating, SoftCoating]:
+def soft_coatings(pair: ContactPair, laws: tuple[WearLaw, WearLaw]) -> tuple[SoftCoating, SoftCoating]:
     """Return the coatings of punch and strip, which may give way beside their base.
 
     Raises:
         CaseError: the thickness of one is negative somewhere.
     """
-    coatings = [None if law is None else law.coating for law in laws]
-    moduli = [getattr(coating, "modulus", None) or np.inf for coating in coatings]
+    moduli = [getattr(law.coating, "modulus", None) or np.inf for law in laws]
     punch, strip = map(SoftCoating, coatings_of(pair, laws), moduli)
     return punch, strip
 

@@ -372,7 +372,7 @@ class Wear:
     """The wear rule of a motion: both bodies' laws and the sliding of each phase.
 
     Attributes:
-        punch, strip: The laws; None where the body does not wear.
+        punch, strip: The laws.
         sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
@@ -380,8 +380,8 @@ class Wear:
         split: Whether nodes between regions share their pressure among unlike coefficients.
     """
 
-    punch: WearLaw | None
-    strip: WearLaw | None
+    punch: WearLaw
+    strip: WearLaw
     sliding: tuple[Array, Array]
     pairs: Sequence[ContactPair]
     friction: Friction
@@ -398,7 +398,7 @@ class Wear:
         """What of a pressure wears each body, by its key."""
         laws = {"wear.punch": self.punch, "wear.strip": self.strip}
         share = self.friction.contact.uniform_share
-        return {key: PressureLaw.of(law, share) for key, law in laws.items() if law is not None}
+        return {key: PressureLaw.of(law, share) for key, law in laws.items()}
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
@@ -414,7 +414,7 @@ class Wear:
         bodies: list[_BodyWear | None] = []
         given = zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), self.coatings, strict=True)
         for law, sliding, key, thickness in given:
-            if law is None:
+            if not law.wears:
                 bodies.append(None)
                 continue
 
@@ -433,9 +433,9 @@ class Wear:
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 
-def stays(wear: tuple[WearLaw | None, WearLaw | None], friction: Friction) -> bool:
+def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
     """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
-    laws = [one for law in wear if law is not None for one in (law, law.of_coating) if one is not None]
+    laws = [one for law in wear for one in (law, law.of_coating) if one is not None]
     of_friction = any(law.beta is not None or law.energy is not None for law in laws)
     dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
     dependent = dependent or any(map(friction.contact.splits_pressure, laws))

@@ -192,7 +192,7 @@ class Coulomb:
         Raises:
             ConvergenceError: there is none, or none that does not depend on the way there.
         """
-        if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
+        if any(law.pressure_threshold > 0 for law in system.sliding.wear):
             raise ConvergenceError(
                 "no one final shape exists with a pressure_threshold: what slips keeps any pressure below it, as the "
                 "way there has left it. Follow the wear by `run`"

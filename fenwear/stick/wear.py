@@ -51,7 +51,7 @@ class BodyRate:
 
 @dataclass(frozen=True)
 class LocalWear:
-    """The wear laws of punch and strip; None where a body does not wear.
+    """The wear laws of punch and strip.
 
     Attributes:
         punch, strip: Of a coated body as if all of it were of the coating.
@@ -89,7 +89,7 @@ class LocalLaws:
 
     Attributes:
         friction: The law of friction.
-        wear: The wear laws of punch and strip; None where a body does not wear.
+        wear: The wear laws of punch and strip.
         regions: Of punch and strip at the contact nodes.
         initial: Temperature without heat, K.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
@@ -97,7 +97,7 @@ class LocalLaws:
     """
 
     friction: Friction
-    wear: tuple[WearLaw | None, WearLaw | None]
+    wear: tuple[WearLaw, WearLaw]
     coatings: tuple[Array, Array]
     regions: tuple[Regions, Regions] = field(default_factory=lambda: (Regions(), Regions()))
     initial: float = 0.0
@@ -117,7 +117,7 @@ class LocalLaws:
     @property
     def passes(self) -> bool:
         """Whether a coefficient changes as long as a run goes on: with the worn depth, or with what is slid."""
-        given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear if law is not None)]
+        given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear)]
         return any(depends_on(one, "depth", "s") for one in given)
 
     def asks(self, name: str) -> bool:
@@ -177,15 +177,15 @@ class LocalLaws:
             CaseError: a coefficient is negative or not finite there.
         """
 
-        def rate(law: WearLaw | None, key: str) -> BodyRate | None:
-            if law is None:
+        def rate(law: WearLaw, key: str) -> BodyRate | None:
+            if not law.wears:
                 return None
             of_pressure = PressureLaw.of(law, self.friction.contact.uniform_share)
             return BodyRate(coefficient(law, self.friction, conditions, key), of_pressure, law.speed_exponent)
 
         punch, strip = self.wear
         bases = LocalWear(rate(punch, "wear.punch"), rate(strip, "wear.strip"))
-        above = [None if law is None else law.of_coating for law in self.wear]
+        above = [law.of_coating for law in self.wear]
         if above == [None, None]:
             return bases
         of_punch, of_strip = above

@@ -125,10 +125,10 @@ def regions_opposite(
     return Regions.at(of_punch, pair.punch.x), Regions.at(at_contact, pair.punch.x)
 
 
-def any_split(regions: tuple[Regions, Regions], wear: tuple[WearLaw | None, WearLaw | None]) -> bool:
+def any_split(regions: tuple[Regions, Regions], wear: tuple[WearLaw, WearLaw]) -> bool:
     """Return whether nodes between regions share their pressure among unlike coefficients of wear."""
     both = zip(regions, wear, strict=True)
-    return any(law is not None and own.split(law.given_coefficient) for own, law in both)
+    return any(own.split(law.given_coefficient) for own, law in both)
 
 
 def asperity_share(

@@ -34,8 +34,9 @@ import numpy as np
 import xarray
 
 from fenwear import load_case
-from fenwear.report.course import peak_figure
-from fenwear.report.figures import pressure_figure, read_history, shape_figure
+from fenwear.report.course import course_figure
+from fenwear.report.figures import read_history
+from fenwear.report.lines import fields_of, lines_figure
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements, fewer half-cycles
@@ -127,7 +128,8 @@ print(f"width in contact {float(last.contact_width):.1f} {last.contact_width.uni
 
 # %%
 shown = [1, 10, 50, 200] if COARSE else [1, 20, 200, 800, 2600]
-pressure_figure(history, shown)
+fields = fields_of(history)
+lines_figure(history, [fields["pressure"]], shown)
 
 # %% [markdown]
 # ## Worn shape
@@ -136,7 +138,7 @@ pressure_figure(history, shown)
 # every second half-cycle. In the end the shape only moves down as a whole.
 
 # %%
-shape_figure(history, shown)
+lines_figure(history, [fields["wear"]], shown)
 
 # %% [markdown]
 # ## How far has it come?
@@ -146,7 +148,7 @@ shape_figure(history, shown)
 # `steady` gets there at once; `"run.integration=jump"` takes many cycles in one step.
 
 # %%
-peak_figure(history)
+course_figure(history, "peaks")
 
 # %% [markdown]
 # ## Stress in the bodies

@@ -40,11 +40,9 @@ from fenwear.life import (
     parse_quantity,
     parse_scatter,
     read_data,
-    repeated,
     sensitivity,
-    without_values,
 )
-from fenwear.life.pictures import life_figure, tornado
+from fenwear.life.commands import life_figure, tornado
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements and samples
 ELEMENTS, SAMPLES = (12, 6) if COARSE else (60, 100)
@@ -146,8 +144,8 @@ print(f"made-up measurement {1e3 * measured:.1f} µm; expected {expected[1]:.1f}
 # %% [markdown]
 # ## What changes the depth most
 #
-# Derivatives by differences of runs with the same jumps, each with its own error; of a steady state they would come
-# from one linear system. The bars: the depth with each key a tenth smaller and larger.
+# Derivatives by differences of runs with the same jumps, each with its own error. The bars: the depth with each key a
+# tenth smaller and larger.
 
 # %%
 keys = ["wear.punch.coefficient", "punch.loads.0.force.1", "geometry.parameters.radius", "materials.steel.young"]
@@ -173,20 +171,6 @@ life_figure(life)
 # %% [markdown]
 # For rigid bodies $s \propto 1 / (K P')$, so that the variance of $\ln s$ is the sum of those of $\ln K$ and $\ln P'$.
 #
-# ## Do the intervals hold what they say? Twin experiments
-#
-# Data made by the model itself with noise of a known size, fitted again and again: 95 % of the intervals must hold the
-# truth.
-
-# %%
-plan = without_values(tests[0], sigma=1e-3)
-deviations, errors = repeated(
-    LeastSquares(case, [plan], [Unknown("wear.punch.coefficient")]), [0.0], 5 if COARSE else 50
-)
-held = np.abs(deviations[:, 0]) < 1.96 * errors[:, 0]
-print(f"{held.sum()} of {len(held)} intervals hold the truth; the coefficient is known to {100 * errors.mean():.2f} %")
-
-# %% [markdown]
 # On the command line, in the folder that `measured_folder()` names, the same is:
 #
 #     fenwear calibrate block_on_ring.toml block_on_ring_*.csv --unknown wear.punch.coefficient --baseline offset \

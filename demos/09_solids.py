@@ -26,7 +26,8 @@ import xarray
 from IPython import display as screen
 
 from fenwear import assemble, load_case, steady
-from fenwear.report.maps import cuts_figure, map_figure, quantities
+from fenwear.report.lines import fields_of, lines_figure
+from fenwear.report.maps import map_figure
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
@@ -102,8 +103,9 @@ print(f"at the end {float(last.temperature_punch.min()):.1f} to {float(last.temp
 
 # %%
 history, summary = run("pin-on-disc", f"run.half_cycles={100 if COARSE else 2000}", *LINEAR)
-screen.display(map_figure(history, quantities(history)["pressure_map"], [int(n) for n in history.half_cycle[::2]]))
-screen.display(cuts_figure(history, [int(n) for n in history.half_cycle[::2]], along=True))
+fields, chosen = fields_of(history), [int(n) for n in history.half_cycle[::2]]
+screen.display(map_figure(history, fields["pressure"], chosen))
+screen.display(lines_figure(history, [fields["pressure"], fields["wear"]], chosen))
 worn = summary["punch"]
 print(f"worn: {worn['worn_volume_mm3']:.4g} mm³, at most {1e3 * worn['largest_depth_mm']:.3g} µm deep")
 
@@ -117,8 +119,8 @@ print(f"worn: {worn['worn_volume_mm3']:.4g} mm³, at most {1e3 * worn['largest_d
 history, summary = run("ball-on-flat", f"run.half_cycles={10 if COARSE else 40}", "motion.positions=3",
                        "geometry.parameters.across=6", "geometry.degree=1", "geometry.order=1")  # fmt: skip
 chosen = [int(history.half_cycle[-1])]
-for name in ("wear_map", "wear_strip_map"):
-    screen.display(map_figure(history, quantities(history)[name], chosen))
+for name in ("wear", "wear_strip"):
+    screen.display(map_figure(history, fields_of(history)[name], chosen))
 for body, coefficient in (("punch", 1e-8), ("strip", 2e-8)):
     by_hand = coefficient * 20 * 0.2 * chosen[0]
     print(f"{body}: {summary[body]['worn_volume_mm3']:.6g} mm³, by hand {by_hand:.6g} mm³")

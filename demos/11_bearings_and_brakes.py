@@ -27,8 +27,8 @@ import xarray
 from scipy.optimize import brentq
 
 from fenwear import load_case
-from fenwear.report.maps import map_figure, quantities
-from fenwear.report.tracks import tracks_figure
+from fenwear.report.lines import fields_of
+from fenwear.report.maps import map_figure, tracks_figure
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
@@ -104,7 +104,7 @@ print(f"worn volume over k F s {float(history.worn_volume[-1] / (wear * 1000 * h
 small = ["geometry.parameters.fine_elements=12", "geometry.parameters.along=4"] if COARSE else []
 tilted, _ = run("bushing-misaligned", *small)
 chosen = [int(n) for n in tilted.half_cycle.values[[0, len(tilted.half_cycle) // 2, -1]]]
-map_figure(tilted, quantities(tilted)["pressure_map"], chosen)
+map_figure(tilted, fields_of(tilted)["pressure"], chosen)
 
 # %%
 fig, ax = plt.subplots(figsize=(6.5, 3), layout="constrained")
@@ -154,7 +154,7 @@ cup, summary = run("ball-in-cup", "run.half_cycles=100", "run.jump_tolerance=0.1
 tracks_figure(cup)
 
 # %%
-map_figure(cup, quantities(cup)["wear_map"], [int(cup.half_cycle[-1])])
+map_figure(cup, fields_of(cup)["wear"], [int(cup.half_cycle[-1])])
 
 # %%
 print(f"worn per million cycles {summary['punch']['worn_volume_per_million_cycles_mm3']:.1f} mm³")

@@ -76,7 +76,7 @@ _HOMES = {
     "run_case": "run",
     "export": "results.export",
     "read_history": "report.figures",
-    "to_dataset": "results.dataset",
+    "to_dataset": "results.reading",
     "flash_temperatures": "flash.temperatures",
     "sweep": "sweeps",
 }

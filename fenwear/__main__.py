@@ -89,7 +89,7 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
     from fenwear.cli import UsageError, app, told, typer
-    from fenwear.cli.removed import check_removed
+    from fenwear.cli.base import check_removed
     from fenwear.signals import ignore_from_now_on
 
     try:

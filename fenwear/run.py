@@ -49,8 +49,7 @@ from fenwear.plausibility import (
     uniques,
 )
 from fenwear.progress import How, Log, Progress
-from fenwear.results import checkpoint, coating, steps
-from fenwear.results.degrees import degrees_of
+from fenwear.results import between, checkpoint, steps
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
     HISTORY,
@@ -61,6 +60,7 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
+from fenwear.results.quantity import degrees_of
 from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
 from fenwear.results.surfaces import surface_cells
 from fenwear.signals import RunMonitor, Signals
@@ -360,7 +360,7 @@ class _Run:
             self._see_heat(block.system)
             self._see_heat(block.system, block.end)
         self.system = block.system
-        self.extremes |= coating.worn_through(block, self.state, self.extremes)
+        self.extremes |= between.worn_through(block, self.state, self.extremes)
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         self._note("largest_complementarity_error", block.complementarity_error)
@@ -485,15 +485,15 @@ class _Run:
 
         The results are safe by now: what fails here is a warning.
         """
-        from fenwear.accuracy import shown, uncertainty
+        from fenwear.accuracy import uncertainty, uncertainty_table, uncertainty_text
 
         try:
             found = uncertainty(self.case, last)
         except (FenwearError, ArithmeticError, RuntimeError, ValueError) as error:
             self.log(f"warning: the numerical uncertainty of the run could not be told: {error}")
             return {}
-        self.log(shown.text(last.system, found))
-        return {"uncertainty": shown.table(last.system, found)}
+        self.log(uncertainty_text(last.system, found))
+        return {"uncertainty": uncertainty_table(last.system, found)}
 
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""

@@ -126,7 +126,7 @@ def check_history(folder: Path) -> int:
 def check_goes_on(fenwear: Run, folder: Path) -> None:
     """Check that the checkpoint loads, no farther than the history, and that the run goes on."""
     with np.load(folder / "checkpoint" / "state.npz") as moment:
-        reached = int(moment["half_cycle"])
+        reached = int(moment["state.half_cycle"])
     assert reached <= check_history(folder) + 20  # every tenth cycle is kept
     on = options(f"run.half_cycles={reached + 20}", "output.every=10")
     done = fenwear("run", "example1-heat", "-o", folder, *on, "--resume")
@@ -157,7 +157,7 @@ def test_full_disk(fenwear: Run, small_disk: Callable[[int], Path], kilobytes: i
         assert "warning: no report of the run" in done.stderr
         assert check_history(folder) == 40
         with np.load(folder / "checkpoint" / "state.npz") as moment:
-            assert int(moment["half_cycle"]) == 40
+            assert int(moment["state.half_cycle"]) == 40
         return
     assert done.returncode == 1, done.stderr
     assert "cannot be written" in done.stderr
@@ -266,7 +266,7 @@ def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
     assert status == 1
     assert "interrupted" in messages
     with np.load(folder / "checkpoint" / "state.npz") as saved:
-        reached = int(saved["half_cycle"])
+        reached = int(saved["state.half_cycle"])
     with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
         assert history.half_cycle.values[-1] == reached > 0
     words = options(*settings, f"run.half_cycles={reached + 2}", "output.every=1", "output.fields_at=[]")
@@ -299,8 +299,8 @@ def test_killed_at_any_moment(tmp_path: Path) -> None:
     with running(folder, "output.checkpoint=0.01") as process:
         for number in range(30):
             if number % 6 == 0:  # however busy the machine is, it has gone on meanwhile
-                before = int(_kept(folder).get("half_cycle", 0))
-                wait_until(lambda before=before: int(_kept(folder).get("half_cycle", 0)) > before, process)
+                before = int(_kept(folder).get("state.half_cycle", 0))
+                wait_until(lambda before=before: int(_kept(folder).get("state.half_cycle", 0)) > before, process)
             time.sleep(0.0037 * number)
             process.send_signal(signal.SIGSTOP)
             wait_until(lambda: _state(process.pid) == "T")
@@ -311,8 +311,8 @@ def test_killed_at_any_moment(tmp_path: Path) -> None:
         present = [name for name in ("checkpoint", "checkpoint.old") if (copy / name / "state.npz").exists()]
         assert present
         with np.load(copy / present[0] / "state.npz") as moment:
-            assert int(moment["half_cycle"]) <= check_history(copy) + 20
-            reached.add(int(moment["half_cycle"]))
+            assert int(moment["state.half_cycle"]) <= check_history(copy) + 20
+            reached.add(int(moment["state.half_cycle"]))
     assert len(reached) > 3
 
 
@@ -333,8 +333,8 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
         process.send_signal(signal.SIGKILL)
         process.communicate(timeout=PATIENCE)
     with np.load(resumed / "checkpoint" / "state.npz") as moment:
-        assert np.abs(moment["wear_strip"]).max() > 0 or name != "worn strip"
-        last = int(moment["half_cycle"]) + 40
+        assert np.abs(moment["state.worn.strip"]).max() > 0 or name != "worn strip"
+        last = int(moment["state.half_cycle"]) + 40
     words = options(*settings, f"run.half_cycles={last}", "output.every=10", "output.fields_at=[]")
     for folder, ranks, extra in ((resumed, 2, ["--resume"]), (whole, 1, [])):
         done = fenwear("run", case, "-o", folder, *words, *extra, ranks=ranks)
@@ -362,7 +362,7 @@ def _kept(folder: Path) -> dict[str, Any]:
 
 def _reached(folder: Path) -> int:
     """Return the half-cycle of the checkpoint."""
-    return int(_kept(folder).get("half_cycle", 0))
+    return int(_kept(folder).get("state.half_cycle", 0))
 
 
 # ---------------------------------------------------------------------- removed files
@@ -378,7 +378,7 @@ def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
     assert messages.count("history.nc cannot be written: it or its folder has been removed") == 1, messages
     assert "then go on from the checkpoint" in messages
     with np.load(folder / "checkpoint" / "state.npz") as moment:
-        reached = int(moment["half_cycle"])
+        reached = int(moment["state.half_cycle"])
     done = fenwear("run", "example1-heat", "-o", folder, *options(f"run.half_cycles={reached + 20}"), "--resume")
     assert done.returncode == 0, done.stderr
     assert "warning: history.nc is gone" in done.stderr

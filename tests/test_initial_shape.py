@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
 from fenwear.initial_shape import initial_shape
-from fenwear.results.machining import TRIANGLE, profile_of, with_shape
+from fenwear.results.export import TRIANGLE, profile_of, with_shape
 from fenwear.stick.records import TimeStepRecords
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")

@@ -12,7 +12,7 @@ from fenwear.assembly import assemble
 from fenwear.law_choice import check_decided, resolve_law
 from fenwear.plausibility import system_warnings
 from fenwear.run import run_case
-from fenwear.sweeps.evaluate import VariantRunner
+from fenwear.sweeps.engines import VariantRunner
 
 SMALL = (
     "contact.law='auto'",

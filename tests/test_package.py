@@ -130,7 +130,7 @@ def test_import_is_light(run_python: Run) -> None:
 def test_start_is_quick(run_python: Run) -> None:
     """The steady state needs no tables, statistics or plots: a third of its start."""
     late = "{'xarray', 'pandas', 'scipy.stats', 'matplotlib', 'pyvista', 'gmsh'}"
-    modules = "fenwear.cli.states, fenwear.cycle, fenwear.results.degrees"
+    modules = "fenwear.cli.states, fenwear.cycle, fenwear.results.quantity"
     code = f"import sys, {modules}; print(sorted({late} & set(sys.modules)))"
     assert run_python("-c", code).stdout.strip() == "[]"
 

@@ -19,7 +19,7 @@ from fenwear.bodies.ready import ready_geometries
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import coating, creep, registry, roughness, sheet, steps, table_cycle
+from fenwear.results import between, registry, roughness, sheet, steps
 from fenwear_verify.suite import registered
 from fenwear_verify.validation import Experiment, experiments
 from fenwear_verify.validation.command import draw, markdown
@@ -131,9 +131,9 @@ class Results(Written):
             "With heat": registry.OF_HEAT,
             "With heat.track": registry.OF_TRACK,
             "Solids and rings, in place of the plane variables": others,
-            "Coatings; names of the strip's variables end in _strip": coating.of_body("punch"),
-            "Creep; names of the strip's variables end in _strip": creep.of_member("punch"),
-            "Cycles as tables, in solids": table_cycle.VARIABLES,
+            "Coatings; names of the strip's variables end in _strip": between.of_coated("punch"),
+            "Creep; names of the strip's variables end in _strip": between.of_creeping("punch"),
+            "Cycles as tables, in solids": steps.TABLE_VARIABLES,
             "Rough surfaces; names of the strip's variables end in _strip": roughness.of_body("punch"),
             "With contact.law = coulomb": steps.VARIABLES,
             "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,

@@ -29,7 +29,24 @@ limit may be a singularity or a step that wear has left, 1. What the coarser run
 friction and wear coefficients, is no part of it.
 """
 
-from fenwear.accuracy.told import Uncertainty, foreseen, uncertainty, uncertainty_of_steady
+from fenwear.accuracy.told import (
+    Uncertainty,
+    foreseen,
+    uncertainty,
+    uncertainty_of_steady,
+    uncertainty_table,
+    uncertainty_text,
+)
 from fenwear.accuracy.values import Quantity, Value, values_of
 
-__all__ = ["Quantity", "Uncertainty", "Value", "foreseen", "uncertainty", "uncertainty_of_steady", "values_of"]
+__all__ = [
+    "Quantity",
+    "Uncertainty",
+    "Value",
+    "foreseen",
+    "uncertainty",
+    "uncertainty_of_steady",
+    "uncertainty_table",
+    "uncertainty_text",
+    "values_of",
+]

@@ -100,17 +100,22 @@ class Coarser:
 
     Attributes:
         case: Itself.
-        ratio: How many times as far apart its nodes are.
+        ratio: How many times as far apart its nodes are; 1 where there is nothing coarser.
         grid: Its grid, where it has one that stays.
     """
 
     case: Case
-    ratio: float
+    ratio: float = 1.0
     grid: RegularGrid | None = None
 
+    @property
+    def differs(self) -> bool:
+        """Whether it is coarser at all."""
+        return self.ratio > 1
 
-def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser | None:
-    """Return the case on elements of the next lower degree, on a grid half or a quarter as fine; None for none.
+
+def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser:
+    """Return the case on elements of the next lower degree, on a grid half or a quarter as fine.
 
     Args:
         case: The problem.
@@ -119,14 +124,15 @@ def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser | None
     """
     degree, grid, wanted = case.geometry.degree, placed.pair.punch.grid, case.grid
     if wanted is None or grid is None:
-        return None if degree == 1 else Coarser(changed(case, geometry={"degree": degree - 1}), degree / (degree - 1))
+        lower = changed(case, geometry={"degree": max(degree - 1, 1)})
+        return Coarser(lower, degree / max(degree - 1, 1))
     rough = any(body.topography is not None for body in case.bodies.values())  # which is another one on other nodes
     every = 4 if (wanted.across or across) >= 4 * PLENTY and not rough else 2
     if wanted.across is not None:
         few = wanted.across < every * LEAST
-        return None if few else Coarser(changed(case, grid={"across": wanted.across // every}), every)
+        return Coarser(case) if few else Coarser(changed(case, grid={"across": wanted.across // every}), every)
     if max(grid.counts) < FEWEST:
-        return None
+        return Coarser(case)
     fewer = grid.thinned(every, less=int(wanted.size is None))  # by default a spacing is left at each end
     numbers = {"nodes": max(fewer.counts), "size": tuple(fewer.sides), "middle": tuple(fewer.middle)}
     return Coarser(changed(case, grid=numbers), every, fewer)
@@ -177,7 +183,7 @@ def in_longer_jumps(case: Case) -> Case:
     return changed(case, run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)})
 
 
-def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:
+def set_up(case: Case, system: Tribosystem, by: Coarser) -> Tribosystem:
     """Return the bodies of a case; where its curved elements are too coarse, those with straight ones; collective.
 
     What answers on any grid is not made again for a coarser one.
@@ -185,12 +191,12 @@ def set_up(case: Case, system: Tribosystem, by: Coarser | None) -> Tribosystem:
     Args:
         case: The run's on other elements.
         system: Of the run, whose steps of slip it takes.
-        by: What it is coarser by; None where it is not.
+        by: What it is coarser by.
 
     Raises:
         CaseError: neither goes.
     """
-    if by is not None and answers_anywhere(system):
+    if by.differs and answers_anywhere(system):
         return relaid(system, case, by.grid)
     try:
         return renewed(replace(system, case=case))

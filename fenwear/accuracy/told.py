@@ -1,16 +1,27 @@
-"""The contributions to the numerical uncertainty of a run's end."""
+"""What steps and bases of the heat contribute: to temperatures what is known of both, to pressures what the gap feels.
+
+The exchange knows how far contact temperatures and the thermal gap are from those of smaller steps and of the whole
+mesh, relative to themselves. The pressure is solved for once more with a thermal gap that is larger by as much; worn
+depths differ by no more than it does beside a rigid motion, and by no more than the pressure that wears them.
+
+The contributions to the numerical uncertainty of a run's end.
+
+How the uncertainty of a run is told: as a table of summary.json, and in words, with the key that lowers it.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from fenwear.accuracy.again import (
     LESS,
     Again,
+    Coarser,
     are_dear,
     coarser,
     in_few_steps,
@@ -18,15 +29,75 @@ from fenwear.accuracy.again import (
     nodes_across,
     set_up,
 )
-from fenwear.accuracy.heat import of_heat, of_steady_heat
 from fenwear.accuracy.jumps import by_short_jumps
-from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of, values_of_steady
-from fenwear.assembly import Tribosystem
+from fenwear.accuracy.values import BODIES, Contribution, Quantity, Value, Values, values_of, values_of_steady
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.case import Case
 from fenwear.cycle import Block, SteadyState, steady
 from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
+from fenwear.results.quantity import KELVIN, degrees_of
+from fenwear.results.registry import known
+
+
+def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
+    """Return what steps and basis of the heat contribute to the numbers of a run's end; none without heat; collective.
+
+    Args:
+        last: The last half-cycles.
+        values: Their numbers.
+    """
+    fineness = last.system.exchange.fineness
+    if fineness is None or last.heat is None:
+        return {}
+    known = {"heat_steps": fineness.change, "heat_basis": fineness.difference}
+    return {source: _of(last, values, share) for source, share in known.items() if share is not None}
+
+
+def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contribution]:
+    """Return the same of a steady state: relative, of pressures too, which the thermal gap makes at most as much of."""
+    exchange = with_reduced_heat(system).exchange
+    if exchange.fineness is None:
+        return {}
+    start = {"largest_temperature": system.initial_temperature}
+    return {
+        source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
+        for source, share in (("heat_steps", exchange.fineness.change), ("heat_basis", exchange.fineness.difference))
+        if share is not None
+    }
+
+
+def _of(last: Block, values: Values, share: float) -> Contribution:
+    assert last.heat is not None
+    system = last.system
+    rise = float(last.heat.largest_temperature[-1]) - system.initial_temperature
+    pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
+    found: Contribution = {}
+    for quantity, value in values.items():
+        relative = pressure * abs(value.number)
+        found[quantity] = {
+            "largest_temperature": share * abs(rise),
+            "largest_depth": min(relative, depth),
+            "worn_volume": 0.0,
+        }.get(quantity.name, relative)
+    return found
+
+
+def _felt(last: Block, share: float) -> tuple[float, float]:
+    """Return the relative change of the largest pressure by a share more of the thermal gap, and that gap's range."""
+    system, exchange, temperature = last.system, last.system.exchange, last.end.temperature
+    phase = (int(last.half_cycle[-1]) * system.motion.positions - 1) % len(system.motion.phases)
+    thermal = exchange.gap(exchange.own(temperature), phase)
+    gap: Array = system.gap(phase, last.end.worn) + thermal
+    contact = system.phase_contact((phase,))
+    try:
+        before, after = (contact.solve(g).pressure.max() for g in (gap, gap + share * thermal))
+    except ConvergenceError:
+        return share, np.inf
+    return abs(float(after / before) - 1), share * float(np.ptp(thermal))
+
 
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
 AT_EDGE, INSIDE, OF_VOLUME = 1.0, 1.5, 2.0  # orders in the distance of nodes, see `order_of`
@@ -85,10 +156,10 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
     found: dict[str, Contribution] = {}
     untold: dict[str, str] = {}
     lower = coarser(case, last.system, nodes_across(last.system, last.pressure[-last.system.motion.half_cycles :]))
-    if lower is None:
+    if not lower.differs:
         untold["mesh"] = NOTHING_BELOW
     try:
-        base = in_few_steps(case if lower is None else lower.case, last.system, until)
+        base = in_few_steps(lower.case, last.system, until)
         by_jumps = case.run.integration == "jump"
         longer = by_jumps and are_dear(last)
         share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
@@ -96,7 +167,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         first, end, a_cycle_ago = again.ends()
         before, without = values_of(end), by_short_jumps(end)
         short = before if without is None else values_of(without)
-        if lower is not None:
+        if lower.differs:
             coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
             found["mesh"] = of_mesh(values, coarse, lower.ratio)
         of_jumps = {quantity: SAFETY * share * value.apart(short[quantity]) for quantity, value in before.items()}
@@ -220,14 +291,14 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     """
     begin = time.perf_counter()
     case, until = system.case, system.case.run.half_cycles
-    below = coarser(case, system) if case.geometry.degree > 2 or case.grid is not None else None
-    base = in_few_steps(case if below is None else below.case, system, until)
+    below = coarser(case, system) if case.geometry.degree > 2 or case.grid is not None else Coarser(case)
+    base = in_few_steps(below.case, system, until)
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles
-    one = replace(system, case=base) if below is None else set_up(base, system, below)
+    one = set_up(base, system, below) if below.differs else replace(system, case=base)
     _, last, _ = Again(one, until, watch).ends()
     found = uncertainty(base, last, watch)
-    if below is not None and "mesh" in found.contributions:
+    if below.differs and "mesh" in found.contributions:
         mesh = {
             quantity: own / below.ratio ** order_of(quantity, found.values[quantity])
             for quantity, own in found.contributions["mesh"].items()
@@ -253,7 +324,7 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     case = system.case
     lower = coarser(case, system, nodes_across(system, np.array(state.pressure)))
     found, untold = dict[str, Contribution](), dict[str, str]()
-    if lower is None:
+    if not lower.differs:
         untold["mesh"] = NOTHING_BELOW
     else:
         try:
@@ -265,3 +336,113 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     left = state.complementarity_error + ROUNDING
     found["solver"] = {quantity: left * abs(value.number) for quantity, value in values.items()}
     return Uncertainty(values, found, untold, time.perf_counter() - begin)
+
+
+HIGHEST = 8  # degree of elements
+WORDS = {
+    "largest_depth": "worn depth",
+    "worn_volume": "worn volume",
+    "largest_pressure": "largest pressure",
+    "largest_pressure_in_cycle": "largest pressure",
+    "mean_pressure": "mean pressure",
+    "largest_temperature": "temperature",
+}
+
+
+def uncertainty_table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
+    """Return an uncertainty as summary.json has it: under the names of the numbers, in all and by its sources."""
+    return {
+        **(_named(system, found.total) if found.is_whole else {}),
+        "contributions": {source: _named(system, own) for source, own in found.contributions.items()},
+        **({"untold": found.untold} if found.untold else {}),
+        "remedies": remedies(system, found),
+        "seconds": found.seconds,
+    }
+
+
+def _named(system: Tribosystem, numbers: Contribution) -> dict[str, Any]:
+    named: dict[str, Any] = {}
+    for quantity, number in numbers.items():
+        registered = known(quantity.name)
+        if quantity.of in BODIES:
+            named.setdefault(quantity.of, {})[registered.key] = number
+        elif quantity.of:
+            named.setdefault(_way(system, quantity), {})[registered.key] = number
+        elif registered.unit == KELVIN.unit:
+            named[f"{quantity.name}_{degrees_of(system.case).unit}"] = number
+        else:
+            named[registered.key] = number
+    return named
+
+
+def _way(system: Tribosystem, quantity: Quantity) -> str:
+    motion = system.motion
+    stroke = (int(quantity.of) - 1) % motion.half_cycles
+    return system.direction_words[int(motion.phases[stroke * motion.positions].direction)]
+
+
+def remedies(system: Tribosystem, found: Uncertainty) -> dict[str, str]:
+    """Return for each kind of number what would lower its uncertainty most, a key and its value."""
+    worst: dict[str, tuple[float, str]] = {}
+    for quantity, value in found.values.items():
+        share = found.total[quantity] / max(abs(value.number), 1e-300)
+        if share > worst.get(quantity.name, (0.0, ""))[0]:
+            worst[quantity.name] = share, found.largest(quantity)
+    return {name: remedy for name, (_, source) in worst.items() if (remedy := _remedy(system, source))}
+
+
+def _remedy(system: Tribosystem, source: str) -> str:
+    case, positions = system.case, system.motion.positions
+    follow = case.geometry.follow_wear or 0.0
+    fineness = system.exchange.fineness
+    jumps = case.run.integration == "jump"
+    steps = 0 if fineness is None else 2 * fineness.steps
+    tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"
+    return {
+        "mesh": _finer(case),
+        "wear_steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
+        if jumps
+        else 'run.integration = "jump"',
+        "slip_steps": f"stick.step_tolerance = {case.stick.step_tolerance / 2:.2g}",
+        "positions": f"motion.positions = {2 * positions - positions % 2}",
+        "following": f"geometry.follow_wear = {follow / 2:.2g}",
+        "heat_steps": f"heat.steps = {steps}",
+        "heat_basis": tolerance,
+    }.get(source, "")
+
+
+def _finer(case: Case) -> str:
+    """Return which key has nodes lie closer."""
+    grid, degree = case.grid, case.geometry.degree
+    if grid is not None and grid.across is not None:
+        return f"grid.across = {2 * grid.across}"
+    if grid is not None and grid.nodes is not None:
+        return f"grid.nodes = {2 * grid.nodes - 1}"
+    return (
+        f"geometry.degree = {degree + 1}, or smaller elements at and below the contact"
+        if degree < HIGHEST
+        else "more elements"
+    )
+
+
+def in_words(source: str) -> str:
+    """Return a source of uncertainty for people."""
+    return source.replace("_", " ")
+
+
+def uncertainty_text(system: Tribosystem, found: Uncertainty) -> str:
+    """Return in a few lines how uncertain the numbers are, what of, and what would help."""
+    told, helps, total = [], remedies(system, found), found.total
+    for name, words in WORDS.items() if found.is_whole else ():
+        shares = {q: total[q] / max(abs(v.number), 1e-300) for q, v in found.values.items() if q.name == name}
+        if not shares:
+            continue
+        worst = max(shares, key=lambda quantity: shares[quantity])
+        by = f", most by the {in_words(found.largest(worst))}" if name in helps else ""
+        # A share of kelvins tells nothing, nor one of a rise above a temperature that bodies have in part.
+        size = f"{total[worst]:.2g} K" if name == "largest_temperature" else f"{100 * shares[worst]:.2g} %"
+        told.append(f"{words} {size}{by}")
+    lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
+    lines += [f"not told of the {in_words(source)}: {why}" for source, why in found.untold.items()]
+    lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]
+    return "\n".join(lines)

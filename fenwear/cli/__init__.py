@@ -6,7 +6,7 @@ with without("rich"):  # typer would load it to draw boxes that are drawn nowher
     import typer
 
 # In the order in which the help lists their commands.
-from fenwear.cli import cases, states, shape, folders, studies, about, agents  # noqa: I001
+from fenwear.cli import cases, states, folders, studies, about, agents  # noqa: I001
 from fenwear.cli.base import UsageError, app, told
 
-__all__ = ["UsageError", "about", "agents", "app", "cases", "folders", "shape", "states", "studies", "told", "typer"]
+__all__ = ["UsageError", "about", "agents", "app", "cases", "folders", "states", "studies", "told", "typer"]

@@ -1,10 +1,13 @@
-"""What all commands share: the application, its common options, reading a case and printing."""
+"""What all commands share: the application, its common options, reading a case and printing.
+
+Options and commands that were removed, and what takes their place.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TextIO
@@ -130,10 +133,32 @@ def show_results(found: str | dict[str, Any], where: str) -> None:
 
 
 def print_json(data: dict[str, Any]) -> None:
-    """Print one JSON object in a line."""
-    _write(sys.stdout, json.dumps(data))
+    """Print one JSON object in a line; numbers that are not finite are null."""
+    from fenwear.results.disk import finite
+
+    _write(sys.stdout, json.dumps(finite(data)))
 
 
 def print_case(case: Case) -> None:
     """Print a case with all defaults, as a case file."""
     _write(sys.stdout, case.to_toml())
+
+
+REMOVED = {
+    "--posterior": "removed. Sample the posterior with emcee: docs/how-to/calibrate.md has the recipe",
+    "--sobol": "removed. Compute Sobol indices with SALib: docs/how-to/calibrate.md has the recipe",
+    "--jumped": "removed. Run the case twice, with --set run.integration=implicit and =jump, then compare both folders",
+    "serve": "removed. Offer the model with the package umbridge: docs/how-to/other-programs.md has the script",
+}
+
+
+def check_removed(arguments: Sequence[str]) -> None:
+    """Check that a command line has nothing that was removed.
+
+    Raises:
+        CaseError: names it, and what takes its place.
+    """
+    words = [word.partition("=")[0] for word in arguments]
+    found = [word for at, word in enumerate(words) if word in REMOVED and (at == 0 or word.startswith("-"))]
+    if found:
+        raise CaseError([InputError(word, REMOVED[word]) for word in found])

@@ -68,8 +68,8 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
-    from fenwear.results.contacts import contact_text
     from fenwear.results.sheet import sheet_text
+    from fenwear.results.summary import contact_text
     from fenwear.run import run_case
 
     loaded = load(case, settings)
@@ -123,12 +123,8 @@ def check_command(
 def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: bool, full: bool) -> None:
     """Validate a case and say what it comes to."""
     from fenwear.assembly import elastic, law_named, place_case, resources_of
-    from fenwear.cycle import stability_number
-    from fenwear.heat.periodic import cycle_memory
     from fenwear.law_choice import choose_law, with_law
-    from fenwear.parallel import memory_size
-    from fenwear.plausibility import fineness_text, initial_warnings
-    from fenwear.run import level_of, position_warnings
+    from fenwear.run import level_of
 
     loaded = load(case, settings)
     if loaded.sticks:
@@ -147,9 +143,19 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
             _check_stick(loaded, stuck, accuracy=accuracy, full=full)
             return
         system = replace(system, case=loaded)
-    from fenwear.optimum import motion_words
+    _check_sliding(system, heat_seconds, accuracy=accuracy, full=full)
 
-    number = stability_number(system)
+
+def _check_sliding(system: Tribosystem, heat_seconds: float, *, accuracy: bool, full: bool) -> None:
+    """Say what a case comes to whose surfaces slide as a whole."""
+    from fenwear.cycle import stability_number
+    from fenwear.heat.periodic import cycle_memory
+    from fenwear.optimum import motion_words
+    from fenwear.parallel import memory_size
+    from fenwear.plausibility import fineness_text, initial_warnings
+    from fenwear.run import position_warnings
+
+    loaded, number = system.case, stability_number(system)
     system.passing(system.phases_wear)  # with a look at the life of debris, as at all other laws
     system.check_touching()
     warnings = [
@@ -211,10 +217,10 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
 
 def _foresee(system: Tribosystem) -> None:
     """Say how uncertain the numbers of a run will be."""
-    from fenwear.accuracy import foreseen, shown
+    from fenwear.accuracy import foreseen, uncertainty_text
 
     found = foreseen(system)
-    log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {shown.text(system, found)}")
+    log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {uncertainty_text(system, found)}")
 
 
 def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: bool, full: bool) -> None:

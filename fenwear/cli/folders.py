@@ -24,8 +24,8 @@ def plot_command(
     axis: Annotated[str, typer.Option(help="Horizontal axis of the figures: cycles, distance or time.")] = "cycles",
 ) -> None:
     """Draw a run: figures with captions, pictures of the bodies and report.html, into its folder."""
-    from fenwear.report.chosen import chosen_formats, chosen_look
     from fenwear.report.page import write_report
+    from fenwear.report.style import chosen_formats, chosen_look
 
     look, endings = chosen_look(width, axis), chosen_formats(formats)
     paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
@@ -50,8 +50,7 @@ def export_command(
     ] = False,
 ) -> None:
     """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
-    from fenwear.results.export import export
-    from fenwear.results.worn import export_worn
+    from fenwear.results.export import export, export_worn
 
     if worn:
         paths = export_worn(directory, output, "last" if at == "first,last" else at)
@@ -80,8 +79,8 @@ def flash_command(
     """Compute flash temperatures of a run on a contact grid, by moving sources."""
     from fenwear.flash.temperatures import flash_temperatures
     from fenwear.flash.told import dataset, numbers, text
-    from fenwear.report.draw import DPI
-    from fenwear.report.flash import figures
+    from fenwear.report.figures import DPI
+    from fenwear.report.maps import flash_figures
     from fenwear.report.style import name_bodies, save
     from fenwear.results.disk import writing
     from fenwear.results.netcdf import write
@@ -91,7 +90,7 @@ def flash_command(
 
     def keep() -> None:
         maps = dataset(found)
-        drawn = figures(maps)
+        drawn = flash_figures(maps)
         name_bodies(drawn.values(), names)
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case
 from fenwear.cycle.totals import approach
 from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
-from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
+from fenwear.results.quantity import CELSIUS, KELVIN, degrees_of
 from fenwear.results.steps import REGIMES, regime_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.final import FinalShape

@@ -1,4 +1,7 @@
-"""Commands that find a state directly: the cyclic steady state, and the pressure optimum."""
+"""Commands that find a state directly: the cyclic steady state, and the pressure optimum.
+
+The command that finds the shape to machine.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,12 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from fenwear.case import Case, plausibility_warnings
+from fenwear.case import plausibility_warnings
 from fenwear.case.program import held_at
 from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, ConvergenceError, InputError
@@ -18,7 +22,7 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
     from fenwear.cycle import RunningIn, SteadyState
-
+    from fenwear.initial_shape import InitialShape
 
 T = TypeVar("T")
 StepOption = Annotated[
@@ -49,80 +53,97 @@ def steady_command(
 ) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import with_case, with_reduced_heat
-    from fenwear.cycle import growth_rate, heat_gain, heat_warnings, held, running_in, steady
+    from fenwear.cycle import growth_rate, held, running_in, steady
     from fenwear.law_choice import resolve_law
-    from fenwear.plausibility import fineness_warnings, steady_warnings
-    from fenwear.results.degrees import degrees_of
 
     begin = time.perf_counter()
     given = load(case, settings)
     held_at(given, _number(step))  # before anything is set up
     law_state = resolve_law(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
-    loaded, system = law_state.case, law_state.system
-    of_step = held(system, _number(step))
-    if of_step is not None:
-        loaded = of_step[0]
-        system = with_case(system, loaded)
+    system, held_step = law_state.system, held(law_state.system, _number(step))
+    of_step = ""
+    if held_step is not None:
+        system, of_step = with_case(system, held_step[0]), held_step[1]
     if system.sticks:
         _print_final(case, system, as_json=as_json)
         return
-    if of_step is not None:
+    if of_step:
         system = with_reduced_heat(system, keep=True, fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    found, forces = state.system, _forces(state)
-    gain = heat_gain(with_reduced_heat(found), state.phase_pressure, None if state.heat is None else state.heat.end)
+    forces, gain, warnings = _forces(state), *_gain_and_warnings(system, state)
+    if not as_json:
+        _print_steady(case, state, forces, of_step)
+    uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), {}) if accuracy else {}
+    way = time.perf_counter()
+    rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
+    short = len(state.system.motion.phases) <= FOLLOWED
+    cycles = None
+    if rate < 0 and short:
+        cycles = _unless_failed("the way there", lambda: running_in(state.system, state, 0.01), cycles)
+    seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
+    in_all = time.perf_counter() - begin
+    if not as_json:
+        _print_way(rate, short, cycles, seconds, in_all)
+        return
+    print_json(
+        {
+            **({"of": of_step} if of_step else {}),
+            **_state_json(state),
+            "growth_rate_per_s": rate,
+            "heat_gain": gain,
+            **{name: values for name, (_, values) in forces.items()},
+            "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
+            "cycles_to_1_percent_uncertainty": None if cycles is None else round(cycles.uncertainty),
+            **uncertain,
+            "seconds": state.seconds,
+            "all_seconds": {**seconds, "in_all": in_all},
+            "warnings": warnings,
+        }
+    )
+
+
+def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float, list[str]]:
+    """Return the largest share that friction heat gives back, and what is to be said of a state, and say it."""
+    from fenwear.assembly import with_reduced_heat
+    from fenwear.cycle import heat_gain, heat_warnings
+    from fenwear.plausibility import fineness_warnings, steady_warnings
+
+    warm = with_reduced_heat(state.system)
+    gain = heat_gain(warm, state.phase_pressure, None if state.heat is None else state.heat.end)
     warnings = [
         *system.bodies.remarks,
-        *plausibility_warnings(loaded),
-        *steady_warnings(found, state),
+        *plausibility_warnings(system.case),
+        *steady_warnings(state.system, state),
         *heat_warnings(gain),
         *fineness_warnings(system),
     ]
     for warning in warnings:
         log(f"warning: {warning}")
-    if not as_json:
-        _print_steady(case, state, forces, of_step[1] if of_step else "")
-    uncertain: dict[str, Any] = {}
-    if accuracy:
-        uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), uncertain)
-    way = time.perf_counter()
-    rate = _unless_failed("its stability", lambda: growth_rate(found, state), math.nan)
-    short = len(found.motion.phases) <= FOLLOWED
-    cycles = None
-    if rate < 0 and short:
-        cycles = _unless_failed("the way there", lambda: running_in(found, state, 0.01), cycles)
-    seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
-    if not as_json:
-        _print_way(rate, short, cycles, seconds, time.perf_counter() - begin)
-        return
-    degrees = degrees_of(loaded)
+    return gain, warnings
+
+
+def _state_json(state: SteadyState) -> dict[str, Any]:
+    """Return a steady state's pressures, shape, temperatures and wear as --json prints them."""
+    from fenwear.results.quantity import degrees_of
+
+    degrees, system = degrees_of(state.system.case), state.system
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
-    print_json(
-        {
-            **coordinates(found),
-            **_held_json(of_step),
-            "pressure_plus": pressures.get(1),
-            "pressure_minus": pressures.get(-1),
-            "shape": state.shape.tolist(),
-            "temperature": None if state.heat is None else degrees.of(state.heat.punch[-1]).tolist(),
-            "temperature_strip": None if state.heat is None else degrees.of(state.heat.strip[-1]).tolist(),
-            "temperature_unit": None if state.heat is None else degrees.unit,
-            "property_passes": state.passes,
-            "growth_rate_per_s": None if math.isnan(rate) else rate,
-            "complementarity_error": state.complementarity_error,
-            "heat_gain": gain,
-            **{name: values for name, (_, values) in forces.items()},
-            "wear_per_cycle": state.wear_per_cycle.tolist(),
-            **state.velocity,
-            "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
-            "cycles_to_1_percent_uncertainty": None if cycles is None else round(cycles.uncertainty),
-            **uncertain,
-            "seconds": state.seconds,
-            "all_seconds": {**seconds, "in_all": time.perf_counter() - begin},
-            "warnings": warnings,
-        }
-    )
+    warm: dict[str, Any] = dict.fromkeys(("temperature", "temperature_strip", "temperature_unit"))
+    if state.heat is not None:
+        sides = [degrees.of(side[-1]).tolist() for side in (state.heat.punch, state.heat.strip)]
+        warm = dict(zip(warm, (*sides, degrees.unit), strict=True))
+    return {
+        **coordinates(system),
+        "pressure_plus": pressures.get(1),
+        "pressure_minus": pressures.get(-1),
+        "shape": state.shape.tolist(),
+        **warm,
+        "property_passes": state.passes,
+        "complementarity_error": state.complementarity_error,
+        "wear_per_cycle": state.wear_per_cycle.tolist(),
+        **state.velocity,
+    }
 
 
 def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
@@ -136,11 +157,11 @@ def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
 
 def _uncertain(state: SteadyState) -> dict[str, Any]:
     """Return how uncertain a state's numbers are, and say it."""
-    from fenwear.accuracy import shown, uncertainty_of_steady
+    from fenwear.accuracy import uncertainty_of_steady, uncertainty_table, uncertainty_text
 
     found = uncertainty_of_steady(state)
-    log(shown.text(state.system, found))
-    return {"uncertainty": shown.table(state.system, found)}
+    log(uncertainty_text(state.system, found))
+    return {"uncertainty": uncertainty_table(state.system, found)}
 
 
 def _print_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
@@ -163,10 +184,6 @@ def _number(step: int | None) -> int | None:
     return None if step is None else step - 1
 
 
-def _held_json(of_step: tuple[Case, str] | None) -> dict[str, str]:
-    return {} if of_step is None else {"of": of_step[1]}
-
-
 def _forces(state: SteadyState) -> dict[str, tuple[str, Any]]:
     """Return what the contact carries in each half-cycle of a state, by names: the unit, and values."""
     from fenwear.cycle.steady_cycle import cycle_of_state
@@ -178,7 +195,7 @@ def _forces(state: SteadyState) -> dict[str, tuple[str, Any]]:
         name: (known[name].unit, known[name].compute(records).tolist()) for name in (*SIZES, *CARRIED) if name in known
     }
     nominal = nominal_pressure(state.system, state.system.normal_force)
-    return found if nominal is None else {**found, "nominal_pressure": ("MPa", nominal)}
+    return {**found, **{name: ("MPa", value) for name, value in nominal.items()}}
 
 
 def coordinates(system: Tribosystem) -> dict[str, Any]:
@@ -193,7 +210,7 @@ def coordinates(system: Tribosystem) -> dict[str, Any]:
 def _print_steady(case: str, state: SteadyState, forces: dict[str, tuple[str, Any]], step: str) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     from fenwear.cycle.state import pressure_scale
-    from fenwear.results.degrees import degrees_of
+    from fenwear.results.quantity import degrees_of
 
     show(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     if step:
@@ -275,10 +292,10 @@ def optimum_command(
         reason = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
         raise CaseError(InputError("contact.law", reason))
     held_at(given, _number(step))  # before any mesh is made
-    system = place_case(given)
-    of_step = held(system, _number(step))
-    if of_step is not None:
-        system = place_case(of_step[0])
+    system, of_step = place_case(given), ""
+    held_step = held(system, _number(step))
+    if held_step is not None:
+        system, of_step = place_case(held_step[0]), held_step[1]
     if not system.rigid.mode_names:
         reason = (
             "they hold the punch along the contact's normal: no rigid motion follows the wear, and no pressure stays"
@@ -292,11 +309,11 @@ def optimum_command(
                 n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
                 for n, o in found.items()
             }
-            | _held_json(of_step)
+            | ({"of": of_step} if of_step else {})
         )
         return
-    if of_step is not None:
-        show(f"of {of_step[1]}")
+    if of_step:
+        show(f"of {of_step}")
     for name, state in found.items():
         show(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
@@ -304,3 +321,77 @@ def optimum_command(
             names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
             at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
             show(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")
+
+
+SAME = 1e-6  # of the pressure scale
+
+
+@app.command("shape")
+def shape_command(
+    case: CaseArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="New folder of the profile, surface and case.")],
+    settings: SetOption = [],  # noqa: B006
+    loads: Annotated[
+        list[str],
+        typer.Option(
+            "--load",
+            metavar="FACTOR[:SHARE]",
+            help="Factor of all loads, and its share of the sliding; repeatable, for loads that take turns.",
+        ),
+    ] = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Find the shape to machine: that of the steady state (of a program: in its last step), without run-in."""
+    from fenwear.assembly import with_reduced_heat
+    from fenwear.assembly.variants import with_case
+    from fenwear.cycle import held
+    from fenwear.initial_shape import initial_shape
+    from fenwear.law_choice import resolve_law
+    from fenwear.parallel import on_root
+    from fenwear.results.export import write_shape
+
+    law_state = resolve_law(load(case, settings), log, heat="none")
+    loaded, system = law_state.case, law_state.system
+    wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
+    of_step = held(system)
+    if of_step is not None:
+        system = with_case(system, of_step[0])
+    if not system.sticks:
+        system = with_reduced_heat(system, keep=True)
+    shape = initial_shape(system, wanted)
+    on_root(system.comm, lambda: write_shape(output, loaded, shape))
+    if as_json:
+        rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
+        known = [{"largest_pressure": pressure, "left_to_run_in": left} for pressure, left in rows]
+        numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}
+        print_json({**coordinates(system), **numbers, "uneven_wear": shape.uneven_wear})
+        return
+    _print_shape(case, wanted, shape)
+    log(f"profile, surface and case in {output}; next: fenwear run {output / 'case.toml'}")
+
+
+def _print_shape(case: str, wanted: list[tuple[float, float]], shape: InitialShape) -> None:
+    """Print how deep a shape to machine is, and its pressures under each load."""
+    show(f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep")
+    show(f"  made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale")
+    for (factor, share), state, p, left in zip(
+        wanted, shape.states, shape.largest_pressure, shape.left_to_run_in, strict=True
+    ):
+        at = "" if len(wanted) == 1 else f" at {factor:g} of the loads, {share:g} of the sliding"
+        worn = f"{state.pressure.max():.3f} MPa once worn in"
+        if math.isnan(p):
+            show(f"  largest pressure{at}: {worn}, and as warm as then from the start")
+        else:
+            change = "the same" if left < SAME else f"differ by {100 * left:.2g} % at most"
+            show(f"  largest pressure{at}: {p:.3f} MPa in the first cycle, {worn} ({change})")
+    if shape.uneven_wear > SAME:
+        show(f"  the loads reach different zones: their wear together is uneven by {100 * shape.uneven_wear:.2g} %")
+
+
+def _load_of(text: str) -> tuple[float, float]:
+    """Return the factor and the share of FACTOR or FACTOR:SHARE."""
+    factor, _, share = text.partition(":")
+    try:
+        return float(factor), float(share or 1.0)
+    except ValueError:
+        raise CaseError(InputError("--load", f"expected FACTOR or FACTOR:SHARE, got {text!r}")) from None

@@ -234,15 +234,16 @@ def sweep_command(
     as_json: JsonOption = False,
 ) -> None:
     """Compute many variants of a case side by side: keys over their values, in one dataset."""
-    from fenwear.sweeps import command
+    from fenwear.sweeps.sweep import as_json as sweep_json
+    from fenwear.sweeps.sweep import run_sweep, text
 
     loaded = load(case, settings)
     if overwrite:
         clear(output, resume=resume)
-    dataset, folder = command.run_sweep(
+    dataset, folder = run_sweep(
         loaded, Path(case).stem, over, table, of, output, log,
         zipped=zipped, resume=resume, processes=processes, quiet=quiet,
     )  # fmt: skip
-    show_results(command.as_json(dataset) if as_json else command.text(dataset), f"results in {folder}")
+    show_results(sweep_json(dataset) if as_json else text(dataset), f"results in {folder}")
     if (dataset["trouble"].values != "").any():
         raise typer.Exit(3)

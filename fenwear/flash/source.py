@@ -36,6 +36,7 @@ from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, Cycle
 from fenwear.case.program import stages_of
 from fenwear.cycle import march
+from fenwear.cycle.state import known_pressures
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import check_memory, on_root
 from fenwear.results import checkpoint
@@ -231,25 +232,26 @@ def heating_of(case: Case, directory: Path) -> Heating:
 def _of_positions(case: Case, directory: Path) -> Heating:
     """Return the heat of surfaces that slide as a whole; collective."""
     placed = place_case(case)
-    last = on_root(placed.comm, lambda: checkpoint.last_contact(directory))
+    kept = on_root(placed.comm, lambda: checkpoint.last_contact(directory))
+    last = kept.state
     stage = next((one for one in stages_of(case) if one.end >= last.half_cycle), None)
     if stage is not None:
         case = case.model_copy(update={"motion": stage.case.motion, "program": None})
-    if stage is not None or last.followed is not None:
-        placed = place_case(case, followed=last.followed)
-    if last.grid is not None:
-        placed = placed_on(placed, grid_of(placed).with_numbers(last.grid))
-    motion = placed.motion
-    if last.pressure.shape != (len(motion.phases), len(placed.pair.weights)) or np.isnan(last.pressure).any():
+    if stage is not None or kept.followed is not None:
+        placed = place_case(case, followed=kept.followed)
+    if kept.grid is not None:
+        placed = placed_on(placed, grid_of(placed).with_numbers(kept.grid))
+    motion, reached = placed.motion, known_pressures(last.contacts)
+    if reached is None or reached.shape != (len(motion.phases), len(placed.pair.weights)):
         raise CaseError(InputError(str(directory), "expected a run that has done a whole cycle"))
-    heat = np.empty_like(last.pressure)
+    heat = np.empty_like(reached)
     for k in range(len(heat)):
-        conditions = placed.conditions(k, last.pressure[k], worn=last.worn, half_cycles=last.half_cycle)
-        heat[k] = last.pressure[k] * heating_friction(placed, placed.friction.values(conditions), k)
-    along = _along(placed, last.pressure)
-    window = Window.around(grid_of(placed), last.pressure)
+        conditions = placed.conditions(k, reached[k], worn=last.worn, half_cycles=last.half_cycle)
+        heat[k] = reached[k] * heating_friction(placed, placed.friction.values(conditions), k)
+    along = _along(placed, reached)
+    window = Window.around(grid_of(placed), reached)
     heat *= placed.pair.weights / window.cell
-    pressure, heat = last.pressure[:, window.nodes], heat[:, window.nodes]
+    pressure, heat = reached[:, window.nodes], heat[:, window.nodes]
     if motion.one_way:
         velocity = motion.directions[0] * motion.mean_speed * along
         fast, whole = float(np.linalg.norm(velocity)), heat[:1] * motion.mean_speed

@@ -10,18 +10,15 @@ From Python:
     life = lifetime(case, "depth 0.2 mm", fit.scatter())
 """
 
-from fenwear.life.between_tests import between
-from fenwear.life.calibrate import Calibration, calibrate
-from fenwear.life.data import DataSet, Series, measured_folder, read_data
-from fenwear.life.forward import Forward, forward
-from fenwear.life.least_squares import LeastSquares, repeated, without_values
+from fenwear.life.calibrate import Calibration, between, calibrate
+from fenwear.life.data import DataSet, Noise, Series, measured_folder, read_data
+from fenwear.life.keys import Unknown
+from fenwear.life.least_squares import LeastSquares
 from fenwear.life.lifetime import Lifetime, lifetime
 from fenwear.life.model import Model, Snapshot
-from fenwear.life.noise import Noise
 from fenwear.life.quantities import Quantity, evaluate, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
-from fenwear.life.sensitivity import Sensitivity, sensitivity
-from fenwear.life.unknowns import Unknown
+from fenwear.life.sensitivity import Forward, Sensitivity, forward, sensitivity
 
 __all__ = [
     "Calibration",
@@ -47,7 +44,5 @@ __all__ = [
     "parse_quantity",
     "parse_scatter",
     "read_data",
-    "repeated",
     "sensitivity",
-    "without_values",
 ]

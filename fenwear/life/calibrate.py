@@ -4,7 +4,9 @@ Minimised is chi^2 = sum ((prediction - value) / sigma)^2 over the unknown keys 
 offset and tilt of the trace where they are asked for. The covariance is (J^T J)^-1, J the Jacobian
 of the weighted residuals, times chi^2 / (n - m) where no sigma was given. Unknowns that cannot be
 negative are fitted by their logarithms: their intervals are intervals of a ratio. Intervals end at the key's bounds.
-Errors that depend on each other are whitened, see `fenwear.life.noise`.
+Errors that depend on each other are whitened, see `fenwear.life.data`.
+
+The scatter between tests of the same kind.
 """
 
 from __future__ import annotations
@@ -22,16 +24,20 @@ from scipy.optimize import OptimizeResult
 from fenwear.arrays import Array, Mask
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
-from fenwear.life.data import DataSet, Series
-from fenwear.life.identifiable import hardly_known, known_together, not_determined, without_baselines
-from fenwear.life.keys import nearest_possible
-from fenwear.life.least_squares import LeastSquares
-from fenwear.life.noise import FEW, SMOOTH, Noise, in_order, neighbours_ratio
+from fenwear.life.data import FEW, SMOOTH, DataSet, Noise, Series, in_order, neighbours_ratio
+from fenwear.life.keys import ScaledUnknown, Unknown, nearest_possible
+from fenwear.life.least_squares import (
+    LeastSquares,
+    hardly_known,
+    known_together,
+    not_determined,
+    without_baselines,
+)
 from fenwear.life.quantities import GROWING, unit_of
+from fenwear.life.runs import Trials
 from fenwear.life.scatter import Scatter
-from fenwear.life.trials import Trials
-from fenwear.life.unknowns import ScaledUnknown, Unknown
 from fenwear.parallel import on_root
+from fenwear.results.disk import finite
 
 LARGEST_CONDITION = 1e12  # of the Jacobian, beyond which the data do not tell what is fitted
 WIDER = 1.5  # factor of a standard error worth a word
@@ -134,21 +140,17 @@ class Calibration:
 
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints and calibration.json holds."""
-
-        def number(value: float) -> float | None:
-            return float(value) if np.isfinite(value) else None
-
-        return {
+        found = {
             "unknowns": [
-                {"key": one.key, "value": one.value, "unit": one.unit, "standard_error": number(one.standard_error),
-                 "interval_95": [number(one.low), number(one.high)], "logarithmic": one.logarithmic}
+                {"key": one.key, "value": one.value, "unit": one.unit, "standard_error": one.standard_error,
+                 "interval_95": [one.low, one.high], "logarithmic": one.logarithmic}
                 for one in self.fitted
             ],
             "correlation": self.correlation.tolist(),
             "covariance": self.covariance.tolist() if np.isfinite(self.covariance).all() else None,
             "traces": [
                 {"name": t.name, "quantity": t.series.quantity, "measurements": len(t.series.values),
-                 "offset_mm": number(t.offset), "tilt": number(t.tilt),
+                 "offset_mm": t.offset, "tilt": t.tilt,
                  "rms_residual": float(np.sqrt(np.mean(t.residual**2)))}
                 for t in self.traces
             ],
@@ -159,6 +161,7 @@ class Calibration:
             "at_bound": list(self.at_bound),
             "evaluations": self.evaluations,
         }  # fmt: skip
+        return dict(finite(found))
 
     def text(self) -> str:
         """Return a table for people."""
@@ -302,12 +305,12 @@ def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask
         begin = rows.stop
         if series.noise.kind or not trace.residual.any():
             continue
-        if series.x is None and series.quantity in GROWING and (len(series.values) < FEW or ratio < SMOOTH):
+        if not series.is_profile and series.quantity in GROWING and (len(series.values) < FEW or ratio < SMOOTH):
             added.append(series.quantity)
             both[rows] = Noise("adds up").whitened(both[rows], None, None, series.after)
-        elif series.x is not None and ratio < SMOOTH:
+        elif series.is_profile and ratio < SMOOTH:
             alike = 1 - ratio / 2
-            length = -float(np.median(in_order(series.x)[1])) / np.log(alike)
+            length = -float(np.median(in_order(series.places)[1])) / np.log(alike)
             remarks.append(
                 f"{trace.name}: neighbouring residuals are alike (correlation {alike:.2f}), so standard errors are too "
                 f"small. Set `# scatter = alike over {length:.2g} mm` in the file"
@@ -374,3 +377,44 @@ def _traces(problem: LeastSquares, predicted: Array, lines: Array) -> list[Trace
         }
         found.append(Trace(name, series, predicted[rows], **own))
     return found
+
+
+LEAST_TESTS = 3
+
+
+def between(found: Sequence[Calibration]) -> Scatter:
+    """Return the distribution of the unknowns from test to test: what tests of the same kind differ by.
+
+    Normal, or lognormal where they were fitted so, with mean and covariance of the tests' results.
+
+    Raises:
+        CaseError: fewer than three tests, not of the same unknowns, or their results do not differ.
+    """
+    values, covariance, logarithmic = _between(found)
+    return Scatter.joint(list(found[0].values), [float(value) for value in values], covariance, logarithmic)
+
+
+def _between(found: Sequence[Calibration]) -> tuple[Array, Array, list[bool]]:
+    """Return middle values, covariance between tests, and which unknowns are taken by their logarithms."""
+    if len(found) < LEAST_TESTS:
+        raise CaseError(InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(found)}"))
+    if len({tuple(one.values) for one in found}) > 1:
+        raise CaseError(InputError("--each", "expected the same unknowns in every calibration"))
+    logarithmic = [one.logarithmic for one in found[0].fitted]
+    table = np.array([[np.log(u.value) if u.logarithmic else u.value for u in one.fitted] for one in found])
+    covariance = np.atleast_2d(np.cov(table.T))
+    if not (np.diag(covariance) > 0).all() or len(found) <= table.shape[1]:
+        raise CaseError(InputError("--each", "expected more tests than unknowns, and results that differ"))
+    middle = table.mean(axis=0)
+    return np.where(logarithmic, np.exp(middle), middle), covariance, logarithmic
+
+
+def between_as_json(found: Sequence[Calibration]) -> dict[str, Any]:
+    """Return the scatter between tests in the form of a calibration's result."""
+    values, covariance, logarithmic = _between(found)
+    rows = [
+        {"key": one.key, "value": float(value), "unit": one.unit, "logarithmic": by_log}
+        for one, value, by_log in zip(found[0].fitted, values, logarithmic, strict=True)
+    ]
+    lines = list(dict.fromkeys(line for one in found for line in one.not_known))
+    return {"unknowns": rows, "covariance": covariance.tolist(), "not_known": lines}

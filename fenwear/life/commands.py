@@ -1,35 +1,131 @@
-"""What the commands sensitivity, calibrate and life do: compute, write into a folder, say where."""
+"""Pictures of sensitivities, calibrations and lives.
+
+What the commands sensitivity, calibrate and life do: compute, write into a folder, say where.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
+import itertools
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from mpi4py import MPI
 
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
-from fenwear.life.between_tests import between, between_as_json
-from fenwear.life.calibrate import Calibration, calibrate
+from fenwear.life.calibrate import Calibration, between, between_as_json, calibrate
 from fenwear.life.data import read_data
-from fenwear.life.keys import with_values
-from fenwear.life.lifetime import SAMPLES, Lifetime, Lives, lifetime
+from fenwear.life.keys import parse_unknown, with_values
+from fenwear.life.lifetime import Lifetime, Lives, lifetime
 from fenwear.life.model import Model
-from fenwear.life.pictures import life_figure, residuals, save, tornado
 from fenwear.life.quantities import Quantity, cycles_of, lives, of_case, parse_amount, parse_quantity, unit_of
-from fenwear.life.ranks import everywhere
+from fenwear.life.runs import TRIALS, Trials, everywhere
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
-from fenwear.life.trials import TRIALS, Trials
-from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
 from fenwear.progress import now_and_then
-from fenwear.results.disk import write_text
-from fenwear.results.history import CASE, free_directory, make_directory, write_case
+from fenwear.report.style import BLUE, GREY, RED, panels, reference_line
+from fenwear.results.disk import write_text, writing
+from fenwear.results.export import csv_text
+from fenwear.results.history import free_directory, make_directory, write_case
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+DECADE = 10.0
+
+
+def tornado(sensitivities: Sequence[Sensitivity]) -> Figure:
+    """Return a panel for each quantity: its values with each key smaller and larger, the most influential on top."""
+    most = max(len(one.derivatives) for one in sensitivities)
+    figure, axes = panels(len(sensitivities), 0.9 + 0.35 * most, share_x=False)
+    for ax, one in zip(axes, sensitivities, strict=True):
+        rows = one.ranked()[::-1]
+        for height, row in enumerate(rows):
+            for end, colour, name in ((row.low, BLUE, "smaller"), (row.high, RED, "larger")):
+                if np.isfinite(end):
+                    label = f"key {100 * one.spread:g} % {name}" if height == len(rows) - 1 else None
+                    ax.barh(height, end - one.value, left=one.value, color=colour, height=0.7, label=label)
+        ax.set_yticks(range(len(rows)), [row.key for row in rows])
+        ax.axvline(one.value, color=GREY, linewidth=0.8)
+        ax.set_xlabel(f"{one.quantity} ({one.unit or '-'})")
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(frameon=False)
+    return figure
+
+
+def residuals(calibration: Calibration) -> Figure:
+    """Return two panels for each series: measured and fitted, and their difference."""
+    traces = calibration.traces
+    figure, axes = panels(2 * len(traces), 2.0, share_x=False)
+    for k, trace in enumerate(traces):
+        fit, rest = axes[2 * k : 2 * k + 2]
+        series = trace.series
+        factor, unit = (1e3, "µm") if unit_of(series.quantity) == "mm" else (1.0, unit_of(series.quantity) or "-")
+        x = series.places
+        order = np.argsort(x, kind="stable")
+        fit.plot(x, factor * series.values, ".", color=GREY, markersize=3, label="measured")
+        fit.plot(x[order], factor * trace.predicted[order], color=BLUE, label="fitted")
+        fit.set_title(trace.name)
+        fit.set_ylabel(f"{series.quantity} ({unit})")
+        fit.legend(frameon=False)
+        rest.plot(x[order], factor * trace.residual[order], color=RED, linewidth=0.8)
+        reference_line(rest, 0.0, "")
+        rest.set_ylabel(f"fitted - measured ({unit})")
+        counted = {"cycles": "cycles", "distance": "sliding distance (mm)", "time": "time (s)"}[series.counted]
+        rest.set_xlabel("x (mm)" if series.is_profile else counted)
+    return figure
+
+
+def _label_places(ax: Axes) -> None:
+    """Label a logarithmic axis of less than a decade by few numbers: powers of ten would stand on each other."""
+    from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter  # which takes long to load
+
+    low, high = ax.get_xlim()
+    if high < DECADE * low:
+        ax.xaxis.set_major_locator(MaxNLocator(6))
+        ax.xaxis.set_major_formatter(ScalarFormatter(useMathText=True))
+        ax.xaxis.set_minor_locator(NullLocator())
+
+
+def life_figure(life: Lifetime) -> Figure:
+    """Return the distribution of the lives."""
+    figure, axes = panels(1, 3.0, share_x=False)
+    known = np.sort(life.lives[~np.isnan(life.lives)])
+    share = np.arange(1, len(known) + 1) / len(known)
+    finite = np.isfinite(known)
+    axes[0].step(known[finite], share[finite], where="post", color=BLUE)
+    for own, style in zip(life.each, itertools.cycle(("--", ":", "-.")), strict=False):
+        alone = np.sort(own.lives[np.isfinite(own.lives)])
+        height = np.arange(1, len(alone) + 1) / len(known)
+        axes[0].step(alone, height, where="post", color=GREY, linestyle=style, label=own.quantity)
+    if life.each:
+        axes[0].lines[0].set_label("the first")
+        axes[0].legend(frameon=False)
+    for one in life.quantiles:
+        if np.isfinite(one.value) and np.isfinite(one.high):
+            axes[0].plot([one.low, one.high], [one.level, one.level], color=RED, linewidth=1.5)
+    axes[0].set_xscale("log")
+    _label_places(axes[0])
+    axes[0].set_xlabel(f"{life.quantity} ({life.unit or 'cycles'})")
+    axes[0].set_ylabel("share that has failed")
+    axes[0].set_title("95 % intervals of the quantiles in red")
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    with writing(path):
+        figure.savefig(path, dpi=150)
+
 
 Log = Callable[[str], None]
 FITTED = "fitted.toml"  # the case with the values that a calibration has found
@@ -170,26 +266,18 @@ def each_as_json(found: Sequence[Calibration], scatter: Scatter) -> dict[str, An
     return {**between_as_json(found), "scatter": list(scatter.text), "tests": [one.as_json() for one in found]}
 
 
-def _table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heading)
-    writer.writerows(rows)
-    return text.getvalue()
-
-
 def _residual_table(found: Calibration) -> str:
     rows: list[list[object]] = []
     for trace in found.traces:
         series = trace.series
         for k, row in enumerate(series.rows):
             rows.append(
-                [trace.name, row, series.quantity, "" if series.x is None else float(series.x[k]),
+                [trace.name, row, series.quantity, float(series.places[k]) if series.is_profile else float("nan"),
                  float(series.after[k]), series.counted, float(series.values[k]), float(trace.predicted[k]),
                  unit_of(series.quantity)]
             )  # fmt: skip
     heading = ["file", "row", "quantity", "x (mm)", "after", "counted in", "measured", "fitted", "unit"]
-    return _table(heading, rows)
+    return csv_text(heading, rows)
 
 
 def run_life(
@@ -212,11 +300,10 @@ def run_life(
     Without any scatter it is one life, in life.json.
     """
     quantities = [parse_quantity(one, "--until", case.names) for one in until]
-    scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
+    scatter = Scatter() if calibration is None else load_scatter(calibration, case)
     for text in scatters:
-        one = parse_scatter(case, text)
-        scatter = one if scatter is None else scatter.and_also(one)
-    if scatter is None:
+        scatter = scatter.and_also(parse_scatter(case, text))
+    if not scatter.keys:
         if resume or wanted is not None:
             option = "--resume" if resume else "--wanted"
             message = f"expected {option} with --scatter KEY=KIND(A, B), or --from a calibration, only"
@@ -226,9 +313,6 @@ def run_life(
     _tell_of_stick(case, log, comm)
     level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
     folder = _resumed(output) if resume else _folder(output, "life", name, comm)
-    if resume:
-        on_root(comm, lambda: _check_folder(folder, case))
-    on_root(comm, lambda: write_case(folder, case))
     for line in scatter.text:
         log(line)
     found = lifetime(
@@ -237,6 +321,7 @@ def run_life(
     )  # fmt: skip
 
     def write() -> None:
+        write_case(folder, case)
         write_text(folder / "life.json", json.dumps(found.as_json(), indent=1))
         save(life_figure(found), folder / "life.png")
 
@@ -267,22 +352,6 @@ def _resumed(output: Path | None) -> Path:
     if output is None:
         raise CaseError(InputError("--resume", "needs the folder of the study to resume, as -o DIR"))
     return output
-
-
-def _check_folder(folder: Path, case: Case) -> None:
-    """Check that a folder holds samples of the same case.
-
-    Raises:
-        CaseError: it does not.
-    """
-    if not (folder / SAMPLES).is_file():
-        raise CaseError(InputError("--resume", f"{folder} holds no {SAMPLES} to go on with"))
-    try:
-        before = (folder / CASE).read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise CaseError(InputError("--resume", f"{folder / CASE} cannot be read")) from None
-    if before != case.to_toml():
-        raise CaseError(InputError("--resume", f"the case differs from {folder / CASE}, of which the samples are"))
 
 
 def _wanted(case: Case, life: str, text: str) -> float:

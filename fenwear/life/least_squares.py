@@ -1,9 +1,13 @@
-"""The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2, and twin experiments."""
+"""What measurements cannot tell: unknowns and combinations of unknowns that the data leave open.
+
+Computed trials of a fit, kept in a file: an interrupted calibration resumes at any run.
+
+The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -14,14 +18,78 @@ from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.data import DataSet
-from fenwear.life.identifiable import hardly_known, without_baselines
+from fenwear.life.keys import Unknown, scaled
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
-from fenwear.life.ranks import share
-from fenwear.life.trials import Trials
-from fenwear.life.unknowns import Unknown, scaled
+from fenwear.life.runs import Trials, share
 from fenwear.parallel import Team
 from fenwear.progress import Log, now_and_then
+
+UNKNOWN = 0.5  # standard error, relative to the value, beyond which a combination of unknowns is not known
+TOGETHER = 0.95  # correlation that is told
+APART = 0.995  # correlation, of data of one condition, from which two unknowns count as one: errors ten times as wide
+
+
+def without_baselines(weighted: Array, m: int) -> Array:
+    """Return the unknowns' columns less what offsets and tilts can take over."""
+    own, lines = weighted[:, :m], weighted[:, m:]
+    if not lines.shape[1]:
+        return own
+    return own - lines @ np.linalg.lstsq(lines, own, rcond=None)[0]
+
+
+def not_determined(keys: Sequence[str], relative: Array) -> list[str]:
+    """Return the combinations of unknowns that the data leave open by more than half of their values."""
+    _, singular, directions = np.linalg.svd(relative, full_matrices=False)
+    lines = []
+    for size, direction in zip(singular, directions, strict=True):
+        if size * UNKNOWN >= 1:
+            continue
+        parts = [k for k in range(len(keys)) if abs(direction[k]) > 0.05 * np.abs(direction).max()]
+        first = direction / direction[max(parts, key=lambda k: abs(direction[k]))]
+        if len(parts) == 1:
+            lines.append(f"{keys[parts[0]]}: the data do not determine it within {100 * UNKNOWN:g} %")
+            continue
+        changes = ", ".join(f"{keys[k]} by {first[k]:+.2g} %" for k in parts)
+        lines.append(f"{' and '.join(keys[k] for k in parts)} cannot be told apart: changes of {changes} together "
+                     "alter nothing that was measured beyond its noise; give one of them, or data at another "
+                     "load")  # fmt: skip
+    return lines
+
+
+def hardly_known(keys: Sequence[str], data: Sequence[DataSet], own: Array) -> list[str]:
+    """Return the pairs that one condition tells apart by the finest details of its data only.
+
+    By all columns of the Jacobian, also those of unknowns at a bound: a pair that wanders there is one.
+    """
+    lengths = np.linalg.norm(own, axis=0)
+    if len({one.settings for one in data}) > 1 or not (lengths > 0).all():
+        return []
+    unit = own / lengths
+    inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-15, hermitian=True)
+    errors = np.sqrt(np.diag(inverse))
+    correlation = inverse / np.outer(errors, errors)
+    return [
+        f"{keys[j]} and {keys[i]} cannot both be known from one condition: their correlation is "
+        f"{correlation[i, j]:.5f}, and errors are more than ten times those of each alone; give one of them, or data "
+        "at another load"
+        for i in range(len(keys))
+        for j in range(i)
+        if abs(correlation[i, j]) > APART
+    ]
+
+
+def known_together(keys: Sequence[str], correlation: Array, at_bound: Sequence[str]) -> list[str]:
+    """Return what is to be said of unknowns that are known."""
+    lines = [
+        f"{keys[i]} and {keys[j]} are known together better than alone: correlation {correlation[i, j]:.3f}"
+        for i in range(len(keys))
+        for j in range(i)
+        if abs(correlation[i, j]) > TOGETHER
+    ]
+    lines += [f"{key} is at a bound: the data want a value beyond it" for key in at_bound]
+    return lines
+
 
 STEP = 1e-5  # of the unknowns in the Jacobian, which are of order one
 NO_INFLUENCE = 1e-9  # relative change of all predictions over the relative change of an unknown
@@ -68,8 +136,8 @@ class LeastSquares:
         self._jumps = 0  # how often the jumps that runs follow have changed
         self._computed = False  # whether a trial on them has a prediction
         self.observed = np.concatenate([series.values for series in self.series])
-        self.has_sigma = self.series[0].sigma is not None
-        self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
+        self.has_sigma = self.series[0].has_sigma
+        self.sigma = np.concatenate([series.scale for series in self.series])
         self._lines, self.baseline_names = self._baselines()
         self._reach = self._first_reach()
         count = len(self.unknowns) + self._lines.shape[1]
@@ -88,7 +156,7 @@ class LeastSquares:
         for name in self.baseline:
             if name not in BASELINES:
                 problems.append(InputError("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
-        if self.baseline and all(series.x is None for series in self.series):
+        if self.baseline and not any(series.is_profile for series in self.series):
             problems.append(InputError("--baseline", "expected with profiles only: the data hold none"))
         for one in self.data:
             for setting in one.settings:
@@ -96,9 +164,9 @@ class LeastSquares:
                 if key in keys:
                     problems.append(InputError(f"{one.name}: # set {key}", "is an unknown of the calibration too"))
         kinds = {series.quantity for series in self.series}
-        given = {series.sigma is not None for series in self.series}
+        given = {series.has_sigma for series in self.series}
         if len(given) > 1 or (len(kinds) > 1 and given == {False}):
-            names = ", ".join(dict.fromkeys(one.name for one in self.data if any(s.sigma is None for s in one.series)))
+            names = ", ".join(dict.fromkeys(one.name for one in self.data if not all(s.has_sigma for s in one.series)))
             text = "gives no sigma; expected the standard deviation of every measurement where "
             problems.append(InputError(names, text + f"{' and '.join(sorted(kinds))} are fitted together"))
         if problems:
@@ -110,11 +178,12 @@ class LeastSquares:
         for number, series in enumerate(self.series):
             rows = slice(begin, begin + len(series.values))
             begin = rows.stop
-            if series.x is None:
+            if not series.is_profile:
                 continue
+            x = series.places
             for name in self.baseline:
                 column = np.zeros(len(self.observed))
-                column[rows] = 1.0 if name == "offset" else series.x - (series.x.min() + series.x.max()) / 2
+                column[rows] = 1.0 if name == "offset" else x - (x.min() + x.max()) / 2
                 columns.append(column)
                 names.append((number, name))
         return (np.array(columns).T if columns else np.zeros((len(self.observed), 0))), names
@@ -267,42 +336,31 @@ class LeastSquares:
         ]
         return np.array(ends).T
 
-    def fit(
-        self,
-        observed: Array | None = None,
-        start: Vector | None = None,
-        jacobian: Array | None = None,
-        settled: float = SETTLED,
-    ) -> OptimizeResult:
+    def fit(self, start: Vector, settled: float = SETTLED) -> OptimizeResult:
         """Return scipy's result, whose `x` has the fitted unknowns and the baselines; collective.
 
         Args:
-            observed: Values in place of the measured ones (n,).
-            start: Fitted unknowns to start from; by default zero, the start of each.
-            jacobian: Of the predictions (n, m), kept instead of computed anew in each step: for data near those
-                it belongs to.
+            start: Fitted unknowns to start from.
             settled: Change of the unknowns over themselves that ends the fit.
         """
-        values = self.observed if observed is None else observed
         m, lines = len(self.unknowns), self._lines.shape[1]
         low, high = np.hstack([self._ends(), np.outer([-np.inf, np.inf], np.ones(lines))])
-        z = np.clip(np.zeros(m) if start is None else start, low[:m], high[:m])
-        traces = self.whitened(self._lines), self.whitened(values - self._tried(z))
+        z = np.clip(start, low[:m], high[:m])
+        traces = self.whitened(self._lines), self.whitened(self.observed - self._tried(z))
         begin = np.concatenate([z, np.linalg.lstsq(*traces, rcond=None)[0]])
 
         def derivative(both: Array) -> Array:
-            columns = self.jacobian(both[:m]) if jacobian is None else jacobian
-            return self.whitened(np.hstack([columns, self._lines]))
+            return self.whitened(np.hstack([self.jacobian(both[:m]), self._lines]))
 
         def residual(both: Array) -> Array:
-            found = self.whitened(self.with_baselines(both) - values)
+            found = self.whitened(self.with_baselines(both) - self.observed)
             self._tell(f"{self.model.evaluations:,} runs, residual {np.sqrt(np.mean(found**2)):.3g} sigma or units")
             return found
 
         result = least_squares(
             residual, begin, derivative, (low, high), x_scale=self._reach, xtol=settled, ftol=FLAT, max_nfev=MOST_TRIALS
         )
-        if jacobian is None and settled == SETTLED:
+        if settled == SETTLED:
             columns = self.jacobian(result.x[:m], central=True)
             result.jac = self.whitened(np.hstack([columns, self._lines]))
         return result
@@ -311,41 +369,3 @@ class LeastSquares:
         """Return the predictions (n,) of fitted unknowns and baselines."""
         m = len(self.unknowns)
         return np.asarray(self._tried(np.asarray(both[:m])) + self._lines @ both[m:])
-
-
-def repeated(problem: LeastSquares, truth: Vector, repetitions: int, seed: int = 0) -> tuple[Array, Array]:
-    """Return estimates and standard errors of fits to made-up data: a parametric bootstrap; twin experiments.
-
-    The data are the model's predictions at `truth` with normal noise of each measurement's sigma. Every
-    fit starts at the truth and keeps the Jacobian there, whose change is of second order in the noise.
-
-    Args:
-        problem: Unknowns and data sets; their values are not used, their sigma is.
-        truth: Fitted unknowns.
-        repetitions: How many.
-        seed: Of the noise.
-
-    Returns:
-        Estimates less truth, and standard errors (repetitions, m) each, of the fitted unknowns.
-    """
-    generator = np.random.default_rng(seed)
-    problem.keep_jumps(truth)
-    exact, jacobian = problem.predicted(truth), problem.jacobian(truth)
-    m = len(problem.unknowns)
-    colour = np.linalg.inv(problem.whitened(np.eye(len(exact))))
-    noise = generator.standard_normal((repetitions, len(exact))) @ colour.T
-
-    def one(k: int) -> tuple[Array, Array]:
-        result = problem.fit(exact + noise[k], truth, jacobian)
-        covariance = np.linalg.inv(result.jac.T @ result.jac)
-        scale = 1.0 if problem.has_sigma else np.sqrt(2 * result.cost / (len(exact) - len(result.x)))
-        return result.x[:m] - np.asarray(truth), scale * np.sqrt(np.diag(covariance)[:m])
-
-    found = share(problem.comm, repetitions, one)
-    return np.array([value for value, _ in found]), np.array([error for _, error in found])
-
-
-def without_values(one: DataSet, sigma: float) -> DataSet:
-    """Return a data set with zero values and this standard deviation: the plan of a measurement."""
-    series = tuple(replace(s, values=np.zeros(len(s.values)), sigma=np.full(len(s.values), sigma)) for s in one.series)
-    return replace(one, series=series)

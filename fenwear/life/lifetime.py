@@ -1,15 +1,16 @@
 """Life with scatter: samples of keys, a run for each, and what their lives have in common.
 
-Every sample is appended to samples.csv as soon as it is computed, so that nothing is lost and a sampling can
-go on later. Quantiles come with the interval of order statistics that holds them with 95 %, whatever
-the distribution (binomial); a reliability with that of Clopper and Pearson.
+Every sample is kept as soon as it is computed, so that a sampling can be resumed; samples.csv has them all in the end.
+Quantiles come with the interval of order statistics that holds them with 95 %, whatever the distribution (binomial); a
+reliability with that of Clopper and Pearson.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,11 @@ from fenwear.errors import CaseError, ConvergenceError, FenwearError, InputError
 from fenwear.life.model import Model
 from fenwear.life.quantities import LIMIT, Quantity, of_case, parse_quantity
 from fenwear.life.quantities import lives as lives_until
-from fenwear.life.ranks import everywhere, in_chunks
+from fenwear.life.runs import TRIALS, Trials, everywhere, in_chunks
 from fenwear.life.scatter import Scatter
 from fenwear.parallel import on_root
-from fenwear.results.disk import writing
+from fenwear.results.disk import finite, write_text
+from fenwear.results.export import csv_text
 
 SAMPLES = "samples.csv"
 LEVEL = 0.95  # of the intervals
@@ -67,12 +69,8 @@ class Lives:
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints and life.json holds."""
         rows = zip(self.quantities, self.units, self.values, strict=True)
-        return {
-            "lives": [
-                {"quantity": text, "unit": unit or "cycles", "value": value if np.isfinite(value) else None}
-                for text, unit, value in rows
-            ]
-        }
+        lives = [{"quantity": text, "unit": unit or "cycles", "value": value} for text, unit, value in rows]
+        return {"lives": finite(lives)}
 
     def text(self) -> str:
         """Return a line for each."""
@@ -115,7 +113,7 @@ class Lifetime:
     @property
     def first_share(self) -> list[float]:
         """Of each level, in which share of the parts that reach any it is reached first."""
-        lives = np.array([one.lives for one in self.each])
+        lives = np.array([one.lives for one in self.each]).reshape(len(self.each), len(self.lives))
         lives = lives[:, np.isfinite(lives).any(axis=0)]
         first = (lives == lives.min(axis=0, initial=np.inf)).sum(axis=1)
         return [float(count) / max(lives.shape[1], 1) for count in first]
@@ -129,10 +127,10 @@ class Lifetime:
         """Return what --json prints and life.json holds."""
 
         def row(one: Estimate, name: str) -> dict[str, Any]:
-            interval = [end if np.isfinite(end) else None for end in (one.low, one.high)]
-            return {name: one.level, "value": one.value if np.isfinite(one.value) else None, "interval_95": interval}
+            return {name: one.level, "value": one.value, "interval_95": [one.low, one.high]}
 
-        return {
+        each = [{**one.as_json(), "first": share} for one, share in zip(self.each, self.first_share, strict=True)]
+        found = {
             "quantity": self.quantity,
             "unit": self.counted_in,
             "samples": len(self.lives),
@@ -141,12 +139,9 @@ class Lifetime:
             "quantiles": [row(one, "level") for one in self.quantiles],
             "reliability": None if self.reliability is None else row(self.reliability, "wanted"),
             "seed": self.seed,
-            **self._each_as_json(),
+            **({"each": each} if each else {}),
         }
-
-    def _each_as_json(self) -> dict[str, Any]:
-        told = zip(self.each, self.first_share if self.each else (), strict=True)
-        return {"each": [{**one.as_json(), "first": share} for one, share in told]} if self.each else {}
+        return dict(finite(found))
 
     def text(self) -> str:
         """Return a table for people."""
@@ -237,15 +232,15 @@ def lifetime(
         seed: Of the sample.
         wanted: A life whose reliability is asked for, in the unit of the lives.
         limit: Cycles after which a level counts as never reached.
-        folder: Where samples.csv is kept; None for nowhere.
+        folder: Where samples are kept, and samples.csv in the end; None for nowhere.
         resume: Go on with the samples that are there.
         comm: The ranks.
         progress: Told of the samples done and of all.
 
     Raises:
-        CaseError: what is asked for makes no sense; samples.csv belongs to another sampling.
-        ConvergenceError: more than 5 % of the runs did not converge; their samples are in samples.csv.
-        OutputError: samples.csv cannot be written.
+        CaseError: what is asked for makes no sense; the samples of the folder belong to another sampling.
+        ConvergenceError: more than 5 % of the runs did not converge; theirs are kept in the folder.
+        OutputError: the folder takes no file.
     """
     asked = _asked(case, [until] if isinstance(until, str | Quantity) else until)
     if samples < 2:
@@ -255,9 +250,15 @@ def lifetime(
     model = Model(case)
     quantities = everywhere(comm, lambda: _of_contacts(model, asked))
     names = [one.text for one in quantities]
-    record = _Record(folder, scatter.keys, names, design) if folder is not None else None
-    done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
-    lives, failures = _run(model, quantities, scatter.keys, design, done, record, limit, comm, progress)
+    kept = Trials() if folder is None else Trials(folder / TRIALS)
+    about = f"{case.to_toml()} {scatter.keys} {names} {limit} {design.tobytes().hex()}"
+    on_root(comm, lambda: kept.begin(about, resume=resume))
+    lives, failures = _run(model, quantities, scatter.keys, design, kept, limit, comm, progress)
+    if folder is not None:
+        rows = zip(range(samples), design.tolist(), lives.tolist(), strict=True)
+        heading = ["sample", *scatter.keys, *names, "trouble"]
+        table = [[k, *values, *own, failures.get(k, "")] for k, values, own in rows]
+        on_root(comm, lambda: write_text(folder / SAMPLES, csv_text(heading, table)))
 
     def summary(one: Quantity, own: Array, level: float | None) -> Lifetime:
         return _summary(one, scatter.keys, design, own, failures, level, seed)
@@ -311,111 +312,33 @@ def _run(
     quantities: Sequence[Quantity],
     keys: Sequence[str],
     design: Array,
-    done: dict[int, tuple[Array, str]],
-    record: _Record | None,
+    kept: Trials,
     limit: int,
     comm: MPI.Comm,
     progress: Callable[[int, int], None],
 ) -> tuple[Array, dict[int, str]]:
-    """Compute what is not done yet; return lives (n, q) and failures."""
+    """Compute what is not kept yet; return lives (n, q) and failures, which a resumed sampling tries again."""
     lives = np.full((len(design), len(quantities)), np.nan)
-    failures: dict[int, str] = {}
-
-    def note(number: int, life: Array, trouble: str) -> None:
-        lives[number] = life
-        if trouble:
-            failures[number] = trouble
-
-    for number, (life, trouble) in done.items():
-        note(number, life, trouble)
-    left = [number for number in range(len(design)) if number not in done]
+    known = on_root(comm, lambda: [kept.get("lives", row) for row in design])
+    left = [number for number, own in enumerate(known) if own is None]
+    for number in set(range(len(design))) - set(left):
+        lives[number] = known[number]
 
     def one(number: int) -> Array:
         values = dict(zip(keys, design[number].tolist(), strict=True))
         return lives_until(model, quantities, values, limit)
 
-    begin = 0
-    progress(len(done), len(design))
-    for outcomes in in_chunks(comm, left, one):
-        rows: list[tuple[int, Array, str]] = []
-        for number, outcome in zip(left[begin : begin + len(outcomes)], outcomes, strict=True):
-            if isinstance(outcome, FenwearError):
-                rows.append((number, np.full(len(quantities), np.nan), " ".join(str(outcome).split())))
-            else:
-                rows.append((number, outcome, ""))
-        begin += len(outcomes)
-        on_root(comm, lambda rows=rows: None if record is None else record.add(rows))  # type: ignore[misc]
-        for row in rows:
-            note(*row)
-        progress(len(done) + begin, len(design))
+    failures: dict[int, str] = {}
+    progress(len(design) - len(left), len(design))
+    for done, outcome in enumerate(chain.from_iterable(in_chunks(comm, left, one))):
+        number = left[done]
+        if isinstance(outcome, FenwearError):
+            failures[number] = " ".join(str(outcome).split())
+        else:
+            lives[number] = outcome
+            on_root(comm, partial(kept.put, "lives", design[number], outcome))
+        progress(len(design) - len(left) + done + 1, len(design))
     return lives, failures
-
-
-class _Record:
-    """samples.csv: heading, then a row for each sample as it is computed."""
-
-    def __init__(self, folder: Path, keys: Sequence[str], quantities: Sequence[str], design: Array) -> None:
-        self.folder, self.path, self.design = folder, folder / SAMPLES, design
-        self.heading = ["sample", *keys, *quantities, "trouble"]
-        self.lives = len(quantities)
-
-    def begin(self, *, resume: bool) -> dict[int, tuple[Array, str]]:
-        """Make the file, or read what it holds.
-
-        Raises:
-            CaseError: the file exists, or belongs to another sampling.
-        """
-        if not resume and self.path.exists():
-            raise CaseError(InputError("-o", f"{self.path} exists already; expected a new folder, or --resume"))
-        with writing(self.path):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            if not self.path.exists():
-                self.path.write_text("", "utf-8")
-                self._append([self.heading])
-                return {}
-        return self._read()
-
-    def add(self, rows: Sequence[tuple[int, Array, str]]) -> None:
-        """Append samples."""
-        with writing(self.path):
-            self._append(
-                [[number, *(repr(float(v)) for v in (*self.design[number], *life)), trouble]
-                 for number, life, trouble in rows]
-            )  # fmt: skip
-
-    def _append(self, rows: Sequence[Sequence[object]]) -> None:
-        with self.path.open("a", encoding="utf-8", newline="") as file:
-            csv.writer(file).writerows(rows)
-
-    def _read(self) -> dict[int, tuple[Array, str]]:
-        try:
-            text = self.path.read_bytes().decode("utf-8")
-        except (OSError, UnicodeDecodeError):
-            raise CaseError(InputError("--resume", f"{self.path} cannot be read")) from None
-        whole = text[: text.rfind("\n") + 1]  # an interrupted write leaves half a row behind
-        rows = list(csv.reader(whole.splitlines()))
-        if not rows or rows[0] != self.heading:
-            raise CaseError(InputError("--resume", f"{self.path} is of another sampling: expected the heading "
-                                    f"{', '.join(self.heading)}"))  # fmt: skip
-        done: dict[int, tuple[Array, str]] = {}
-        for line, row in enumerate(rows[1:], 2):
-            try:
-                number, numbers = int(row[0]), [float(cell) for cell in row[1:-1]]
-                values, life = numbers[: -self.lives], np.array(numbers[-self.lives :])
-            except (ValueError, IndexError):
-                raise CaseError(
-                    InputError("--resume", f"{self.path}: row {line}: is damaged; remove it and go on")
-                ) from None
-            if not 0 <= number < len(self.design) or not np.array_equal(values, self.design[number]):
-                text = (
-                    f"{self.path}: row {line} is of another sample: expected the same --seed, --samples and --scatter"
-                )
-                raise CaseError(InputError("--resume", text))
-            done[number] = (life, row[-1])
-        if whole != text:
-            with writing(self.path):
-                self.path.write_text(whole, "utf-8")
-        return done
 
 
 def _summary(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -25,10 +25,11 @@ from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
 from fenwear.plausibility import system_warnings
-from fenwear.results.contacts import within
+from fenwear.results.summary import within
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.final import FinalShape, cycle_of_final
 
+T = TypeVar("T")
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
 KEPT = 32  # runs whose ends are kept
@@ -43,18 +44,30 @@ class Course:
     """What a run follows so that its results are smooth functions of the values of keys: what another one did.
 
     Attributes:
-        ends: Cycles at whose ends jumps end, and nowhere else.
+        ends: Cycles at whose ends jumps end, and nowhere else; none of a run that finds its own.
         renewals: After which half-cycles meshes, properties or grids were made anew.
     """
 
-    ends: tuple[int, ...]
+    ends: tuple[int, ...] = ()
     renewals: Mapping[int, Renewal] = field(default_factory=dict)
+
+    @property
+    def given(self) -> bool:
+        """Whether there is a run to follow."""
+        return bool(self.ends)
+
+    def last(self, otherwise: int) -> int:
+        """Return the cycle that a run ends with: that of the run it follows, or another one."""
+        return self.ends[-1] if self.given else otherwise
 
     @classmethod
     def of(cls, snapshots: Sequence[Snapshot]) -> Course:
         """Return that of a run of these snapshots."""
         made = {half_cycle: renewal for one in snapshots for half_cycle, renewal in one.renewals}
         return cls(tuple(int(one.cycle) for one in snapshots), made)
+
+
+FREE = Course()  # of a run that finds its own
 
 
 @dataclass(frozen=True)
@@ -82,6 +95,7 @@ class Model:
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _runs: dict[tuple[object, ...], RunSamples] = field(default_factory=dict, repr=False)
+    _states: dict[tuple[object, ...], Snapshot] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a test program.
@@ -136,11 +150,7 @@ class Model:
         if not values:
             return base
         key = (tuple(settings), tuple(sorted(values.items())))
-        if key not in self._recent:
-            while len(self._recent) >= RECENT:
-                self._recent.pop(next(iter(self._recent)))
-            self._recent[key] = with_case(base, with_values(base.case, values))
-        return self._recent[key]
+        return _kept(self._recent, key, RECENT, lambda: with_case(base, with_values(base.case, values)))
 
     def _base(self, settings: tuple[str, ...]) -> Tribosystem:
         if settings not in self._bases:
@@ -167,7 +177,7 @@ class Model:
         *,
         settings: Sequence[str] = (),
         stops: Sequence[int] = (),
-        course: Course | None = None,
+        course: Course = FREE,
         until: Callable[[Snapshot], bool] = lambda _: False,
     ) -> Iterator[Snapshot]:
         """Yield the end of every jump, from the first to the last.
@@ -177,7 +187,7 @@ class Model:
             cycles: How many at most.
             settings: Overrides `key.path=value` besides.
             stops: Cycles at whose end a jump ends in any case.
-            course: Of another run, which this one is to follow.
+            course: Of another run, which this one is to follow, or `FREE`.
             until: Ends the run at the first snapshot for which it is true.
 
         Raises:
@@ -187,13 +197,13 @@ class Model:
         system = self.system(values, settings)
         self.evaluations += 1
         strokes, case = system.motion.half_cycles, system.case
-        tolerance = case.run.jump_tolerance if course is None else np.inf
-        ends = frozenset(strokes * end for end in (stops if course is None else course.ends))
+        tolerance = np.inf if course.given else case.run.jump_tolerance
+        ends = frozenset(strokes * end for end in course.ends or stops)
         renewals: list[tuple[int, Renewal]] = []
 
         def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
             start = reached
-            if course is not None:
+            if course.given:
                 start = start or beginning(on)
                 start = replace(start, jump_length=ONE_STEP)
             return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
@@ -203,7 +213,7 @@ class Model:
         blocks = follow(
             system,
             integrate,
-            given=None if course is None else course.renewals,
+            given=course.renewals if course.given else None,
             heights_of=base if base.case.geometry == case.geometry else system,
             told=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),
         )
@@ -219,25 +229,29 @@ class Model:
         values: Mapping[str, float],
         cycles: int,
         settings: Sequence[str] = (),
-        course: Course | None = None,
+        course: Course = FREE,
     ) -> RunSamples:
         """Return a run to its end, as `run`; kept, so that several quantities of it cost one."""
-        followed = None if course is None else (course.ends, tuple(course.renewals.items()))
+        followed = course.ends, tuple(course.renewals.items())
         key = (tuple(sorted(values.items())), cycles, tuple(settings), followed)
-        if key not in self._runs:
-            while len(self._runs) >= KEPT:
-                self._runs.pop(next(iter(self._runs)))
+
+        def run() -> RunSamples:
             taken = list(self.run(values, cycles, settings=settings, course=course))
-            self._runs[key] = RunSamples(taken[-1], Course.of(taken), edge_moved(taken))
-        return self._runs[key]
+            return RunSamples(taken[-1], Course.of(taken), edge_moved(taken))
+
+        return _kept(self._runs, key, KEPT, run)
 
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
-        """Return the cyclic steady state, with properties of its own temperatures where they depend on them.
+        """Return the cyclic steady state, with properties of its own temperatures where they depend on them; kept.
 
         Raises:
             CaseError: a value is not possible.
             ConvergenceError: there is none, or it was not found.
         """
+        key = (tuple(sorted(values.items())), tuple(settings))
+        return _kept(self._states, key, KEPT, lambda: self._steady(values, settings))
+
+    def _steady(self, values: Mapping[str, float], settings: Sequence[str]) -> Snapshot:
         self._check_stays()
         system = self.system(values, settings)
         self.evaluations += 1
@@ -248,8 +262,8 @@ class Model:
         return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
 
     def run_in(
-        self, values: Mapping[str, float], settings: Sequence[str] = (), course: Course | None = None
-    ) -> tuple[float, Course | None]:
+        self, values: Mapping[str, float], settings: Sequence[str] = (), course: Course = FREE
+    ) -> tuple[float, Course]:
         """Return after how many cycles the pressure is within 1 % of the pressure scale of its end; infinite if never.
 
         And the course of its jumps, which values nearby are to follow.
@@ -262,10 +276,8 @@ class Model:
         system = self._sliding("run_in", values, settings)
         self.evaluations += 1
         state = steady(system)
-        found = running_in(
-            state.system, state, NEAR_THE_END, jumps=FINE_JUMPS, ends=() if course is None else course.ends
-        )
-        return (np.inf, None) if found is None else (found.cycles, Course(found.ends))
+        found = running_in(state.system, state, NEAR_THE_END, jumps=FINE_JUMPS, ends=course.ends)
+        return (np.inf, FREE) if found is None else (found.cycles, Course(found.ends))
 
     def critical_speed(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
         """Return the speed above which full contact is thermo-elastically unstable in either direction, mm/s.
@@ -289,6 +301,15 @@ class Model:
             message = "a quantity of gross sliding: in partial slip wear goes on until what slips carries nothing"
             raise CaseError(InputError(quantity, message))
         return system
+
+
+def _kept(cache: dict[tuple[object, ...], T], key: tuple[object, ...], most: int, compute: Callable[[], T]) -> T:
+    """Return a value of a cache, which keeps so many; computed where it is not there."""
+    if key not in cache:
+        while len(cache) >= most:
+            cache.pop(next(iter(cache)))
+        cache[key] = compute()
+    return cache[key]
 
 
 @dataclass(frozen=True)

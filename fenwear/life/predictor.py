@@ -10,7 +10,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, InputError
 from fenwear.life.data import DataSet, Series
-from fenwear.life.model import Course, Model, Snapshot
+from fenwear.life.model import FREE, Course, Model, Snapshot
 from fenwear.life.quantities import Quantity, cycles_of, padded, registered_name, unit_of
 from fenwear.results.surfaces import at_places, rim
 
@@ -54,8 +54,8 @@ class Predictor:
                 stops |= {max(1, round(cycles_of((a, series.counted), *measures))) for a in np.unique(series.after)}
         runs = {}
         for settings, stops in wanted.items():
-            course = self._courses.get(settings)
-            last = max(stops) if course is None else course.ends[-1]
+            course = self._courses.get(settings, FREE)
+            last = course.last(max(stops))
             runs[settings] = list(self.model.run(values, last, settings=settings, stops=sorted(stops), course=course))
         return runs
 
@@ -63,16 +63,16 @@ class Predictor:
 def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[float, float], *, strict: bool) -> Array:
     ends = np.array([s.cycle for s in snapshots])
     predicted = np.empty(len(series.values))
-    name = registered_name(series.quantity, at_a_place=series.x is not None)
+    name = registered_name(series.quantity, at_a_place=series.is_profile)
     quantity = Quantity(name, name, "snapshot", unit_of(name), series.body)
     for amount in np.unique(series.after):
         cycles = cycles_of((float(amount), series.counted), *measures)
         snapshot = snapshots[int(np.argmin(np.abs(ends - cycles)))].at_cycle(cycles)
         own = series.after == amount
-        if series.x is None:
-            predicted[own] = quantity.of_snapshot(snapshot)
+        if series.is_profile:
+            predicted[own] = _profile(series, snapshot, series.places[own], strict=strict)
         else:
-            predicted[own] = _profile(series, snapshot, series.x[own], strict=strict)
+            predicted[own] = quantity.of_snapshot(snapshot)
     return predicted
 
 

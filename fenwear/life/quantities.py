@@ -26,7 +26,7 @@ from fenwear.case import Case
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.life.model import Course, Model, Snapshot, cycle_of, edge_moved
+from fenwear.life.model import FREE, Course, Model, Snapshot, cycle_of, edge_moved
 from fenwear.results import registry
 from fenwear.results.quantity import RECORD
 from fenwear.results.quantity import Quantity as Registered
@@ -213,7 +213,7 @@ class Quantity:
     def within(self, contact: str) -> Quantity:
         """Return the same of one named contact."""
         match = _UNTIL.fullmatch(self.text) or _PLAIN.fullmatch(self.text)
-        written = self.name if match is None else match["name"]
+        written = match["name"] if match else self.name
         text = re.sub(rf"\b{written}\b( of [\w-]+)?", lambda at: f"{at[0]} in {contact}", self.text, count=1)
         return replace(self, text=text, contact=contact)
 
@@ -254,19 +254,19 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
     if whole in WHOLE:
         return Quantity(words, whole, "whole", WHOLE[whole])
     match = _UNTIL.fullmatch(words)
-    if match is not None and registered_name(match["name"], at_a_place=match["at"] is not None):
+    if match and registered_name(match["name"], at_a_place=bool(match["at"])):
         return _life(words, match, option, names)
     match = _PLAIN.fullmatch(words)
-    name = "" if match is None else registered_name(match["name"], at_a_place=match["at"] is not None)
-    if match is None or not name:
-        raise CaseError(InputError(option, _unknown(text, "" if match is None else match["name"])))
-    is_steady = match["steady"] is not None
+    name = registered_name(match["name"], at_a_place=bool(match["at"])) if match else ""
+    if not match or not name:
+        raise CaseError(InputError(option, _unknown(text, match["name"] if match else "")))
+    is_steady = bool(match["steady"])
     if name.startswith("lambda_") and not is_steady:
         raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
     body, at = _place(name, match, words, option, names)
     if is_steady and (match["after"] or not registered(name, body).steady):
         raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
-    after = None if match["after"] is None else parse_amount(match["after"], option)
+    after = parse_amount(match["after"], option) if match["after"] else None
     kind: Kind = "steady" if is_steady else "snapshot"
     return Quantity(words, name, kind, unit_of(name), body, at, after, contact=match["contact"] or "")
 
@@ -289,17 +289,17 @@ def registered_name(word: str, *, at_a_place: bool) -> str:
         return "" if at_a_place else name
     if at_a_place:
         field = registry.known(WARMER[0] if name == "temperature" else name)
-        return "" if field is None or field.dims[1:] not in (("x",), ("x_strip",)) else name
+        return "" if field.dims[1:] not in (("x",), ("x_strip",)) else name
     name = registry.LARGEST.get(name, name)
     found = registry.known(name)
-    return "" if found is None or found.dims not in (RECORD, ()) else name
+    return "" if found.dims not in (RECORD, ()) else name
 
 
 def registered(name: str, body: str = "punch") -> Registered:
     """Return what the registry has of a name; of the strip where the strip has its own."""
     name = "moved_z" if name == APPROACH else name
     names = (f"{name}_strip", name) if body == "strip" else (name, f"{name}_punch")
-    return next(found for one in names if (found := registry.known(one)) is not None)
+    return next(found for one in names if (found := registry.known(one)).name)
 
 
 def unit_of(name: str) -> str:
@@ -322,7 +322,7 @@ def parse_level(text: str, option: str, names: Names = BY_ROLE) -> Quantity:
 
 def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
     life = match["life"] or "cycles"
-    name = registered_name(match["name"], at_a_place=match["at"] is not None)
+    name = registered_name(match["name"], at_a_place=bool(match["at"]))
     if life not in LIVES:
         raise CaseError(InputError(option, f"expected cycles, distance or time until a level, got {words!r}"))
     if name not in GROWING:
@@ -346,7 +346,7 @@ def _place(
     body = names.role_of(match["body"] or "punch")
     wrong = {
         "punch": False,
-        "strip": name == "temperature" or registry.known(f"{name}_strip") is None,
+        "strip": name == "temperature" or not registry.known(f"{name}_strip").name,
         BOTH: name not in OF_BOTH,
     }
     if wrong.get(body, True) or (match["body"] and name == APPROACH):
@@ -354,7 +354,7 @@ def _place(
         raise CaseError(InputError(option, names.told(f"{message}, such as wear and worn_volume, got {words!r}")))
     if match["contact"] and not registered(name, body).nodal:
         raise CaseError(InputError(option, f"{name} is of all contacts together: expected no contact, got {words!r}"))
-    if match["at"] is None:
+    if not match["at"]:
         return body, None
     parts = [part.strip() for part in match["at"].split(",")]
     try:
@@ -398,15 +398,18 @@ class Path:
     """How a quantity is computed again for other values, so that its values are smooth.
 
     Attributes:
-        course: Of the run; None of what is not one.
+        course: Of the run; `FREE` of what is not one.
         rough: Whether values are smooth as long as the same nodes are in contact, and no further: an edge of contact or
             scar has moved on the way to them and lies within the mesh, or they are the place of one.
         grain: The smallest step of a value that is counted in nodes.
     """
 
-    course: Course | None = None
+    course: Course = FREE
     rough: bool = False
     grain: float = 0.0
+
+
+NO_PATH = Path()
 
 
 def evaluate(
@@ -414,7 +417,7 @@ def evaluate(
     quantity: Quantity,
     values: Mapping[str, float],
     settings: Sequence[str] = (),
-    path: Path | None = None,
+    path: Path = NO_PATH,
     limit: int = LIMIT,
 ) -> tuple[float, Path]:
     """Return a quantity for values of keys, and the path on which to compute it for values nearby.
@@ -446,9 +449,7 @@ def evaluate(
         wanted = float(max(1, model.case.run.half_cycles // half_cycles))
     else:
         wanted = cycles_of(quantity.after, distance, period)
-    course = None if path is None else path.course
-    last = max(1, round(wanted)) if course is None else course.ends[-1]
-    run = model.samples(values, last, settings, course)
+    run = model.samples(values, path.course.last(max(1, round(wanted))), settings, path.course)
     made = Path(run.course, run.moved, _grain(quantity, run.last))
     return quantity.of_snapshot(run.last.at_cycle(wanted)), made
 
@@ -463,11 +464,11 @@ def _whole(
     values: Mapping[str, float],
     settings: Sequence[str],
     distance: float,
-    path: Path | None,
+    path: Path,
 ) -> tuple[float, Path]:
     if quantity.name == "critical_speed":
         return model.critical_speed(values, settings), Path()
-    cycles, course = model.run_in(values, settings, None if path is None else path.course)
+    cycles, course = model.run_in(values, settings, path.course)
     return cycles * distance if quantity.name == "run_in_distance" else cycles, Path(course)
 
 
@@ -478,7 +479,7 @@ def lives(model: Model, quantities: Sequence[Quantity], values: Mapping[str, flo
         CaseError: a value is not possible, or a contact is not known.
         ConvergenceError: the run did not converge.
     """
-    return _until(model, quantities, values, (), None, limit, model.cycle_measures(values))[0]
+    return _until(model, quantities, values, (), NO_PATH, limit, model.cycle_measures(values))[0]
 
 
 def _until(
@@ -486,21 +487,20 @@ def _until(
     quantities: Sequence[Quantity],
     values: Mapping[str, float],
     settings: Sequence[str],
-    path: Path | None,
+    path: Path,
     limit: int,
     measures: tuple[float, float],
 ) -> tuple[Array, Path]:
     """Run until all levels are passed, and count to where a cubic through values and rates meets each."""
     taken = [[(0.0, 0.0, float("nan"))] for _ in quantities]
     levels, passed = np.array([one.level for one in quantities]), np.zeros(len(quantities), dtype=int)
-    course = None if path is None else path.course
+    course = path.course
     run: list[Snapshot] = []
 
     def enough(_: Snapshot) -> bool:
         return bool((passed > 1).all())  # one jump more, so that values nearby find their level on the same path
 
-    cycles = limit if course is None else course.ends[-1]
-    for snapshot in model.run(values, cycles, settings=settings, course=course, until=enough):
+    for snapshot in model.run(values, course.last(limit), settings=settings, course=course, until=enough):
         for rows, one in zip(taken, quantities, strict=True):
             rows.append((snapshot.cycle, one.of_snapshot(snapshot), one.rate(snapshot)))
         passed += np.array([rows[-1][1] for rows in taken]) >= levels

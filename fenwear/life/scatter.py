@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,10 @@ class Scatter:
         text: For people, one line for each key.
     """
 
-    keys: tuple[str, ...]
-    marginals: tuple[Any, ...]
-    correlation: Array
-    text: tuple[str, ...]
+    keys: tuple[str, ...] = ()
+    marginals: tuple[Any, ...] = ()
+    correlation: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    text: tuple[str, ...] = ()
 
     def sample(self, size: int, seed: int) -> Array:
         """Return values of the keys (size, d)."""
@@ -136,7 +136,7 @@ def parse_scatter(case: Case, text: str) -> Scatter:
     path, equals, form = (part.strip() for part in text.partition("="))
     match = _FORM.fullmatch(form)
     name = f"--scatter {path}"
-    if not equals or match is None or match["kind"].lower() not in KINDS:
+    if not equals or not match or match["kind"].lower() not in KINDS:
         raise CaseError(
             InputError("--scatter", f"expected KEY=KIND(FIRST, SECOND) with {', '.join(KINDS)}, got {text!r}")
         )

@@ -1,43 +1,90 @@
-"""Derivatives of quantities of interest to keys of a case.
+"""Derivatives of quantities of interest to keys of a case, and quantities as a function of keys.
 
-Of a steady state by implicit differentiation; of a run, and of what is not differentiable so, such as a steady
-state whose materials depend on its temperatures, by central differences of runs with the same jumps, whose meshes,
-grids and properties of materials are made anew after the same half-cycles. Every
-difference is taken with two steps, h and h / 2, and extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the
-error that is told is |D(h/2) - D(h)|, of the coarser order. Where it is too large the step is reduced.
+Derivatives are central differences of steady states, or of runs with the same jumps, whose meshes, grids and properties
+of materials are made anew after the same half-cycles. Every difference is taken with two steps, h and h / 2, and
+extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; its error is |D(h/2) - D(h)|, of the coarser order. Where it is
+too large the step is reduced. The error is that of this step alone: not of the mesh, the positions and the jumps, which
+are those of the value itself (`run` has them as numerical uncertainty). A derivative and an error of exactly zero are
+held against the change of the quantity by a tenth of the key.
 
-The error that differences and implicit derivatives tell is that of this step alone: not of the mesh, the positions and
-the jumps, which are those of the value itself (`run` tells them as numerical uncertainty). A derivative and an error of
-exactly zero are held against the change of the quantity by a tenth of the key.
+Where contact or scar moves over the mesh such steps are too small. An edge takes its nodes one by one: from one to the
+next a computed width, pressure or depth goes another way than over many. Quantities q of a wear contact are near to
+powers of their keys x, so that over a window x = x_0 e^t, |t| <= T, which the edge crosses several nodes in,
 
-Where contact or scar moves over the mesh such steps are too small: as long as the same nodes are in contact a computed
-quantity changes with a key in another way than from node to node. There it is computed at keys over a window that
-the edge crosses several nodes in, see `fenwear.life.window`.
+    ln(q / q_0) = c_0 + c_1 t + c_2 t^2 (+ c_3 t^3)
+
+is fitted by least squares to samples with even steps of t; the derivative is c_1 q_0 / x_0. The residual is the
+roughness of the mesh: its standard error times Student's factor, and by what c_3 changes c_1, are the error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
+from scipy.stats import t as student
 
+from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.keys import Key, find_key, with_values
-from fenwear.life.linearised import SteadyTangent, differentiable
-from fenwear.life.model import Model, Snapshot
-from fenwear.life.quantities import Path, Quantity, evaluate, of_case, parse_quantity
-from fenwear.life.ranks import everywhere, share
-from fenwear.life.window import over_window
+from fenwear.life.model import Model
+from fenwear.life.quantities import NO_PATH, Path, Quantity, evaluate, of_case, parse_quantity
+from fenwear.life.runs import everywhere, share
+from fenwear.results.disk import finite
+
+WINDOWS = (0.6, 0.3, 0.1)  # T, tried until all of the window is possible
+SAMPLES = 13
+SURE = 0.975  # two-sided: 95 %
+
+
+def over_window(
+    function: Callable[[float], float], value: float, key: float, grain: float = 0.0
+) -> tuple[float, float] | None:
+    """Return the derivative of a function to a key and its error; None where no window around the key is possible.
+
+    Args:
+        function: Of the key, for any other value.
+        value: At the key's own value.
+        key: That value.
+        grain: What a value may change by unnoticed, as one that is counted in nodes: where it has not changed by more
+            over the window, it may have by so much.
+    """
+    if key == 0.0 or value == 0.0:
+        return None
+    for half in WINDOWS:
+        t: Array = np.linspace(-half, half, SAMPLES, dtype=np.float64)
+        try:
+            found = np.array([value if step == 0.0 else function(float(key * np.exp(step))) for step in t])
+        except (CaseError, ConvergenceError):
+            continue
+        ratio = found / value
+        if np.isfinite(ratio).all() and (ratio > 0).all():
+            slope, error = _slope(t, np.log(ratio))
+            if np.ptp(found) < grain:
+                error = max(error, grain / abs(value) / (2 * half))
+            return slope * value / key, error * abs(value / key)
+    return None
+
+
+def _slope(t: Array, y: Array) -> tuple[float, float]:
+    """Return the slope at t = 0 of a parabola through samples, and its error."""
+    parabola, cubic = (np.vander(t, order + 1, increasing=True) for order in (2, 3))
+    c, rest = np.linalg.lstsq(parabola, y, rcond=None)[:2]
+    bent = np.linalg.lstsq(cubic, y, rcond=None)[0]
+    free = len(t) - parabola.shape[1]
+    variance = float(rest[0]) / free * float(np.linalg.inv(parabola.T @ parabola)[1, 1])
+    return float(c[1]), float(student.ppf(SURE, free) * np.sqrt(variance) + abs(bent[1] - c[1]))
+
 
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small
 GOOD = 1e-6  # relative error of a derivative at which the step stays
 SURELY = 0.1  # relative change of a key that a quantity without any derivative is held against
 NONE = 1e-3  # elasticity below which a derivative may have the error of this one
-Method = Literal["implicit", "differences", "window"]
+Method = Literal["differences", "window"]
 
 
 @dataclass(frozen=True)
@@ -52,7 +99,7 @@ class Derivative:
         error: What two steps differ by, or what a fit over a window leaves open, in the same unit; see `error_of`.
         elasticity: Relative change of the quantity over that of the key; NaN where one of them is zero.
         low, high: The quantity with the key smaller and larger by the spread; NaN where that is not possible.
-        method: implicit, differences, or window.
+        method: differences, or window.
     """
 
     key: str
@@ -91,15 +138,9 @@ class Sensitivity:
 
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints: NaN as null."""
-        rows = [
-            {
-                **{name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in asdict(row).items()},
-                "error_of": row.error_of,
-            }
-            for row in self.derivatives
-        ]
-        return {"quantity": self.quantity, "unit": self.unit, "value": self.value, "spread": self.spread,
-                "derivatives": rows}  # fmt: skip
+        rows = [{**asdict(row), "error_of": row.error_of} for row in self.derivatives]
+        found = {**asdict(self), "derivatives": rows}
+        return dict(finite(found))
 
     def text(self) -> str:
         """Return a table for people, the most influential key first."""
@@ -144,8 +185,8 @@ def sensitivity(
         quantities: Such as "depth", "steady pressure" or "cycles until depth 0.2 mm".
         keys: Such as "wear.punch.coefficient".
         spread: Relative change of each key for the tornado plot; 0 for none.
-        method: By default implicit where that is possible, over a window where contact or scar grows, and by
-            differences else. Differences that are asked for are those of a growing contact's present nodes.
+        method: By default over a window where contact or scar grows, and by differences else. Differences that are
+            asked for are those of a growing contact's present nodes.
         comm: The ranks.
         progress: Told of the derivatives done and of all.
 
@@ -166,16 +207,10 @@ def sensitivity(
             raise CaseError(
                 InputError("--of", f"{quantity.text!r} is never reached in this case: it has no derivative")
             )
-    methods = [_method(model, quantity, method) for quantity in wanted]
-    implicit = "implicit" in methods
-    tangent = everywhere(comm, lambda: SteadyTangent(model.system(), model.steady({})) if implicit else None)
 
     def one(k: int) -> list[Derivative]:
-        nearby = None if tangent is None else _Nearby(model, found[k], tangent)
-        return [
-            _derivative(model, quantity, base, found[k], spread, nearby if by == "implicit" else None, method)
-            for quantity, base, by in zip(wanted, bases, methods, strict=True)
-        ]
+        pairs = zip(wanted, bases, strict=True)
+        return [_derivative(model, quantity, base, found[k], spread, method) for quantity, base in pairs]
 
     columns = share(comm, len(found), one, progress)
     return [
@@ -184,46 +219,28 @@ def sensitivity(
     ]
 
 
-def _implicitly(model: Model) -> bool:
-    """Return whether steady states are differentiated implicitly: not where properties are of their own warmth."""
-    return not model.warming and differentiable(model.system())
-
-
-def _method(model: Model, quantity: Quantity, asked: Method | None) -> Method:
-    if quantity.kind == "steady" and asked != "differences" and _implicitly(model):
-        return "implicit"
-    if asked == "implicit":
-        raise CaseError(
-            InputError("--method", f"{quantity.text!r} is not differentiated implicitly; expected 'differences'")
-        )
-    return "differences"
-
-
 def _derivative(
     model: Model,
     quantity: Quantity,
     base: tuple[float, Path],
     key: Key,
     spread: float,
-    nearby: _Nearby | None,
     asked: Method | None,
 ) -> Derivative:
     value, path = base
     scale = abs(value) / _step(key, 1.0)
-    along = None if quantity.kind == "life" else path  # with a smaller key a life is longer
+    along = NO_PATH if quantity.kind == "life" else path  # with a smaller key a life is longer
 
-    def at(x: float, on: Path | None) -> float:
+    def at(x: float, on: Path) -> float:
         return evaluate(model, quantity, {key.path: x}, path=on)[0]
 
-    by: Method = "differences" if nearby is None else "implicit"
+    by: Method = "differences"
     windowed = None
-    if path.rough and by != asked:
+    if path.rough and asked != "differences":
         windowed = over_window(lambda x: at(x, along), value, key.value, path.grain)
     if windowed is not None:
         by = "window"
         slope, error = windowed
-    elif nearby is not None:
-        slope, error = _refined(lambda relative: nearby.slope(quantity, relative), scale)
     else:
         slope, error = _differences(lambda x: at(x, path), model.case, key, scale)
     wide = spread or (SURELY if slope == error == 0 else 0.0)
@@ -280,7 +297,7 @@ def _refined(slope: Callable[[float], float], scale: float) -> tuple[float, floa
 
 
 def _sides(case: Case, key: Key) -> tuple[bool, bool]:
-    """Return whether values below and above the key's own are possible.
+    """Return whether values below and above that of a key are possible.
 
     Raises:
         CaseError: neither is.
@@ -306,30 +323,65 @@ def _differences(function: Callable[[float], float], case: Case, key: Key, scale
     return _refined(slope, scale)
 
 
-class _Nearby:
-    """The steady states of systems beside the base, to first order; kept for several quantities."""
+KEPT = 64  # Jacobians
 
-    def __init__(self, model: Model, key: Key, tangent: SteadyTangent) -> None:
-        self._model, self._key, self._tangent = model, key, tangent
-        self._sides = _sides(model.case, key)
-        self._known: dict[float, tuple[Snapshot, Snapshot, float]] = {}
 
-    def slope(self, quantity: Quantity, relative: float) -> float:
-        """Return the derivative of a quantity by steps of this relative size."""
-        if relative not in self._known:
-            self._known[relative] = self._ends(_step(self._key, relative))
-        first, last, width = self._known[relative]
-        return (quantity.of_snapshot(last) - quantity.of_snapshot(first)) / width
+@dataclass
+class Forward:
+    """Quantities of interest of a case as a function of its keys.
 
-    def _ends(self, h: float) -> tuple[Snapshot, Snapshot, float]:
-        key, (below, above) = self._key, self._sides
-        values = (key.value - h if below else key.value, key.value + h if above else key.value)
-        first, last = (self._model.system({key.path: x}) for x in values)
-        width = values[1] - values[0]
-        step = self._tangent.change(first, last)
-        factors = [(x - key.value) / width for x in values]
-        return (
-            self._tangent.snapshot(first, step, factors[0]),
-            self._tangent.snapshot(last, step, factors[1]),
-            width,
-        )
+    Attributes:
+        case: The case.
+        quantities: What is wanted.
+        keys: What they are functions of.
+    """
+
+    case: Case
+    quantities: Sequence[Quantity]
+    keys: Sequence[Key]
+    _model: Model = field(init=False)
+    _jacobians: dict[tuple[float, ...], Array] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._model = Model(self.case)
+
+    def values(self, given: Sequence[float]) -> list[float]:
+        """Return the quantities at values of the keys (k,).
+
+        Raises:
+            CaseError: a value is not possible.
+            ConvergenceError: a run or a steady state did not converge.
+        """
+        return [evaluate(self._model, quantity, self._named(given))[0] for quantity in self.quantities]
+
+    def jacobian(self, given: Sequence[float]) -> Array:
+        """Return the derivatives of the quantities to the keys (quantities, keys).
+
+        Raises:
+            CaseError, ConvergenceError: as `values`.
+        """
+        at = tuple(given)
+        if at not in self._jacobians:
+            case = with_values(self.case, self._named(given))
+            paths = [key.path for key in self.keys]
+            found = sensitivity(case, self.quantities, paths, spread=0, comm=MPI.COMM_SELF)
+            if len(self._jacobians) >= KEPT:
+                self._jacobians.clear()
+            self._jacobians[at] = np.array([[row.derivative for row in one.derivatives] for one in found])
+        return self._jacobians[at]
+
+    def _named(self, given: Sequence[float]) -> dict[str, float]:
+        return {key.path: float(value) for key, value in zip(self.keys, given, strict=True)}
+
+
+def forward(case: Case, quantities: Sequence[str], keys: Sequence[str]) -> Forward:
+    """Return quantities of a case as a function of its keys.
+
+    Raises:
+        CaseError: one that the case does not have, or none.
+    """
+    for option, given in (("--of", quantities), ("--to", keys)):
+        if not given:
+            raise CaseError(InputError(option, "expected at least one"))
+    wanted = [of_case(parse_quantity(text, names=case.names), case) for text in quantities]
+    return Forward(case, wanted, [find_key(case, key, "--to") for key in keys])

@@ -47,7 +47,7 @@ from fenwear.interface import ContactPair, RigidEquilibrium
 from fenwear.interface.frame import facet_normals
 from fenwear.interface.overlap import RING
 from fenwear.plausibility.boundary import contact_modulus
-from fenwear.results.zone import ContactNet, Zone
+from fenwear.results.surfaces import ContactNet, Zone
 from fenwear.sliding.chart import sliding_chart
 
 ENOUGH = 4  # nodes from the middle of a contact to each of its ends: eight across it

@@ -26,8 +26,7 @@ from fenwear.plausibility.boundary import Chamfers, Limits, contact_chamfers, co
 from fenwear.plausibility.elastic import TAKEN_UP, elastic_share, elastic_way, large, stroke_amplitude
 from fenwear.plausibility.meshes import Fields
 from fenwear.results import between
-from fenwear.results.shakedown import factor, shakedown_limit
-from fenwear.results.summary import net_of
+from fenwear.results.summary import factor, net_of, shakedown_limit
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:

@@ -2,32 +2,52 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray
 
+from fenwear.arrays import Array
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, InputError
-from fenwear.report.compare_figure import has_stick, runs_figure
-from fenwear.report.figures import of_half_cycles
+from fenwear.report.course import directions_present, mark_few
+from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
-from fenwear.report.style import name_bodies, save
-from fenwear.report.surface import model_of
-from fenwear.results.cycles import by_cycles, resolves
-from fenwear.results.degrees import in_kelvin
-from fenwear.results.disk import writing
-from fenwear.results.reading import load_history
+from fenwear.report.lines import fields_of, tracks_of, worn_range
+from fenwear.report.stick import loop_of
+from fenwear.report.style import (
+    by_powers,
+    direction_words,
+    from_zero,
+    legend_beside,
+    name_bodies,
+    panels,
+    run_style,
+    save,
+    strip_moves,
+)
+from fenwear.report.surface import gaps_of, model_of, part_lines
+from fenwear.results.disk import finite, writing
+from fenwear.results.quantity import in_kelvin
+from fenwear.results.reading import by_cycles, resolves
 from fenwear.results.sheet import BODIES, LINES, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = (".png", ".pdf", ".svg")
+COURSES = {
+    "largest_pressure": "largest contact pressure (MPa)",
+    "largest_depth": "largest worn depth of the punch (mm)",
+    "largest_temperature": "largest temperature (K)",
+    "friction_work_increment": "work of friction in a half-cycle (mJ)",
+}
+DRAWN = ("wear", "wear_strip", "pressure")  # along the contact, at the end
+PLACES = np.array([-0.5, -0.25, 0.0, 0.25, 0.5])  # of the length that all runs have
+OF_EACH = ("x_mm", "wear_mm", "pressure_MPa", "temperature_punch_", "temperature_strip_")  # at other places in each run
 
 
 @dataclass(frozen=True)
@@ -52,8 +72,12 @@ class Comparison:
 
     def as_json(self) -> dict[str, Any]:
         """Return the tables; what is no finite number is null."""
-        numbers = {k: [None if _not_finite(v) else v for v in row] for k, row in self.numbers.items()}
-        return {"runs": self.names, "numbers": numbers, "cases": self.cases, "versions": self.versions}
+        return {
+            "runs": self.names,
+            "numbers": finite(self.numbers),
+            "cases": self.cases,
+            "versions": self.versions,
+        }
 
     def text(self) -> str:
         """Return the tables for people, a column per run: names and units of results, keys of cases."""
@@ -67,56 +91,36 @@ class Comparison:
         return "\n\n".join(parts)
 
     def named(self) -> dict[str, dict[str, list[Any]]]:
-        """Return the results by their names and units: the sheet, what is at the same places, and the rest."""
-        of_sheet = {f"{part}.{key}" for part in ("sliding", *BODIES) for key in LINES}
-        # At quarters of each run's own contact: not the same places.
-        own_places = ("x_mm", "wear_mm", "pressure_MPa", "temperature_punch_", "temperature_strip_")
-        rest = {
-            _name(key): row
-            for key, row in self.numbers.items()
-            if key not in of_sheet and not key.rpartition(".")[2].startswith(own_places)
-        }
-        return {"results": self._sheet(), "at the same places": at_same_places(self.histories), "further": rest}
-
-    def _sheet(self) -> dict[str, list[Any]]:
-        """Return what stands on a tribometer's sheet, in the units in which it is read."""
-        found = {}
+        """Return the results by their names and units: the sheet, values at the same places, and the rest."""
+        of_sheet: dict[str, list[Any]] = {}
+        rest = {key: row for key, row in self.numbers.items() if not key.rpartition(".")[2].startswith(OF_EACH)}
         for part in ("sliding", *BODIES):
             for key, line in LINES.items():
-                row = self.numbers.get(f"{part}.{key}")
-                if row is not None:
-                    unit = f" ({line.unit})" if line.unit else ""
-                    of = "" if part == "sliding" else f", {part}"
-                    found[f"{line.label}{of}{unit}"] = [shown(value, line) for value in row]
-        return found
+                row = rest.pop(f"{part}.{key}", [])
+                unit = f" ({line.unit})" if line.unit else ""
+                of = "" if part == "sliding" else f", {part}"
+                if row:
+                    of_sheet[f"{line.label}{of}{unit}"] = [shown(value, line) for value in row]
+        further = {_name(key): row for key, row in rest.items()}
+        return {"results": of_sheet, "at the same places": at_same_places(self.histories), "further": further}
 
 
 def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
     """Return depths and pressures at the end of plane runs at places that all of them have, by names with units."""
-    if any(model_of(history) != "plane" or has_stick(history) for history in histories):
+    if any(model_of(history) != "plane" for history in histories):
         return {}
-    low, high = (pick(float(end(history.x)) for history in histories) for pick, end in ((max, np.min), (min, np.max)))
-    if high <= low:
-        return {}
-    places = (low + high) / 2 + (high - low) * np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
-    places = np.round(places, 9) + 0.0
+    low, high = max(float(history.x.min()) for history in histories), min(float(h.x.max()) for h in histories)
+    places = np.round((low + high) / 2 + (high - low) * PLACES, 9) + 0.0
     found: dict[str, list[Any]] = {}
-    values = {
-        "worn depth of the punch (µm)": ("wear", "x", 1e3),
-        "worn depth of the strip (µm)": ("wear_strip", "x_strip", 1e3),
-        "pressure, last half-cycle (MPa)": ("pressure", "x", 1.0),
-    }
-    for name, (variable, along, factor) in values.items():
-        if not any(variable in history for history in histories):
-            continue
-        rows = [
-            np.interp(places, history[along], factor * history[variable].isel(half_cycle=-1))
-            if variable in history
-            else np.full(len(places), np.nan)
-            for history in histories
-        ]
+    fields = {name: field for history in histories for name, field in fields_of(history).items() if name in DRAWN}
+    for name, field in fields.items() if high > low else ():
+        rows = []
+        for history in histories:
+            line = tracks_of(history)[0].line
+            last = field.factor * history[name].values[-1] if name in history else np.full(history.sizes["x"], np.nan)
+            rows.append(np.interp(places, *line(last, field.body if name in history else "punch")))
         for k, x in enumerate(places):
-            found[f"{name} at x = {x:.4g} mm"] = [float(row[k]) for row in rows]
+            found[f"{field.label} at x = {x:.4g} mm"] = [float(row[k]) for row in rows]
     return found
 
 
@@ -137,40 +141,21 @@ def compare(directories: Sequence[Path]) -> Comparison:
     read = []
     for directory in directories:
         try:
-            read.append((in_kelvin(_read(directory)), read_summary(directory), read_case(directory)))
+            read.append((in_kelvin(read_history(directory)), read_summary(directory), read_case(directory)))
         except CaseError as error:
             problems += error.problems
     if problems:
         raise CaseError(problems)
-    if len({has_stick(history) for history, _, _ in read}) > 1:
-        raise CaseError(InputError("DIR", "expected runs with stick, or runs in gross sliding, not both"))
-    summaries = [summary for _, summary, _ in read]
-    shown = [
-        {k: v for k, v in s.items() if k not in ("versions", "warnings", "title", "uncertainty")} for s in summaries
-    ]
+    left_out = ("versions", "warnings", "title", "uncertainty")
+    names = [directory.resolve().name for directory in directories]
     return Comparison(
-        names=_names(directories),
+        names=names if len(set(names)) == len(names) else [str(directory) for directory in directories],
         histories=[history for history, _, _ in read],
-        numbers=_rows([flat(s) for s in shown]),
+        numbers=_rows([flat({k: v for k, v in summary.items() if k not in left_out}) for _, summary, _ in read]),
         cases=_differing(_rows([flat(case) for _, _, case in read])),
-        versions=_differing(_rows([s.get("versions", {}) for s in summaries])),
+        versions=_differing(_rows([summary.get("versions", {}) for _, summary, _ in read])),
         bodies=Names.of(read[0][2]),
     )
-
-
-def _read(directory: Path) -> xarray.Dataset:
-    """Return the history of a run, in memory.
-
-    Raises:
-        CaseError: there is none, or it holds nothing yet.
-    """
-    history = load_history(directory)
-    return by_cycles(history) if resolves(history) else of_half_cycles(directory, history)
-
-
-def comparison_figure(comparison: Comparison) -> Figure:
-    """Draw shape and pressures at the end of each run, and what it comes to over its cycles."""
-    return runs_figure(comparison.names, comparison.histories)
 
 
 def draw_comparison(comparison: Comparison, path: Path) -> Path:
@@ -193,10 +178,81 @@ def draw_comparison(comparison: Comparison, path: Path) -> Path:
     return path
 
 
-def _names(directories: Sequence[Path]) -> list[str]:
-    """Return the folders' names, or their paths where names repeat."""
-    names = [directory.resolve().name for directory in directories]
-    return names if len(set(names)) == len(names) else [str(directory) for directory in directories]
+class Drawn(NamedTuple):
+    """A line of a run: the title of its panel, the names of its axes, and where it goes."""
+
+    title: str
+    across: str
+    up: str
+    x: Array
+    y: Array
+    from_zero: bool = True
+    ends: tuple[float, float] | None = None
+
+
+def comparison_figure(comparison: Comparison) -> Figure:
+    """Return the runs over each other, a panel for each quantity; along the contact where all are of one model.
+
+    Solids are drawn on cuts along and across the sliding.
+    """
+    histories = comparison.histories
+    alike = len({model_of(history) for history in histories}) == 1
+    runs = [[*(_shapes(history) if alike else ()), *_courses(history)] for history in histories]
+    titles = list(dict.fromkeys(line.title for run in runs for line in run))
+    figure, axes = panels(len(titles), 2.5, share_x=False)
+    for number, (name, run) in enumerate(zip(comparison.names, runs, strict=True)):
+        # Thinner from run to run: where two agree, both are seen.
+        style: dict[str, Any] = {**run_style(number), "linewidth": max(1.2, 3.0 - 0.7 * number)}
+        for line in run:
+            ax = axes[titles.index(line.title)]
+            ax.plot(line.x, line.y, label=name, **style, **mark_few(line.x))
+            ax.set_title(line.title, loc="left")
+            ax.set_xlabel(line.across)
+            ax.set_ylabel(line.up)
+            if line.across == "half-cycle n":
+                by_powers(ax)
+            if line.from_zero:
+                from_zero(ax)
+            if line.ends is not None:
+                ax.set_xlim(line.ends)
+    for ax in axes:
+        legend_beside(ax, "run")
+    part_lines([figure], np.concatenate([gaps_of(history) for history in histories]))
+    return figure
+
+
+def _courses(history: xarray.Dataset) -> Iterator[Drawn]:
+    """Yield what a run comes to over its half-cycles."""
+    directions = len(directions_present(history))
+    for name, label in COURSES.items():
+        if name in history:
+            # The larger of the directions: the line shall not jump between them.
+            values = history[name].rolling(half_cycle=directions, min_periods=1).max().values
+            title = label[0].upper() + label[1:].partition(" (")[0]
+            yield Drawn(title, "half-cycle n", label, history.half_cycle.values, values, from_zero=False)
+
+
+def _shapes(history: xarray.Dataset) -> Iterator[Drawn]:
+    """Yield what there is along the contact at the end of a run, with stick the loop of the last cycle besides."""
+    if resolves(history):
+        cycles = by_cycles(history)
+        way, force, moved, pulled = loop_of(cycles, cycles.sizes["cycle"] - 1)
+        yield Drawn("Loop of the last cycle", moved, pulled, way, force, from_zero=False)
+    solid, words = model_of(history) == "solid", direction_words(history)
+    known = fields_of(history)
+    for name, field in ((name, known[name]) for name in DRAWN if name in known):
+        title = f"{field.title[0].upper()}{field.title[1:]} at the end"
+        by_direction = name == "pressure" and not solid
+        for d in directions_present(history) if by_direction else (0,):
+            rows = history[name].values if d == 0 else history[name].values[history.direction.values == d]
+            own = f"{title}, {strip_moves(history)} {words[d]}" if d else title
+            for along in (True, False) if solid else (True,):
+                track = tracks_of(history, along=along)[0]
+                way = f", {'along' if along else 'across'} the sliding" if solid else ""
+                label = track.label.partition(",")[0]
+                x, y = track.line(field.factor * rows[-1], field.body)
+                ends = worn_range(history) if field.body == "strip" and not solid else None
+                yield Drawn(own + way, label, field.label, x, y, ends=ends)
 
 
 def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
@@ -206,10 +262,6 @@ def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
 
 def _differing(rows: dict[str, list[Any]]) -> dict[str, list[Any]]:
     return {key: row for key, row in rows.items() if any(value != row[0] for value in row)}
-
-
-def _not_finite(value: Any) -> bool:
-    return isinstance(value, float) and not math.isfinite(value)
 
 
 def _columns(title: str, names: Sequence[str], table: dict[str, list[Any]]) -> str:

@@ -1,9 +1,9 @@
-"""Figures over a run: peaks, convergence, worn volume and rate, scars, forces, heat."""
+"""Figures over a run, from one table: which variables stand in which panel; a shaft's path, loads and heat besides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sized
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import xarray
@@ -33,159 +33,205 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LAST = 0.1  # of what is done, that a mean pressure is of
 BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
 SHORT = 0.01  # of cycles, m or s: an end whose labels are long, so that few of them go beside each other
+GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
+ENDS = {**BODIES, "layer": "_layer"}
 
 
-def peak_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw largest pressure, width or area in contact and, with heat, largest temperature."""
-    over = {
-        "largest_pressure": "largest pressure (MPa)",
-        "contact_width": "width in contact (mm)",
-        "contact_area": "area in contact (mm²)",
-        "largest_temperature": f"largest temperature ({temperature_unit(history)})",
-    }
-    over = {name: label for name, label in over.items() if name in history}
-    if "contact_width" in over:
-        over.pop("contact_area", None)  # the same, times the thickness
-    figure, axes = panels(len(over), 2.5, look=look)
-    for ax, (name, label) in zip(axes, over.items(), strict=True):
-        by_direction(ax, history, name, look)
-        ax.set_ylabel(label)
-    if "pressure_sum" in history and len(ends := cycle_ends(history)):
-        x = look.course(history)[np.searchsorted(history.half_cycle.values, ends)]
-        late = late_pressures(history, ends).max(axis=1)
-        axes[0].plot(x, late, color="0.5", linestyle="-.", linewidth=1.0, label="of the mean over the last tenth")
+class Line(NamedTuple):
+    """Lines of a variable: of each sliding direction, or of each body where its name has a place for the body.
+
+    Attributes:
+        variable: Its name; `{}` stands for the end that a body gives it.
+        label: In the legend; `{}` stands for the body or the direction.
+        dashes: Of bodies.
+    """
+
+    variable: str
+    label: str = "{}"
+    dashes: str = "-"
+
+    @property
+    def of_bodies(self) -> bool:
+        """Whether each body has a line."""
+        return "{}" in self.variable
+
+    def ends(self, history: xarray.Dataset) -> dict[str, str]:
+        """Return the names of the variables that a history has, by the body."""
+        names = {body: self.variable.format(end) for body, end in ENDS.items()}
+        return {body: name for body, name in names.items() if name in history and history[name].notnull().any()}
+
+
+class Panel(NamedTuple):
+    """A panel of a figure over the run.
+
+    Attributes:
+        label: Of the upward axis; `{}` stands for the unit of temperatures.
+        lines: What is drawn.
+        factor: From the unit of the history.
+        begins: At zero, anywhere, or on a logarithmic axis.
+    """
+
+    label: str
+    lines: tuple[Line, ...]
+    factor: float = 1.0
+    begins: Literal["zero", "free", "powers"] = "zero"
+
+
+class Course(NamedTuple):
+    """A figure over the run.
+
+    Attributes:
+        of: How the names of the variables begin without which there is no such figure.
+        panels: Below each other; those without any value are left out.
+        axis: What it is drawn over; "" for what the user has chosen.
+        logarithmic: Whether the axis of a long run is.
+    """
+
+    of: str
+    panels: tuple[Panel, ...]
+    axis: str = ""
+    logarithmic: bool = True
+
+
+def _size(name: str) -> Panel:
+    """Return the panel of a size of the scar."""
+    shares = (Line(f"scar_{name}{{}}", "{}, at 1 %"), Line(f"scar_{name}_5_percent{{}}", "{}, at 5 %", "--"))
+    return Panel(f"scar {name} (mm)", shares)
+
+
+COURSES = {
+    "peaks": Course("largest_pressure", (
+        Panel("largest pressure (MPa)", (Line("largest_pressure"),)),
+        Panel("width in contact (mm)", (Line("contact_width"),)),
+        Panel("area in contact (mm²)", (Line("contact_area"),)),
+        Panel("largest temperature ({})", (Line("largest_temperature"),), begins="free"),
+    )),
+    "volume": Course("worn_volume", (
+        Panel("worn volume (mm³)", (Line("worn_volume{}"),)),
+        Panel("specific wear rate (mm³/(N m))", (Line("wear_rate{}", "{}, current"),
+                                                 Line("mean_wear_rate{}", "{}, mean", "--"))),
+    ), "distance", logarithmic=False),
+    "creep": Course("creep_volume", (
+        Panel("largest depth (µm)", (Line("largest_depth{}", "{}, worn off"),
+                                     Line("largest_creep_depth{}", "{}, crept", "--")), 1e3),
+        Panel("volume (mm³)", (Line("worn_volume{}", "{}, worn off"), Line("creep_volume{}", "{}, crept", "--"))),
+    ), "time", logarithmic=False),
+    "scar": Course("largest_depth", (
+        Panel("largest worn depth (µm)", (Line("largest_depth{}"),), 1e3), _size("length"), _size("width"),
+    )),
+    "friction": Course("friction_work", (
+        Panel("load: normal force (N)", (Line("normal_force"),)),
+        Panel("friction force (N)", (Line("friction_force"),)),
+        Panel("work of friction (J)", (Line("friction_work"),), 1e-3),
+    ), logarithmic=False),
+    "energy": Course("energy_ratio", (
+        Panel("work of friction in a half-cycle (µJ)", (Line("friction_work_increment"),), 1e3),
+        Panel("energy ratio (-)", (Line("energy_ratio"),)),
+    )),
+    "roughness": Course("roughness", (
+        Panel("roughness (µm)", (Line("roughness_Sa{}", "mean, {}"),
+                                 Line("roughness_Sq{}", "root mean square, {}", "--")), 1e3),
+    )),
+    "convergence": Course("periodicity", (
+        Panel("change in a cycle, largest of a node (-)", (Line("periodicity"),), begins="powers"),
+        Panel("load elsewhere than in the optimum (-)", (Line("optimum_distance"),)),
+    )),
+}  # fmt: skip
+
+
+def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) -> Figure:
+    """Return a figure of the table `COURSES`."""
+    course = COURSES[name]
+    look = Style(look.width, course.axis or look.axis)
+    twice = "contact_area" if "contact_width" in history else ""  # the width, times the thickness
+    shown = [p for p in course.panels if any(one.ends(history) and one.variable != twice for one in p.lines)]
+    figure, axes = panels(len(shown), 2.6, look=look)
+    x, known = look.course(history), levels(history)
+    for ax, panel in zip(axes, shown, strict=True):
+        for line in panel.lines:
+            (_of_bodies if line.of_bodies else _of_directions)(ax, history, line, panel.factor, x)
+            if line.variable in known:
+                level_line(ax, *known[line.variable])
+        ax.set_ylabel(panel.label.format(temperature_unit(history)))
+        if panel.begins == "powers":
+            by_powers(ax, "y")
+        elif panel.begins == "zero":
+            from_zero(ax)
+        legend_beside(ax, "" if panel.lines[0].of_bodies else strip_moves(history))
+    run_axis(axes[-1], history, look, logarithmic=course.logarithmic)
+    return figure
+
+
+def course_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
+    """Return all figures over the run that a history has data for, by their names."""
+    names = [str(name) for name in history.data_vars]
+    shown = [name for name, course in COURSES.items() if any(one.startswith(course.of) for one in names)]
+    found = {name: course_figure(history, name, look) for name in shown}
+    if bores_of(history):
+        found["place"] = place_figure(history, look)
+    if "load_factor" in history:
+        found["program"] = program_figure(history, look)
+    if "heat_friction" in history:
+        found["heat_balance"] = heat_balance_figure(history, look)
+    return found
+
+
+def levels(history: xarray.Dataset) -> dict[str, tuple[float, str]]:
+    """Return levels that lines of variables are held against, with their words, by the variable."""
+    found = {"energy_ratio": (GROSS, "gross sliding above,\npartial slip below")}
     if is_conforming(history):
-        mean = mean_pressure(history)
-        level_line(axes[0], mean, f"mean {mean:.4g}")
-        level_line(axes[1], nominal_width(history), f"nominal {nominal_width(history):.4g}")
-    for ax in axes[:2]:
-        from_zero(ax)
-    for ax in axes:
-        legend_beside(ax, strip_moves(history))
-    run_axis(axes[-1], history, look)
-    return figure
+        mean, width = mean_pressure(history), nominal_width(history)
+        found |= {"largest_pressure": (mean, f"mean {mean:.4g}"), "pressure": (mean, f"mean {mean:.4g} MPa")}
+        found |= dict.fromkeys(("contact_width", "contact_area"), (width, f"nominal {width:.4g}"))
+    return found
 
 
-def convergence_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw the change against one cycle ago and the distance to the optimal pressure."""
-    over = {
-        "periodicity": "change in a cycle, largest of a node (-)",
-        "optimum_distance": "load elsewhere than in the optimum (-)",
-    }
-    over = {name: label for name, label in over.items() if name == "periodicity" or history[name].notnull().any()}
-    figure, axes = panels(len(over), 2.7, look=look)
-    for ax, (name, label) in zip(axes, over.items(), strict=True):
-        by_direction(ax, history, name, look)
-        ax.set_ylabel(label)
-        legend_beside(ax, strip_moves(history))
-    by_powers(axes[0], "y")
-    for ax in axes[1:]:
-        from_zero(ax)
-    run_axis(axes[-1], history, look)
-    return figure
+def _of_bodies(ax: Axes, history: xarray.Dataset, line: Line, factor: float, x: Array) -> None:
+    """Draw a line of each body that has one."""
+    for body, name in line.ends(history).items():
+        style: dict[str, Any] = {"color": BODY_COLOURS.get(body, "0.4"), "linestyle": line.dashes, **mark_few(x)}
+        ax.plot(x, factor * history[name], label=line.label.format(body), **style)
 
 
-def volume_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw the worn volume and the specific wear rate of the bodies that wear."""
-    figure, axes = panels(2, 2.7, look=look)
-    x = look.course(history)
-    for body, end in BODIES.items():
-        if f"worn_volume{end}" not in history:
-            continue
-        colour = BODY_COLOURS[body]
-        axes[0].plot(x, history[f"worn_volume{end}"], color=colour, label=body, **mark_few(x))
-        axes[1].plot(x, history[f"wear_rate{end}"], color=colour, label=f"{body}, current", **mark_few(x))
-        axes[1].plot(x, history[f"mean_wear_rate{end}"], color=colour, linestyle="--", label=f"{body}, mean")
-    axes[0].set_ylabel("worn volume (mm³)")
-    axes[1].set_ylabel("specific wear rate (mm³/(N m))")
-    for ax in axes:
-        from_zero(ax)
-        legend_beside(ax, "")
-    run_axis(axes[-1], history, look, logarithmic=False)
-    return figure
-
-
-def creep_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw what is worn and what has crept, of each body and of a layer: largest depth and volume."""
-    figure, axes = panels(2, 2.7, look=look)
-    x = look.course(history)
-    for body, end in {**BODIES, "layer": "_layer"}.items():
-        colour = BODY_COLOURS.get(body, "0.4")
-        for text, dashes, depth, volume in (
-            ("worn off", "-", f"largest_depth{end}", f"worn_volume{end}"),
-            ("crept", "--", f"creep_depth{end}", f"creep_volume{end}"),
-        ):
-            if depth not in history:
-                continue
-            deepest = history[depth].max([d for d in history[depth].dims if d != "half_cycle"])
-            style: dict[str, Any] = {"color": colour, "linestyle": dashes, "label": f"{body}, {text}", **mark_few(x)}
-            axes[0].plot(x, 1e3 * deepest, **style)
-            axes[1].plot(x, history[volume], **style)
-    axes[0].set_ylabel("largest depth (µm)")
-    axes[1].set_ylabel("volume (mm³)")
-    for ax in axes:
-        from_zero(ax)
-        legend_beside(ax, "")
-    run_axis(axes[-1], history, look, logarithmic=False)
-    return figure
-
-
-def scar_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw the largest worn depths and the sizes of the scars, unless they are worn all the way round."""
-    sizes = [n for n in ("scar_length", "scar_width") if any(f"{n}{end}" in history for end in BODIES.values())]
-    figure, axes = panels(1 + len(sizes), 2.5, look=look)
-    x = look.course(history)
-    for body, end in BODIES.items():
-        if f"largest_depth{end}" not in history:
-            continue
-        colour = BODY_COLOURS[body]
-        axes[0].plot(x, 1e3 * history[f"largest_depth{end}"], color=colour, label=body, **mark_few(x))
-        for ax, name in zip(axes[1:], sizes, strict=True):
-            for share, dashes in (("", "-"), ("_5", "--")):
-                if f"{name}{share}{end}" in history:
-                    of = f"{body}, at {5 if share else 1} %"
-                    ax.plot(x, history[f"{name}{share}{end}"], dashes, color=colour, label=of, **mark_few(x))
-    axes[0].set_ylabel("largest worn depth (µm)")
-    for ax, name in zip(axes[1:], sizes, strict=True):
-        ax.set_ylabel(f"{name.replace('_', ' ')} (mm)")
-    for ax in axes:
-        from_zero(ax)
-        legend_beside(ax, "")
-    run_axis(axes[-1], history, look)
-    return figure
+def _of_directions(ax: Axes, history: xarray.Dataset, line: Line, factor: float, x: Array) -> None:
+    """Draw a line of each sliding direction."""
+    for d in directions_present(history):
+        text, dashes, colour = direction_style(history, d)
+        rows = np.flatnonzero(history.direction.values == d)
+        values = factor * history[line.variable].values[rows]
+        ax.plot(x[rows], values, dashes, color=colour, label=line.label.format(text), **mark_few(rows))
 
 
 def place_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw a shaft's place in its bores over a run: the path of its middle, eccentricity and attitude angle."""
+    """Return a shaft's place in its bores over a run: the path of its middle, eccentricity and attitude angle."""
     figure, axes = panels(3, 2.7, share_x=False, look=look)
+    path, eccentricity, angle = axes
     x, bores = look.course(history), bores_of(history)
-    axes[0].plot(0, 0, "+", color="0", label="middle of the bore")
+    path.plot(0, 0, "+", color="0", label="middle of the bore")
     for number, (name, end) in enumerate(bores.items()):
         style = run_style(number) if name else {"color": "0"}
         words = f", {name}" if name else ""
         e_x, e_z = (1e3 * history[f"eccentricity_{axis}{end}"].values for axis in "xz")
-        axes[0].plot(e_x, e_z, **style, **mark_few(x))
-        axes[0].plot(e_x[:1], e_z[:1], "o", color=style["color"] if name else BLUE, markersize=4,
-                     label=f"shaft, at first{words}")  # fmt: skip
-        axes[0].plot(e_x[-1:], e_z[-1:], "s", color=style["color"] if name else RED, markersize=4,
-                     label=f"shaft, at the end{words}")  # fmt: skip
+        path.plot(e_x, e_z, **style, **mark_few(x))
+        for row, mark, colour, when in ((0, "o", BLUE, "at first"), (-1, "s", RED, "at the end")):
+            shown = style["color"] if name else colour
+            path.plot(e_x[row], e_z[row], mark, color=shown, markersize=4, label=f"shaft, {when}{words}")
         label = name or "_"  # no entry of a legend
-        axes[1].plot(x, 1e3 * history[f"eccentricity{end}"], label=label, **style, **mark_few(x))
-        axes[2].plot(x, history[f"attitude_angle{end}"], label=label, **style, **mark_few(x))
-    axes[0].set_aspect("equal", adjustable="datalim")
-    axes[0].margins(0.15)
-    axes[0].set_xlabel("x (µm)")
-    axes[0].set_ylabel("z (µm)")
-    axes[1].set_ylabel("eccentricity (µm)")
-    from_zero(axes[1])
-    axes[2].set_ylabel("attitude angle (degrees)")
-    low, high = axes[2].get_ylim()
+        eccentricity.plot(x, 1e3 * history[f"eccentricity{end}"], label=label, **style, **mark_few(x))
+        angle.plot(x, history[f"attitude_angle{end}"], label=label, **style, **mark_few(x))
+    path.set_aspect("equal", adjustable="datalim")
+    path.margins(0.15)
+    path.set_xlabel("x (µm)")
+    path.set_ylabel("z (µm)")
+    eccentricity.set_ylabel("eccentricity (µm)")
+    from_zero(eccentricity)
+    angle.set_ylabel("attitude angle (degrees)")
+    low, high = angle.get_ylim()
     low, high = min(low, -1.0), max(high, 1.0)
-    axes[2].set_ylim(low - BEYOND * (high - low), high + BEYOND * (high - low))
+    angle.set_ylim(low - BEYOND * (high - low), high + BEYOND * (high - low))
     for ax in axes if len(bores) > 1 else axes[:1]:
         legend_beside(ax, "")
     for ax in axes[1:]:
@@ -199,25 +245,6 @@ def bores_of(history: xarray.Dataset) -> dict[str, str]:
     return {name[len(start) + 1 :]: name[len(start) :] for name in map(str, history) if name.startswith(start)}
 
 
-def friction_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw normal and friction force and the work of friction."""
-    figure, axes = panels(2, 2.4, look=look)
-    x, strokes = look.course(history), round(float(history.half_cycle[-1] / history.cycles[-1]))
-    for number, (name, text) in enumerate((("normal_force", "normal"), ("friction_force", "friction"))):
-        for stroke in range(strokes):  # a line for each half-cycle of the cycle: their loads may be others
-            of = (history.half_cycle.values - 1) % strokes == stroke
-            label = text if stroke == 0 else None
-            axes[0].plot(x[of], history[name].values[of], label=label, **run_style(number), **mark_few(x[of]))
-    axes[0].set_ylabel("force (N)")
-    axes[1].plot(x, 1e-3 * history.friction_work, color="0", **mark_few(x))
-    axes[1].set_ylabel("work of friction (J)")
-    legend_beside(axes[0], "")
-    for ax in axes:
-        from_zero(ax)
-    run_axis(axes[-1], history, look, logarithmic=False)
-    return figure
-
-
 WHERE_HEAT_GOES = {
     "convected": "lost to the surroundings",
     "held": "lost where temperature is held",
@@ -229,16 +256,15 @@ assert WHERE_HEAT_GOES.keys() == set(TERMS) - {"friction"}
 
 
 def heat_balance_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw where the friction heat of each half-cycle goes; ways that none goes are left out."""
+    """Return where the friction heat of each half-cycle goes; ways that none goes are left out."""
     figure, (ax,) = panels(1, 3.8, look=look)
     friction, x = history.heat_friction, look.course(history)
     largest = float(np.abs(friction).max())
     scale, unit = (1e-3, "J") if largest > 1e4 else (1.0, "mJ")
     ax.plot(x, scale * friction, color="0", linewidth=2.5, label="made by friction")
-    threshold = 1e-6 * largest
     for number, (name, text) in enumerate(WHERE_HEAT_GOES.items()):
         values = history[f"heat_{name}"]
-        if float(np.abs(values).max()) > threshold:
+        if float(np.abs(values).max()) > 1e-6 * largest:
             ax.plot(x, scale * values, label=text, **run_style(number))
     ax.set_ylabel(f"heat per half-cycle ({unit})")
     legend_beside(ax, "")
@@ -246,26 +272,63 @@ def heat_balance_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figu
     return figure
 
 
-def cycle_ends(history: xarray.Dataset) -> NDArray[np.int64]:
-    """Return the recorded half-cycles that end a cycle (k,)."""
-    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
-    recorded = history.half_cycle.values
-    return np.asarray(recorded[recorded % strokes == 0], dtype=np.int64)
+ACTED = {
+    "load": "normal force (N)",
+    "load_factor": "loads over the case's",
+    "speed": "mean speed",
+    "ambient": "ambient",
+}
+UNITS_ACTED = {"mm s-1": " (mm/s)", "rad s-1": " (rad/s)", "K": " (K)", "degC": " (°C)"}
 
 
-def late_pressures(history: xarray.Dataset, half_cycles: Sequence[int] | NDArray[np.int64]) -> Array:
-    """Return mean pressures (k, n), MPa, over the last tenth of what is done at recorded ends of cycles.
+def program_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
+    """Return what acted over the run: the load, the speed and the ambient temperature, where they change."""
+    shown = [name for name in ACTED if name in history and _changes(history[name])]
+    if "load" in shown and "load_factor" in shown:  # the same twice
+        shown.remove("load_factor")
+    figure, axes = panels(max(1, len(shown)), 2.4, look=look)
+    for ax, name in zip(axes, shown or ["load_factor"], strict=True):
+        of_loads = name in ("load", "load_factor")
+        x, y = look.course(history), history[name].values
+        line = _by_stages(history, x, y) if of_loads and "stage_ends" in history else (x, y)
+        held = "default" if of_loads else "steps-pre"  # constant since the record before
+        ax.plot(*line, color="0", linewidth=1, drawstyle=held)
+        ax.plot(x, y, color="0", marker=".", markersize=3, linestyle="")
+        ax.set_ylabel(ACTED[name] + ("" if of_loads else UNITS_ACTED.get(str(history[name].attrs.get("units")), "")))
+        low, high = float(y.min()), float(y.max())
+        ax.set_ylim(min(0.0, 1.1 * low), 1.1 * max(high, 1e-300))
+    axes[-1].set_xlabel(look.label)
+    return figure
 
-    From the end of a cycle before that tenth on, however far it lies back. At an instant the nodes at an edge that
-    moves are at any fraction of their coming; what they have borne since is what they have lost.
+
+def _by_stages(history: xarray.Dataset, x: Array, loads: Array) -> tuple[Array, Array]:
+    """Return the course of loads that leap from stage to stage and are linear within, through what is recorded of each.
+
+    Args:
+        history: With the stages of its program.
+        x: Where recorded half-cycles end on the axis (k,).
+        loads: In them (k,).
     """
-    ends = cycle_ends(history)
-    borne = history.pressure_sum.sel(half_cycle=ends).values
-    ends, borne = np.concatenate([[0], ends]), np.vstack([np.zeros(borne.shape[1]), borne])
-    numbers = np.asarray(half_cycles)
-    at = np.searchsorted(ends, numbers)
-    before = np.searchsorted(ends, (1 - LAST) * numbers, side="right") - 1
-    return np.asarray((borne[at] - borne[before]) / (ends[at] - ends[before])[:, None], dtype=np.float64)
+    done, places, course = history.half_cycle.values, [], []
+    for (begin, end), ends in zip(history.stage_ends.values, history.stage_loads.values, strict=True):
+        rows = np.flatnonzero((done > begin) & (done <= end))
+        if len(rows):
+            shown = np.array([begin, min(end, done[-1])])
+            of_end, there = (np.interp(at, (begin, end), ends) for at in (done[rows[-1]], shown))
+            places.append(np.interp(shown, [0, *done], [0, *x]))
+            course.append(loads[rows[-1]] * there / of_end)
+    return np.concatenate(places), np.concatenate(course)
+
+
+def _changes(values: xarray.DataArray) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return high - low > 1e-9 * max(abs(low), abs(high))
+
+
+def cycle_ends(history: xarray.Dataset) -> NDArray[np.int64]:
+    """Return the rows of the recorded half-cycles that end a cycle (k,)."""
+    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
+    return np.flatnonzero(history.half_cycle.values.astype(int) % strokes == 0)
 
 
 def mean_pressure(history: xarray.Dataset) -> float:
@@ -296,22 +359,13 @@ def shown_unit(unit: str) -> str:
 
 def temperature_unit(history: xarray.Dataset) -> str:
     """Return the unit of the temperatures of a history as figures show it."""
-    known = "largest_temperature" in history
-    return shown_unit(str(history.largest_temperature.attrs.get("units", "K"))) if known else "K"
+    hot = "largest_temperature" in history
+    return shown_unit(str(history.largest_temperature.attrs.get("units", "K"))) if hot else "K"
 
 
 def mark_few(points: Sized) -> dict[str, Any]:
     """Return the style of a line of so few points that without marks nothing may be seen."""
     return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
-
-
-def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Style = STANDARD) -> None:
-    """Draw a variable over the run, a line for each direction."""
-    x = look.course(history)
-    for d in directions_present(history):
-        text, dashes, colour = direction_style(history, d)
-        rows = history.direction.values == d
-        ax.plot(x[rows], history[name][rows], dashes, color=colour, label=text, **mark_few(rows.nonzero()[0]))
 
 
 def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""Figures of a run, drawn from its folder alone."""
+"""All figures of a run and their captions, drawn from its folder alone."""
 
 from __future__ import annotations
 
@@ -6,185 +6,206 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.report.course import (
-    bores_of,
-    convergence_figure,
-    creep_figure,
-    directions_present,
-    friction_figure,
-    heat_balance_figure,
-    is_conforming,
-    mean_pressure,
-    peak_figure,
-    place_figure,
-    scar_figure,
-    temperature_unit,
-    volume_figure,
+from fenwear.report.bodies import field_figures
+from fenwear.report.course import course_figures
+from fenwear.report.key_numbers import names_in, read_case
+from fenwear.report.lines import (
+    LATE,
+    between_of,
+    chosen_half_cycles,
+    fields_of,
+    lines_figure,
+    profile_figure,
+    that_wear,
+    wear_map_figure,
+    with_late_pressures,
 )
-from fenwear.report.lies_between import between_figure, lies_between
-from fenwear.report.maps import cuts_figure, map_figure, quantities, quantities_between
-from fenwear.report.program import program_figure
-from fenwear.report.roughness_figures import roughness_of, with_surfaces
-from fenwear.report.shapes import profile_figure, shape_figure, wear_map_figure
-from fenwear.report.shown import chosen_half_cycles, cycle_means, early_half_cycles, early_of, nearest_half_cycles
+from fenwear.report.maps import has_tracks, map_figure, tracks_figure, with_surfaces
 from fenwear.report.stick import stick_figures
-from fenwear.report.style import (
-    STANDARD,
-    Style,
-    contact_axis,
-    from_zero,
-    legend_beside,
-    level_line,
-    panels,
-    shades,
-    wrapped,
-)
-from fenwear.report.surface import along_contact, model_of
-from fenwear.report.tracks import tracks_of
-from fenwear.results.cycles import by_cycles, resolves
+from fenwear.report.style import STANDARD, Style, direction_words, name_bodies, save, strip_moves, wrapped
+from fenwear.report.surface import cut_places, gaps_of, model_of, part_lines, sides_of
+from fenwear.results.disk import write_text
 from fenwear.results.history import HISTORY
-from fenwear.results.reading import load_history
+from fenwear.results.reading import by_cycles, load_history, resolves
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FOLDER = "figures"
+CAPTIONS = "captions.txt"
+DPI = 200
 MAPS = 6  # at most
+ALONG = ("profiles", "shape", "pressure", "mean_pressure", "temperature")  # the contact, by lines
+# In the order in which the report shows them.
+TEXTS = {
+    "geometry": "Geometry: (a) whole, (b) near the contact, with elements, supports (red), loads (blue) and the "
+    "contact (green); x along the contact, z upwards.",
+    "loops": "Fretting loops: (a) tangential force over the displacement of the strip, a loop for each cycle named, "
+    "and (b) over what of it is more than full stick's at the same force.",
+    "zones": "Where the surfaces stick and slip over the time steps of the first and of the last cycle.",
+    "tractions": "Tangential traction along the sliding at five times of the first and the last cycle, between "
+    "plus and minus µ p (grey: of the cycle's largest pressure).",
+    "traction_map": "Size and direction of the tangential traction at four times of the first and of the last cycle.",
+    "sliding": "Slip of each place in a cycle, its work of friction, and the largest stress in the strip's surface.",
+    "slip_map": "Slip of each place in the first and the last cycle.",
+    "friction_work_map": "Work of friction of each place in the first and the last cycle.",
+    "stress_map": "Largest stress along the sliding in the strip's surface in the first and the last cycle.",
+    "energy": "(a) Work of friction in a half-cycle and (b) its ratio to the loop's box, with the border of gross "
+    "sliding, over the {axis}.",
+    "profiles": "Surface profiles of {bodies}, unworn and worn, at {chosen}. Heights, or the depths of round "
+    "contacts, are magnified; the punch lies above.",
+    "shape": "Worn depth of {bodies} along the contact at {chosen}.",
+    "wear_map": "Worn depth of {bodies} over the position along the contact and the {axis}.",
+    "roughness": "Rough surfaces where they have worn, without their form: mean and root mean square of the heights "
+    "over the {axis}.",
+    "pressure": "Contact pressure along the contact at {chosen}: {panels}. The axis ends above the later states; "
+    "the legend has the largest pressure of those beyond it.",
+    "mean_pressure": "Mean contact pressure, of all directions, over the last tenth of what is done at "
+    "{chosen}: by it material is lost, and it is well posed where the edge of the contact moves.",
+    "tracks": "Sliding over the last cycle: (a) tracks of the strip's material, dots where it begins, and (b) the "
+    "cross-shear ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
+    "cuts_along": "Pressure, worn depths and temperatures along the sliding at {chosen}.",
+    "cuts_across": "Pressure, worn depths and temperatures across the sliding at {chosen}.",
+    "between": "What lies between the surfaces along the contact at {chosen}: debris, plastic depth, what is left "
+    "of coatings, and what laws remember there, where there are any.",
+    "program": "What acted over the run: load, sliding speed and ambient temperature, where they change.",
+    "peaks": "Largest contact pressure and {size} in contact{hot}, for each sliding direction, over the {axis}.",
+    "place": "The shaft in its bore: the way from the middle of the unworn bore to that of the unworn shaft, "
+    "its size and its angle from the way in which the load presses the shaft (of several bores, what each of them "
+    "carries), as the strip turns, over the {axis}.",
+    "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
+    "the sliding distance.",
+    "creep": "Wear and creep of each body: (a) largest depth and (b) volume, over the time.",
+    "scar": "Largest worn depth, and size of the scar at 1 % and 5 % of it, over the {axis}; of a surface its "
+    "length along the sliding and its width across.",
+    "friction": "(a) Normal force and (b) friction force of each half-cycle and (c) work of friction from the start, "
+    "over the {axis}.",
+    "surface_stress": "Stress along the contact surface of (a) the punch and (b) the strip at half-cycle {last}: its "
+    "components and von Mises' stress.",
+    "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
+    "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
+    "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
+    "heat_balance": "Heat of each half-cycle over the {axis}: what friction makes is the sum of the others.",
+}
+AXES = {
+    "cycles": ("cycles", "the cycles named"),
+    "distance": ("sliding distance", "the sliding distances named"),
+    "time": ("time", "the times named"),
+}
 
 
-def read_history(directory: Path) -> xarray.Dataset:
+def read_history(directory: Path | str) -> xarray.Dataset:
     """Return the history of a run, in memory.
 
     Raises:
         CaseError: there is none, it cannot be read, or holds no half-cycle yet.
     """
-    return of_half_cycles(directory, load_history(directory))
-
-
-def of_half_cycles(directory: Path, history: xarray.Dataset) -> xarray.Dataset:
-    """Return the history of a run if it is one of half-cycles.
-
-    Raises:
-        CaseError: it is none, or holds no half-cycle yet.
-    """
+    history, path = load_history(directory), str(Path(directory) / HISTORY)
     if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
-        raise CaseError(InputError(str(directory / HISTORY), "no history of a run: it has other variables"))
+        raise CaseError(InputError(path, "no history of a run: it has other variables"))
     if history.sizes["half_cycle"] == 0:
-        raise CaseError(InputError(str(directory / HISTORY), "holds no half-cycle yet"))
+        raise CaseError(InputError(path, "holds no half-cycle yet"))
     return history
 
 
-def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
-    """Draw the pressure in both directions, at each chosen half-cycle and the one beside it.
-
-    What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
-    """
-    present = directions_present(history)
-    rows = {d: history.isel(half_cycle=np.flatnonzero(history.direction.values == d)) for d in present}
-    chosen = {d: nearest_half_cycles(own, half_cycles) for d, own in rows.items()}
-    early = {d: early_half_cycles(own, chosen[d]) for d, own in rows.items()}
-    figure, axes = panels(len(present) + any(early.values()), 3.0, look=look)
-    x = along_contact(history)[0]
-    for ax, d in zip(axes, present, strict=False):
-        for colour, n in shades(chosen[d]):
-            drawn = axes[-1] if n in early[d] else ax
-            style = {
-                "color": colour,
-                "label": look.name(history, n),
-                "gid": str(n),
-                "linestyle": "-" if d > 0 else "--",
-            }
-            drawn.plot(x, rows[d].pressure.sel(half_cycle=n), **style)
-    return _along(history, figure, axes, "contact pressure p (MPa)", axes[: len(present)], look)
-
-
-def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
-    """Draw mean pressures of all directions up to some cycles: what is well posed where a contact's edge moves."""
-    means = cycle_means(history, half_cycles)
-    early = early_of(means)
-    figure, axes = panels(2 if early else 1, 3.0, look=look)
-    x = along_contact(history)[0]
-    for colour, n in shades(list(means)):
-        ax = axes[-1] if n in early else axes[0]
-        ax.plot(x, means[n], color=colour, label=look.name(history, n), gid=str(n))
-    return _along(history, figure, axes, "mean pressure (MPa)", axes[:1], look)
-
-
-def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
-    """Draw the temperature along both contact surfaces at the chosen half-cycles."""
-    figure, axes = panels(2, 3.0, look=look)
-    x, label = along_contact(history)
-    for ax, body in zip(axes, BODIES, strict=True):
-        for colour, n in shades(half_cycles):
-            values = history[f"temperature_{body}"].sel(half_cycle=n)
-            ax.plot(x, values, color=colour, label=look.name(history, n), gid=str(n))
-        ax.set_ylabel(f"temperature of the {body} ({temperature_unit(history)})")
-        legend_beside(ax, look.of_one)
-    contact_axis(axes[-1], label)
-    return figure
-
-
-def _along(
-    history: xarray.Dataset, figure: Figure, axes: Sequence[Axes], name: str, with_mean: Sequence[Axes], look: Style
-) -> Figure:
-    """Name the axes of pressures along a contact, some with their mean."""
-    if is_conforming(history):
-        mean = mean_pressure(history)
-        for ax in with_mean:
-            level_line(ax, mean, f"mean {mean:.4g} MPa")
-    for ax in axes:
-        ax.set_ylabel(name)
-        from_zero(ax)
-        legend_beside(ax, look.of_one)
-    contact_axis(axes[-1], along_contact(history)[1])
-    return figure
-
-
 def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style = STANDARD) -> dict[str, Figure]:
-    """Draw every figure that the history has data for, by its name."""
+    """Return every figure that the history has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
-    drawn: dict[str, Figure] = {}
-    model = model_of(history)
-    if model == "solid":
-        surfaces = with_surfaces(history, chosen[-MAPS:])
-        shown = quantities(surfaces) | quantities_between(history)
-        drawn |= {name: map_figure(surfaces, one, chosen[-MAPS:], look) for name, one in shown.items()}
-        drawn |= tracks_of(history, look)
-        drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
-        drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
-    else:
-        if model == "plane":
-            drawn["profiles"] = profile_figure(history, chosen, look)
-            drawn["wear_map"] = wear_map_figure(history, look)
-        drawn["shape"] = shape_figure(history, chosen, look)
-        drawn["pressure"] = pressure_figure(history, chosen, look)
-        if cycle_means(history, chosen):
-            drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
-        if "largest_temperature" in history:
-            drawn["temperature"] = temperature_figure(history, chosen, look)
-        if lies_between(history):
-            drawn["between"] = between_figure(history, chosen, look)
-    drawn |= roughness_of(history, look)
-    drawn["peaks"] = peak_figure(history, look)
-    if bores_of(history):
-        drawn["place"] = place_figure(history, look)
-    if "sliding_distance" in history:
-        drawn["volume"] = volume_figure(history, Style(look.width, "distance"))
-        drawn["scar"] = scar_figure(history, look)
-        drawn["friction"] = friction_figure(history, look)
-    if any(str(name).startswith("creep_volume") for name in history.data_vars):
-        drawn["creep"] = creep_figure(history, Style(look.width, "time"))
-    if "load_factor" in history:
-        drawn["program"] = program_figure(history, look)
-    drawn["convergence"] = convergence_figure(history, look)
-    if "largest_temperature" in history:
-        drawn["heat_balance"] = heat_balance_figure(history, look)
+    draw = _on_surfaces if model_of(history) == "solid" else _along_lines
+    drawn = draw(history, chosen, look) | course_figures(history, look)
     if resolves(history):
         drawn |= stick_figures(by_cycles(history), look)
     return wrapped(drawn)
+
+
+def _on_surfaces(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
+    """Return maps of a solid, and cuts along and across the sliding."""
+    surfaces, between = with_surfaces(history, chosen[-MAPS:]), between_of(history)
+    drawn = {f"{n}_map": map_figure(surfaces, one, chosen[-MAPS:], look) for n, one in fields_of(surfaces).items()}
+    if has_tracks(history):
+        drawn["tracks"] = tracks_figure(history, look)
+    cut = [field for name, field in fields_of(history).items() if name not in between]
+    for way in ("along", "across"):
+        drawn[f"cuts_{way}"] = lines_figure(history, cut, chosen, look, along=way == "along")
+    return drawn
+
+
+def _along_lines(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
+    """Return what lies along the contact of planes and rings, and in planes their profiles."""
+    drawn: dict[str, Figure] = {}
+    if model_of(history) == "plane":
+        drawn["profiles"] = profile_figure(history, chosen, look)
+        drawn["wear_map"] = wear_map_figure(history, look)
+    fields, between = fields_of(history), between_of(history)
+    groups = {
+        "shape": [fields[f"wear{BODIES[body]}"] for body in that_wear(history)],
+        "pressure": [fields["pressure"]],
+        "temperature": [field for name, field in fields.items() if name.startswith("temperature_")],
+        "between": [*between.values()],
+    }
+    drawn |= {name: lines_figure(history, group, chosen, look) for name, group in groups.items() if group}
+    if "pressure_sum" in history and (late := with_late_pressures(history)).sizes["half_cycle"]:
+        drawn["mean_pressure"] = lines_figure(late, [fields_of(late)[LATE]], chosen_half_cycles(late, chosen), look)
+    return drawn
+
+
+def draw_figures(
+    directory: Path,
+    half_cycles: Sequence[int] = (),
+    look: Style = STANDARD,
+    formats: Sequence[str] = ("png",),
+) -> list[Path]:
+    """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
+    folder, history = directory / FOLDER, read_history(directory)
+    drawn = all_figures(history, half_cycles, look)
+    if model_of(history) == "plane":
+        drawn |= field_figures(directory, read_case(directory), look)
+    part_lines(drawn.values(), gaps_of(history))
+    name_bodies(drawn.values(), names := names_in(directory))
+    folder.mkdir(exist_ok=True)
+    paths = []
+    for name, figure in drawn.items():
+        for ending in dict.fromkeys(("png", *formats)):  # the report shows the PNG
+            paths.append(folder / f"{name}.{ending}")
+            save(figure, paths[-1], DPI)
+    captions = folder / CAPTIONS
+    write_text(captions, names.told("".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn)))
+    return [*paths, captions]
+
+
+def caption(name: str, history: xarray.Dataset, look: Style) -> str:
+    """Return the caption of a figure of a run."""
+    bodies = [body for body, end in BODIES.items() if f"wear{end}" in history]
+    words, moves, solid = direction_words(history), strip_moves(history), model_of(history) == "solid"
+    moving = "turning" if "turns" in moves else "moving"
+    ways = [f"the strip {moving} {word}" for d, word in words.items() if bool((history.direction == d).any())]
+    panels = ways[0] if len(ways) == 1 else ", ".join(f"({letter}) {w}" for letter, w in zip("ab", ways, strict=True))
+    axis, chosen = AXES[look.axis]
+    text = TEXTS.get(name, "")
+    if name.endswith("_map") and (solid or not text) and name.removesuffix("_map") in (fields := _mapped(history)):
+        text = f"Maps of the {fields[name.removesuffix('_map')]} at {{chosen}}, the largest value above each."
+    found = text.format(
+        bodies=" and ".join(f"the {body}" for body in bodies),
+        chosen=chosen,
+        panels=panels,
+        size="width" if "contact_width" in history else "area",
+        axis=axis,
+        hot=" and largest temperature of the contact surfaces" if "largest_temperature" in history else "",
+        last=f"{int(history.half_cycle[-1]):,}",
+    )
+    if name in ALONG and (sides := sides_of(history)) is not None:
+        found += f" Solid: the contact {sides[0]}; dotted: {sides[1]}."
+    if name.startswith("cuts") and len(cut_places(history)) > 1:
+        found += " Each contact through the middle of its own wear."
+    return found
+
+
+def _mapped(history: xarray.Dataset) -> dict[str, str]:
+    """Return the titles of what there are maps of, by the variable."""
+    text = "height of the {} over its smooth shape, without the form of its scar (S-F, ISO 25178),"
+    rough = {f"surface{end}": text.format(body) for body, end in BODIES.items()}
+    return {name: field.title for name, field in fields_of(history).items()} | rough

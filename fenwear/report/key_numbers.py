@@ -1,4 +1,4 @@
-"""The key numbers of a run and its case as flat tables: what the report and the comparison show."""
+"""The key numbers of a run and its case as flat tables, and how uncertain they are: for the report and comparisons."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fenwear.case.names import Names
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 from fenwear.results.reading import in_current_names
-from fenwear.results.sheet import LINES, OF_CONTACT
+from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, shown
 
 UNITS = {
     "_per_s": "1/s",
@@ -26,6 +26,10 @@ UNITS = {
     "_mJ": "mJ",
     "_seconds": "s",
 }
+NO_NUMBERS = ("contributions", "untold", "remedies", "seconds")  # of the table of uncertainties
+SMALL = 0.01  # of an uncertainty: shares that are left out
+ANSWERS = ("worn_volume_mm3", "largest_depth_", "largest_pressure_MPa", "largest_pressure_in_cycle", "mean_pressure",
+           "largest_temperature_")  # fmt: skip
 # What is no line of the sheet, which has words for the others.
 LABELS = {
     "half_cycles": "half-cycles done",
@@ -116,7 +120,7 @@ def unit_of(path: str) -> str:
 
 def label_of(path: str) -> str:
     """Return a path in words, without its unit."""
-    return ", ".join(_words(name) for name in path.split("."))
+    return ", ".join(words_of(name) for name in path.split("."))
 
 
 def number_text(value: Any) -> str:
@@ -130,7 +134,45 @@ def number_text(value: Any) -> str:
     return f"{value:,.5g}".replace("-", "−")
 
 
-def _words(name: str) -> str:
+class Answer(NamedTuple):
+    """A number that a run was made for: in words and in the unit in which it is read, with its uncertainty.
+
+    Attributes:
+        label: In words.
+        unit: Of value and uncertainty.
+        value: As text.
+        uncertainty: As text; "" where it is not known.
+        sources: What makes most of the uncertainty.
+    """
+
+    label: str
+    unit: str
+    value: str
+    uncertainty: str = ""
+    sources: str = ""
+
+
+def answers(summary: Mapping[str, Any]) -> list[Answer]:
+    """Return what a run was made for: how much is worn and where, pressures and temperatures, with uncertainties."""
+    given = summary.get(UNCERTAINTY, {})
+    numbers, sources = flat(summary), {source: flat(own) for source, own in given.get("contributions", {}).items()}
+    uncertain = flat({key: value for key, value in given.items() if key not in NO_NUMBERS})
+    lines, rows = {**LINES, **OF_CONTACT}, []
+    for path, value in numbers.items():
+        of, _, key = path.rpartition(".")
+        if path.startswith((UNCERTAINTY, "contacts.")) or not key.startswith(ANSWERS) or key not in lines:
+            continue
+        line, within = lines[key], uncertain.get(path, 0.0)
+        parts = sorted(((own.get(path, 0.0), source) for source, own in sources.items()), reverse=True)
+        most = [f"{s.replace('_', ' ')} {100 * part / within:.0f} %" for part, s in parts if part > SMALL * within > 0]
+        text = number_text(shown(float(f"{within:.1e}"), line)) if within else ""
+        label = f"{words_of(key)}, {of}" if of else words_of(key)
+        rows.append(Answer(label, line.unit, number_text(shown(value, line)), text, ", ".join(most)))
+    return rows
+
+
+def words_of(name: str) -> str:
+    """Return a name in words, as the sheet has it where that is a sentence of its own."""
     bare, bracket, index = name.partition("[")
     words = LABELS.get(bare)
     if words is None:

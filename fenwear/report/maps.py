@@ -1,18 +1,19 @@
-"""Maps of the contact surface of solids at chosen half-cycles, and cuts along and across the sliding."""
+"""Maps of contact surfaces: fields at chosen half-cycles, sliding over a cycle that is a table, flash temperatures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.report.course import temperature_unit
-from fenwear.report.lies_between import DEPTHS, lies_between
-from fenwear.report.shown import early_half_cycles, pressure_top
+from fenwear.arrays import Array, Mask
+from fenwear.report.lines import Field, pressure_top
 from fenwear.report.style import (
+    BLUE,
+    BODY_COLOURS,
     GREY,
     NARROW,
     STANDARD,
@@ -25,9 +26,10 @@ from fenwear.report.style import (
     one_way,
     panels,
     panels_of_maps,
-    shades,
+    row_of,
 )
-from fenwear.report.surface import Surface, cut_places, surface_of
+from fenwear.report.surface import AXES, Surface, model_of, surface_of
+from fenwear.results.roughness import evaluated, levelled
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -36,124 +38,79 @@ if TYPE_CHECKING:
 
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other
-BESIDE = 3  # contacts whose cuts stand beside each other
+MARGIN = 0.15  # of a contact's extent: what a map of it shows beside it
 EDGE_OF_CONTACT = 1e-2  # of the largest pressure
+TRACKS, DIRECTIONS = 14, 60  # places that have one
+RUBBED = 0.01  # of the largest work of friction in a cycle, below which a place has no ratio
+STRAIGHT = 0.07  # of the surface's size: the line of a direction that lies in the map
+ROUNDING = 1e-6  # of a surface's size: of coordinates
 
 
-class Quantity(NamedTuple):
-    """What a map shows: a variable of the history, on which body's surface, and how."""
-
-    variable: str
-    body: str
-    title: str
-    unit: str
-    factor: float
-    colours: str
-    short: str
-
-
-def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
-    """Return what there are maps of, by the figure's name."""
-    warm = temperature_unit(history)
-    found = {
-        "pressure_map": Quantity("pressure", "punch", "Contact pressure", "MPa", 1.0, "YlGnBu", "pressure"),
-        "wear_map": Quantity("wear", "punch", "Worn depth of the punch", "µm", 1e3, "YlOrBr", "punch:\nworn depth"),
-        "wear_strip_map": Quantity(
-            "wear_strip", "strip", "Worn depth of the strip", "µm", 1e3, "YlOrBr", "strip:\nworn depth"
-        ),
-        "temperature_map": Quantity(
-            "temperature_punch",
-            "punch",
-            "Temperature of the punch's contact surface",
-            warm,
-            1.0,
-            "YlOrRd",
-            "punch:\ntemperature",
-        ),
-        "temperature_strip_map": Quantity(
-            "temperature_strip",
-            "punch",
-            "Temperature of the strip's surface below the punch",
-            warm,
-            1.0,
-            "YlOrRd",
-            "strip:\ntemperature",
-        ),
-    }
-    for body, end in BODIES.items():
-        title = f"Height of the {body}, without the form of its scar"
-        found[f"surface{end}_map"] = Quantity(f"surface{end}", body, title, "µm", 1e3, "cividis", f"{body}:\nheight")
-    return {name: q for name, q in found.items() if q.variable in history}
-
-
-def quantities_between(history: xarray.Dataset) -> dict[str, Quantity]:
-    """Return the same of what lies between the surfaces."""
-    found: dict[str, Quantity] = {}
-    for name, words in lies_between(history).items():
-        title, _, unit = words.rstrip(")").partition(" (")
-        body = "strip" if str(history[name].dims[-1]).endswith("_strip") else "punch"
-        factor = 1e3 if name in DEPTHS else 1.0
-        title = title[0].upper() + title[1:]
-        found[f"{name}_map"] = Quantity(name, body, title, unit, factor, "PuBuGn", title.lower())
-    return found
-
-
-def map_figure(
-    history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int], look: Style = STANDARD
-) -> Figure:
-    """Draw a quantity on its surface at each chosen half-cycle.
+def map_figure(history: xarray.Dataset, field: Field, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
+    """Return maps of a field on its surface at each chosen half-cycle.
 
     All have the same colours, but worn depths, which are shown over the largest one of each half-cycle.
     """
-    from matplotlib import colormaps
-
-    surface = surface_of(history, quantity.body)
-    values = quantity.factor * history[quantity.variable].sel(half_cycle=list(half_cycles)).values
-    relative = quantity.variable.startswith("wear")
-    largest = values.max(axis=1)
-    if relative:
+    surface = surface_of(history, field.body)
+    values = field.factor * history[field.variable].sel(half_cycle=list(half_cycles)).values
+    largest, label = values.max(axis=1), field.label
+    levels, extend = _levels(history, field, values, half_cycles)
+    names = [look.in_words(history, row_of(history, n)) for n in half_cycles]
+    titles = [f"{name}\n{_size(field, own)}" for name, own in zip(names, values, strict=True)]
+    if field.variable.startswith("wear"):
         values = values / np.where(largest > 0, largest, 1.0)[:, None]
-        levels, extend = np.linspace(0, 1, 11), "neither"
-    else:
-        levels, extend = _levels(history, quantity, values, half_cycles)
-    figure, axes = _map_panels(surface, len(half_cycles), look)
-    drawn: Any = None
-    for number, (n, ax) in enumerate(zip(half_cycles, axes, strict=True)):
-        found, most = values[number], float(largest[number])
-        how: Any = {"levels": levels, "cmap": colormaps[quantity.colours], "extend": extend}
-        drawn = surface.contours(ax, np.clip(found, levels[0], None), **how)
-        title = f"{look.of_one if look.axis == 'cycles' else ''} {look.name(history, n)} {look.of_unit}".strip()
-        if quantity.variable == "pressure":
-            _contact_edge(ax, surface, found)
-            if one_way(history):
-                title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
-        size = f"≤ {most:,.0f}" if most >= 1000 else f"≤ {most:.3g}"
-        if quantity.variable.startswith("surface"):
-            size = f"{found.min():.3g} to {most:.3g}"
-        name_panel(ax, f"{title}\n{size} {quantity.unit}")
-    name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
-    label = f"{name} over the largest one" if relative else f"{name} ({quantity.unit})" if quantity.unit else name
-    colour_bar(figure, drawn, axes, label, **bar_place(look))
+        levels, extend, label = np.linspace(0, 1, 11), "neither", f"{field.title} over the largest one"
+    if field.variable == "pressure" and one_way(history):
+        arrows = [surface.arrow(int(d)) for d in history.direction.sel(half_cycle=list(half_cycles)).values]
+        titles = [title.replace("\n", f" {arrow}\n") for title, arrow in zip(titles, arrows, strict=True)]
+    figure, axes = map_panels(surface, titles, look)
+    fill_maps(surface, axes, values, label, look, levels=levels, colours=field.colours, extend=extend)
+    if field.variable == "pressure":
+        for ax, own in zip(axes, values, strict=True):
+            level = EDGE_OF_CONTACT * float(own.max())
+            if own.min() < level < own.max():
+                surface.contours(ax, own, filled=False, levels=[level], colors="black", linewidths=1.0)
     return figure
 
 
-def _map_panels(surface: Surface, count: int, look: Style) -> tuple[Figure, list[Axes]]:
-    """Return a figure of equal maps with the surface's border on each."""
+def _size(field: Field, values: Array) -> str:
+    """Return the largest of a field's values as text; of heights both ends."""
+    most, unit = float(values.max()), "" if field.unit == "1" else field.unit
+    size = f"≤ {most:,.0f}" if most >= 1000 else f"≤ {most:.3g}"
+    return f"{values.min():.3g} to {most:.3g} {unit}" if field.variable.startswith("surface") else f"{size} {unit}"
+
+
+def map_panels(
+    surface: Surface, titles: Sequence[str], look: Style, *, columns: int = 0, within: Mask | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of equal maps with the surface's border on each.
+
+    Args:
+        surface: The surface.
+        titles: Above each map.
+        look: Width of the figure.
+        columns: Maps beside each other; 0 for as many as fit.
+        within: Nodes around which maps end (n,); by default all.
+    """
     from matplotlib.collections import LineCollection
 
-    size = np.ptp(surface.map, axis=0)
-    columns = 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3
-    columns = min(count, columns, 2 if look.width < NARROW else columns)
+    seen = surface.map if within is None else surface.map[within]
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    room = (0.03 if within is None else MARGIN) * float((high - low).max()) + 1e-9
+    size, count = high - low + 2 * room, len(titles)
+    fitting = 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3
+    columns = min(count, columns or fitting, 2 if look.width < NARROW and not columns else count)
     rows = -(-count // columns)
     figure, axes = panels_of_maps(rows, columns, size, look)
     shown = list(axes.ravel()[:count])
     for ax in axes.ravel()[count:]:
         ax.set_visible(False)
-    for ax in shown:
+    for ax, title in zip(shown, titles, strict=True):
+        name_panel(ax, title)
         ax.add_collection(LineCollection(list(surface.border), colors=GREY, linewidths=0.8))
         for name, (across, up) in surface.labels:
             ax.text(across, up, name, ha="center", va="center", fontsize="small", color=GREY)
-        ax.margins(0.03)
+        ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
         surface.set_ticks(ax)
     for lowest in shown[-columns:]:  # the last row may be shorter
         lowest.set_xlabel(surface.axis_labels[0])
@@ -163,74 +120,163 @@ def _map_panels(surface: Surface, count: int, look: Style) -> tuple[Figure, list
     return figure, shown
 
 
-def _levels(
-    history: xarray.Dataset, quantity: Quantity, values: Array, half_cycles: Sequence[int]
-) -> tuple[Array, Any]:
-    """Return the steps of the colours, and whether what is above them is cut off."""
+def fill_maps(
+    surface: Surface,
+    axes: Sequence[Axes],
+    values: Array,
+    label: str,
+    look: Style,
+    *,
+    levels: Array,
+    colours: str,
+    extend: str = "neither",
+) -> None:
+    """Draw values at the nodes (k, n) as areas between levels on each of k maps, with a bar of the colours."""
+    drawn: Any = None
+    for ax, own in zip(axes, values, strict=True):
+        drawn = surface.contours(ax, np.clip(own, levels[0], None), levels=levels, cmap=colours, extend=extend)
+    colour_bar(axes[0].figure, drawn, list(axes), label, **bar_place(look))
+
+
+def even_levels(low: float, high: float) -> Array:
+    """Return round steps of colours between two values."""
     from matplotlib.ticker import MaxNLocator
 
+    locator = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10])
+    return np.asarray(locator.tick_values(low, high if high > low else low + 1.0))
+
+
+def _levels(history: xarray.Dataset, field: Field, values: Array, half_cycles: Sequence[int]) -> tuple[Array, str]:
+    """Return the steps of the colours, and whether what is above them is cut off."""
     low, high = float(values.min()), float(values.max())
-    cut = False
-    if quantity.variable == "pressure":
-        low, top = 0.0, pressure_top(history, half_cycles)
-        cut, high = high > top, min(high, top)
-    low = 0.0 if 0 < low < high / 2 else low
-    levels = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high if high > low else low + 1.0)
-    return np.asarray(levels), "max" if cut else "neither"
+    top = pressure_top(history, half_cycles) if field.variable == "pressure" else np.inf
+    low = 0.0 if 0 <= low < high / 2 else low
+    return even_levels(low, min(high, top)), "max" if high > top else "neither"
 
 
-def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
-    """Draw where contact ends."""
-    level = EDGE_OF_CONTACT * float(pressure.max())
-    if pressure.min() < level < pressure.max():
-        surface.contours(ax, pressure, filled=False, levels=[level], colors="black", linewidths=1.0)
+def with_surfaces(history: xarray.Dataset, half_cycles: Sequence[int]) -> xarray.Dataset:
+    """Return a history with the heights of rough surfaces at some half-cycles as `surface`, mm, NaN at others.
 
-
-def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD, *, along: bool) -> Figure:
-    """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear.
-
-    Contacts with names stand beside each other, each cut through the middle of its own; below each other where the
-    figure is narrow.
+    Less what has worn, and where numbers of roughness are of them less their form, too (the S-F surface of ISO 25178):
+    a scar may be many times as deep as its roughness.
     """
-    drawn = list(quantities(history).values())
-    early = early_half_cycles(history, half_cycles)
-    # What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
-    late = [n for n in half_cycles if n not in early]
-    rows = []
-    for quantity in drawn:
-        rows += [(quantity, part) for part in ((late, early) if quantity.variable == "pressure" else (half_cycles,))]
-    rows = [row for row in rows if row[1]]
-    places = cut_places(history)
-    columns = len(places) if len(places) <= BESIDE and look.width >= NARROW else 1
-    order = [(row, place) for row in rows for place in places]
-    if columns == 1:
-        order = [(row, place) for place in places for row in rows]
-    figure, axes = panels(len(order), 2.3, columns=columns, share_x=False, look=look)
-    for number, (ax, ((quantity, shown), place)) in enumerate(zip(axes, order, strict=True)):
-        surface, own = surface_of(history, quantity.body), place.nodes[quantity.body]
-        for colour, n in shades(half_cycles):
-            if n in shown:
-                values = quantity.factor * history[quantity.variable].sel(half_cycle=n).values
-                cut = surface.cut(values, place.at, along=along, nodes=own)
-                ax.plot(*cut, color=colour, label=look.name(history, n))
-        if not quantity.variable.startswith("temperature"):
-            from_zero(ax)
-        ax.margins(x=0.01)
-        first, last = number % columns == 0, number % columns == columns - 1
-        if first:
-            ax.set_ylabel(f"{quantity.short} ({quantity.unit})")
-        if last:
-            legend_beside(ax, look.of_one)
-        if place.name and (columns == 1 or number < columns):
-            ax.set_title(place.name, loc="center", fontsize="medium")
-        if (quantity, shown) == rows[-1]:
-            ax.set_xlabel(_cut_text(history, place.at, along=along))
+    found = {}
+    for body, end in BODIES.items():
+        if f"topography{end}" not in history:
+            continue
+        worn, places = history[f"wear{end}"], _places(history, body, end)
+        heights = np.full(worn.shape, np.nan)
+        for row in np.flatnonzero(np.isin(history.half_cycle.values, half_cycles)):
+            depth = worn.values[row]
+            heights[row] = history[f"topography{end}"].values - depth
+            heights[row, evaluated(places, depth > 0)] = levelled(places, heights[row], depth > 0)
+        found[f"surface{end}"] = worn.copy(data=heights)
+    return history.assign(found)
+
+
+def _places(history: xarray.Dataset, body: str, end: str) -> NDArray[np.int64]:
+    """Return the places of a body's nodes on their grid (n, axes)."""
+    along = [AXES[axis] for axis in surface_of(history, body).seen] if model_of(history) == "solid" else ["x"]
+    columns = []
+    for axis in along:
+        x = history[f"{axis}{end}"].values
+        steps = np.diff(np.unique(x))
+        columns.append(np.rint((x - x.min()) / steps[steps > ROUNDING * np.ptp(x)].min()))
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def has_tracks(history: xarray.Dataset) -> bool:
+    """Return whether a history has tracks that a map can show: not on surfaces that are unrolled."""
+    return "track" in history and not surface_of(history).unrolled
+
+
+def tracks_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
+    """Return tracks over the cycle, and the cross-shear ratio with the principal direction in the last one."""
+    from matplotlib.collections import LineCollection
+
+    surface, last = surface_of(history), history.isel(half_cycle=-1)
+    seen = list(surface.seen)
+    figure, (left, right) = map_panels(surface, ["tracks over a cycle", "cross-shear and main direction"], look)
+    chosen = _spread(surface.map, TRACKS)
+    shift = surface.map[chosen] - surface.x[chosen][:, seen]  # of parts that are laid beside each other
+    tracks = history.track.values[:, :, seen][:, chosen] + shift
+    left.add_collection(LineCollection(list(np.moveaxis(tracks, 1, 0)), colors=BLUE, linewidths=1.0))
+    left.plot(*surface.map[chosen].T, "o", color=BLUE, markersize=2.5)
+    left.autoscale()
+    work = np.asarray(last.dissipated_energy.values, dtype=np.float64)
+    if work.max() <= 0:  # without friction: what slides
+        work = np.linalg.norm(history.slid.values, axis=2).sum(axis=0)
+    ratio = np.where(work > RUBBED * work.max(), last.cross_shear.values, np.nan)
+    triangles, shown = surface.drawn(ratio)
+    triangles.set_mask(~np.isfinite(shown)[triangles.triangles].all(axis=1))
+    drawn = right.tricontourf(triangles, np.nan_to_num(shown), levels=np.linspace(0, 0.5, 11), cmap="YlGnBu")
+    places = _spread(surface.map, DIRECTIONS)
+    places = places[np.isfinite(ratio[places])]
+    way = np.column_stack([last[f"principal_{axis}"].values for axis in "xyz"])[places][:, seen]
+    half = way * STRAIGHT * np.ptp(surface.map) / 2
+    ends = np.stack([surface.map[places] - half, surface.map[places] + half], axis=1)
+    right.add_collection(LineCollection(list(ends), colors="black", linewidths=0.9))
+    colour_bar(figure, drawn, [left, right], "cross-shear ratio (-)", **bar_place(look))
     return figure
 
 
-def _cut_text(history: xarray.Dataset, at: Array, *, along: bool) -> str:
-    """Return what stands below a cut through a point (2,)."""
-    place, other = (float(at[1]), "across") if along else (float(at[0]), "along")
-    grain = 1e-4 * float(np.ptp(surface_of(history).sliding, axis=0).max())
-    place = round(place / grain) * grain
-    return f"place {'along' if along else 'across'} the sliding (mm),\nat {place:.4g} mm {other} it"
+def _spread(places: Array, count: int) -> NDArray[np.int64]:
+    """Return which of places (n, 2) lie far apart: from that in the middle on each farthest from all before."""
+    first = int(np.linalg.norm(places - places.mean(axis=0), axis=1).round(9).argmin())
+    found, apart = [first], np.full(len(places), np.inf)
+    while len(found) < min(count, len(places)):
+        apart = np.minimum(apart, np.linalg.norm(places - places[found[-1]], axis=1))
+        found.append(int(apart.round(9).argmax()))
+    return np.array(found)
+
+
+def flash_map(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
+    """Draw the rise of both surfaces at the instant at which one of them is hottest, and the edge of the contact."""
+    first, second = found.pressure.dims[1:]
+    at = _hottest(found)
+    x, y = found[first].values, found[second].values
+    figure, axes = panels_of_maps(1, 2, np.array([np.ptp(x), np.ptp(y)]), look)
+    rises = [found[f"flash_{body}"].values[at].T for body in BODIES]
+    low, high = min(rise.min() for rise in rises), max(rise.max() for rise in rises)
+    drawn: Any = None
+    for ax, body, rise in zip(axes.ravel(), BODIES, rises, strict=True):
+        drawn = ax.pcolormesh(x, y, rise, cmap="YlOrRd", vmin=min(low, 0.0), vmax=high or 1.0, shading="nearest")
+        touching = found.pressure.values[at].T > 0
+        if touching.any() and not touching.all():
+            ax.contour(x, y, touching, levels=[0.5], colors="black", linewidths=0.8)
+        name_panel(ax, f"{body}\n≤ {rise.max():.3g} K")
+        ax.set_xlabel(f"{first} (mm)")
+    axes[0, 0].set_ylabel(f"{second} (mm)")
+    colour_bar(figure, drawn, axes, "rise over the bulk (K)", **bar_place(look))
+    return figure
+
+
+def flash_course(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
+    """Draw the largest rise of both surfaces, and the mean of what touches, over the cycle."""
+    figure, axes = panels(1, 3.0, look=look)
+    touching = found.pressure.values > 0
+    count = np.maximum(touching.sum(axis=(1, 2)), 1)
+    for body in BODIES:
+        rise = found[f"flash_{body}"].values
+        mean = (rise * touching).sum(axis=(1, 2)) / count
+        for values, line, words in ((rise.max(axis=(1, 2)), "-", "largest"), (mean, "--", "mean")):
+            axes[0].plot(found.time.values, values, line, color=BODY_COLOURS[body], label=f"{body}: {words}")
+    axes[0].set_xlabel("time from the cycle's begin (s)")
+    axes[0].set_ylabel("rise over the bulk (K)")
+    from_zero(axes[0])
+    legend_beside(axes[0], "")
+    return figure
+
+
+def _hottest(found: xarray.Dataset) -> int:
+    """Return the number of the instant at which a surface is hottest."""
+    rise = np.maximum(found.flash_punch.values, found.flash_strip.values)
+    return int(rise.max(axis=(1, 2)).argmax())
+
+
+def flash_figures(found: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
+    """Return the figures of flash temperatures, by name."""
+    drawn = {"flash": flash_map(found, look)}
+    if len(found.time) > 1:
+        drawn["flash_course"] = flash_course(found, look)
+    return drawn

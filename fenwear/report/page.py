@@ -1,39 +1,42 @@
-"""report.html: one page per run that needs nothing else, neither network nor scripts."""
+"""report.html: one page per run that needs nothing else, neither network nor scripts.
+
+The first screen answers what was asked: warnings, how much is worn and where, largest pressure and temperature with
+their uncertainty, whether the run has become stationary, and a picture. Figures follow, then tables, folded.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import xarray
 
 from fenwear.errors import CaseError, OutputError
-from fenwear.report.captions import caption
-from fenwear.report.draw import draw_figures
-from fenwear.report.figures import FOLDER, read_history
+from fenwear.report.bodies import DrawingError, draw_pictures
+from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
-from fenwear.report.key_numbers import flat, label_of, names_in, number_text, read_case, read_summary, unit_of
-from fenwear.report.pictures import DrawingError, draw_pictures
+from fenwear.report.key_numbers import answers, flat, label_of, names_in, number_text, read_case, read_summary, unit_of
 from fenwear.report.style import STANDARD, Style
-from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.registry import known
 from fenwear.results.sheet import BODIES, LINES, OF_CONTACT, UNCERTAINTY, shown
 
 REPORT = "report.html"
-SECTIONS = ("geometry", "loops", "zones", "tractions", "traction_map", "sliding", "energy", "stress_range",
-            "profiles", "shape", "wear_map", "wear_strip_map", "surface_map", "surface_strip_map",
-            "roughness", "pressure", "mean_pressure", "pressure_map", "tracks",
-            "cuts_along", "cuts_across", "program", "peaks", "place", "volume", "creep", "scar", "friction",
-            "surface_stress", "temperature", "boundary_temperature", "temperature_map",
-            "temperature_strip_map")  # fmt: skip
-WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise")
-FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
+WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise", "cyclically")
+# The first of these that there is stands on the first screen.
+FIRST = ("bodies_temperature", "bodies_von_mises", "wear_map", "profiles", "shape")
+BODY_FIELDS = {"bodies_von_mises": "Von Mises stress", "bodies_temperature": "Temperature"}
+STATIONARY = 1e-3  # change in a cycle below which pressures repeat
+BALANCES = {
+    "largest_equilibrium_error": "Force and moment balance: error at most {:.1e} of the load.",
+    "largest_complementarity_error": "No pull, overlap or pressure over a gap: error at most {:.1e} of their scales.",
+    "largest_heat_balance_error": "Heat balance: at most {:.1e} of the largest term is missing in any half-cycle.",
+}
+AT_LAST = ("largest_pressure", "contact_width", "contact_area", "periodicity")
 
 
 def write_report(
@@ -58,22 +61,16 @@ def write_report(
         OutputError: a figure or the page cannot be written.
     """
     with writing(directory):
-        return _write_report(directory, log, complete, look, formats)
-
-
-def _write_report(
-    directory: Path, log: Callable[[str], None], complete: bool, look: Style, formats: Sequence[str]
-) -> list[Path]:
-    history, wanted = read_history(directory), read_case(directory).get("output", {}).get("figures_at", ())
-    paths = draw_figures(directory, wanted, look, formats, history)
-    if complete:
-        try:
-            paths += draw_pictures(directory, formats)
-        except DrawingError as error:
-            log(f"warning: {error}")
-    report = directory / REPORT
-    write_text(report, page(directory, look, history))
-    return [*paths, report]
+        wanted = read_case(directory).get("output", {}).get("figures_at", ())
+        paths = draw_figures(directory, wanted, look, formats)
+        if complete:
+            try:
+                paths += draw_pictures(directory, formats)
+            except DrawingError as error:
+                log(f"warning: {error}")
+        report = directory / REPORT
+        write_text(report, page(directory, look))
+        return [*paths, report]
 
 
 def try_report(directory: Path, log: Callable[[str], None]) -> None:
@@ -84,48 +81,22 @@ def try_report(directory: Path, log: Callable[[str], None]) -> None:
         log(f"warning: no report of the run: {error}; to try again: python -m fenwear plot {directory}")
 
 
-@dataclass(frozen=True)
-class Number:
+class Number(NamedTuple):
     """A number of the page: its path in summary.json, its exact value, and what is read of it."""
 
     path: str
     label: str
-    value: int | float
+    value: float
     text: str
     unit: str
 
 
-@dataclass(frozen=True)
-class Table:
-    """Numbers below a caption."""
-
-    caption: str
-    numbers: list[Number]
-
-
-@dataclass(frozen=True)
-class Row:
-    """A quantity at several places."""
-
-    label: str
-    unit: str
-    numbers: list[Number]
-
-
-@dataclass(frozen=True)
-class Places:
-    """Quantities at several places below a caption."""
-
-    caption: str
-    columns: list[str]
-    rows: list[Row]
-
-
-def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None = None) -> str:
-    """Return report.html of a run whose figures are drawn; its history is read where it is not given."""
-    history, summary = read_history(directory) if history is None else history, read_summary(directory)
-    images = _images(directory)
-    written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
+def page(directory: Path, look: Style = STANDARD) -> str:
+    """Return report.html of a run whose figures are drawn."""
+    history, summary = read_history(directory), read_summary(directory)
+    written = (directory / HISTORY).stat().st_mtime
+    figures = _figures(directory, written, history, look)
+    first = next((name for start in FIRST for name in figures if name.startswith(start)), "")
     return render(
         "report.html",
         names_in(directory),
@@ -133,138 +104,104 @@ def page(directory: Path, look: Style = STANDARD, history: xarray.Dataset | None
         name=directory.resolve().name,
         half_cycles=int(history.half_cycle[-1]),
         stop=summary.get("stop", "no summary yet: the run still goes on, or it was killed"),
-        written=written,
+        written=datetime.fromtimestamp(written).astimezone(),
         warnings=summary.get("warnings", ()),
+        answers=answers(summary),
+        states=[*_states(summary, history), *_retries(summary)],
+        first=figures.get(first),
+        figures=[figure for name, figure in figures.items() if name != first],
         tables=_tables(summary, history),
-        places=_places(summary),
-        figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS if name in images],
-        bodies=_bodies(images),
-        change=_change(summary),
-        scale="the pressure scale",
-        retries=summary.get("retries", {}),
-        convergence=_figure(images, "convergence", caption("convergence", history, look)),
-        equilibrium_error=summary.get("largest_equilibrium_error"),
-        complementarity_error=summary.get("largest_complementarity_error"),
-        heat_error=_heat_error(summary, history),
-        heat=_heat(summary),
-        heat_balance=_figure(images, "heat_balance", caption("heat_balance", history, look)),
-        stability=_stability(summary, history),
-        uncertainty=summary.get(UNCERTAINTY),
-        uncertainties=uncertainty_rows(summary),
+        balances=_balances(summary, history),
+        uncertainty={"remedies": {}, "untold": {}} | summary.get(UNCERTAINTY, {}),
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
     )
 
 
-def _number(path: str, value: float, *, cut: int = 0) -> Number:
+def _number(path: str, value: float, label: str, key: str) -> Number:
     """Return a number as it is read: as the sheet has it, where it is one of its lines."""
-    line = (LINES | OF_CONTACT).get(path[cut:])
+    line = (LINES | OF_CONTACT).get(key)
     if line is not None:
-        return Number(path, line.label, value, number_text(shown(value, line)), line.unit)
-    return Number(path, label_of(path[cut:]), value, number_text(value), unit_of(path))
+        return Number(path, label or line.label, value, number_text(shown(value, line)), line.unit)
+    return Number(path, label or label_of(key), value, number_text(value), unit_of(path))
 
 
-def _table(caption: str, values: dict[str, int | float], *, cut: int = 0) -> Table:
-    return Table(caption, [_number(path, value, cut=cut) for path, value in values.items()])
-
-
-def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
+def numbers_of(summary: Mapping[str, Any]) -> dict[str, float]:
     """Return every number of a summary by its path."""
     left_out = ("versions", "warnings", "retries", UNCERTAINTY)
     values = flat({key: value for key, value in summary.items() if key not in left_out})
     return {k: v for k, v in values.items() if isinstance(v, int | float) and not isinstance(v, bool)}
 
 
-def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
+def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, list[Number]]:
+    """Return all numbers of a summary in tables, by their captions; of a run without one those of its history."""
     if not summary:
-        names = ("largest_pressure", "contact_width", "contact_area", "periodicity")
-        shown_first = [one for name in names if name in history and (one := known(name)) is not None]
-        last = {one.key: float(history[one.name][-1]) for one in shown_first}
-        return [_table("At the last recorded half-cycle", last)]
-    numbers = numbers_of(summary)
-    single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
-    captions = {"sliding": "What a tribometer measures", **{body: body.capitalize() for body in BODIES}}
-    ways = {d: "turning" if "clockwise" in d else "moving" for d in WAYS}
-    captions |= {d: f"Last half-cycle with the strip {moving} {d}" for d, moving in ways.items()}
-    captions |= {f"contacts.{name}": f"Contact {name}" for name in summary.get("contacts", {})}
-    tables = []
-    for name, above in captions.items():
-        inside = {p: v for p, v in numbers.items() if p.startswith(f"{name}.") and "[" not in p}
-        if inside:
-            tables.append(_table(above, inside, cut=len(name) + 1))
-    return [*tables, _table("The run", single)]
+        found = [known(name) for name in AT_LAST if name in history]
+        last = [_number(one.key, float(history[one.name][-1]), "", one.key) for one in found]
+        return {"At the last recorded half-cycle": last}
+    numbers, places = numbers_of(summary), summary.get("x_mm", [])
+    starts = {"sliding": "What a tribometer measures", **{body: body.capitalize() for body in BODIES}}
+    for way in WAYS:
+        starts[way] = f"Last half-cycle with the strip {'turning' if 'clockwise' in way else 'moving'} {way}"
+    starts |= {"heat_mJ": "Heat of the last half-cycle"}
+    starts |= {f"contacts.{name}": f"Contact {name}" for name in summary.get("contacts", {})}
+    tables: dict[str, list[Number]] = {text: [] for text in (*starts.values(), "Along the contact", "The run")}
+    for path, value in numbers.items():
+        bare, _, place = path.rstrip("]").partition("[")
+        start = next((one for one in starts if path.startswith(f"{one}.")), "")
+        if place:
+            label = f"{label_of(bare)} at x = {places[int(place)]:.4g} mm" if places else ""
+            tables["Along the contact"].append(_number(path, value, label, path))
+        else:
+            tables[starts.get(start, "The run")].append(_number(path, value, "", path[len(start) :].lstrip(".")))
+    return {text: rows for text, rows in tables.items() if rows}
 
 
-def _places(summary: dict[str, Any]) -> Places | None:
-    """Return the quantities that summary.json gives at several places."""
-    numbers = numbers_of(summary)
-    listed = [p.removesuffix("[0]") for p in numbers if p.endswith("[0]") and p != "x_mm[0]"]
-    if not (listed and summary.get("x_mm")):
-        return None
-    rows = [
-        Row("position x" if path == "x_mm" else label_of(path), unit_of(path),
-            [_number(p, numbers[p]) for p in numbers if p.startswith(f"{path}[")])
-        for path in ("x_mm", *listed)
-    ]  # fmt: skip
-    columns = ["quantity", "unit", *("" for _ in summary["x_mm"])]
-    return Places("At places along the contact, end of the run", columns, rows)
-
-
-def _change(summary: dict[str, Any]) -> float | None:
-    change = summary.get("periodicity")
-    return None if change is None or math.isnan(change) else float(change)
-
-
-def _heat_error(summary: dict[str, Any], history: xarray.Dataset) -> float | None:
-    if "heat_friction" not in history:
-        return None
-    return float(summary.get("largest_heat_balance_error", history.heat_balance_error.max()))
-
-
-def _heat(summary: dict[str, Any]) -> Table:
-    heat = {path: value for path, value in numbers_of(summary).items() if path.startswith("heat_mJ.")}
-    table = _table("Heat of the last half-cycle", heat, cut=len("heat_mJ."))
-    made = [replace(n, label="made by friction") if n.label == "friction" else n for n in table.numbers]
-    return replace(table, numbers=made)
-
-
-def _stability(summary: dict[str, Any], history: xarray.Dataset) -> str:
-    rate = summary.get("growth_rate_per_s")
-    if rate is None or not math.isfinite(rate):
-        if "largest_temperature" not in history:
-            return "Computed with heat only."
-        reason = summary.get("no_growth_rate")
-        return f"No growth rate: {reason}." if reason else "Not computed for this run."
-    if rate > 0:
-        text = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / rate:.3g} s"
-    elif rate < 0:
-        text = f"Stable: small disturbances of the final contact decay, to 1/e in {-1 / rate:.3g} s"
+def _states(summary: Mapping[str, Any], history: xarray.Dataset) -> list[str]:
+    """Return whether the end is stationary, and whether it is stable, in sentences."""
+    change, rate = summary.get("periodicity", math.nan), summary.get("growth_rate_per_s", math.nan)
+    if change is None or math.isnan(change):
+        stationary = "Stationary: not known."
+    elif change < STATIONARY:
+        stationary = f"Stationary: pressures repeat from cycle to cycle, to {100 * change:.3g} % of the pressure scale."
     else:
-        text = "Neutral"
-    return f"{text} (growth rate {number_text(rate)} 1/s)."
+        stationary = f"Not stationary: pressures change by {100 * change:.3g} % of the pressure scale in a cycle."
+    if rate is not None and math.isfinite(rate):
+        grows = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / max(rate, 1e-300):.3g} s"
+        decays = f"Stable: small disturbances of the final contact decay, to 1/e in {1 / max(-rate, 1e-300):.3g} s"
+        return [stationary, f"{grows if rate > 0 else decays} (growth rate {number_text(rate)} 1/s)."]
+    if "largest_temperature" not in history:
+        return [stationary, "Stability: computed with heat only."]
+    return [stationary, f"No growth rate: {summary.get('no_growth_rate') or 'not computed for this run'}."]
 
 
-def _images(directory: Path) -> dict[str, Path]:
-    """Return the images of a run by their names, without those older than its results."""
-    since = (directory / HISTORY).stat().st_mtime
-    found = sorted((directory / FOLDER).glob("*.png"))
-    return {path.stem: path for path in found if path.stat().st_mtime >= since}
+def _retries(summary: Mapping[str, Any]) -> list[str]:
+    retries = summary.get("retries", {})
+    return [f"Where the usual way did not converge: {way}, {count} times." for way, count in retries.items()]
 
 
-def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Picture | None:
-    if name not in images:
-        return None
-    path = images[name]
-    return picture(path.read_bytes(), path.suffix[1:], text, alt or text)
+def _balances(summary: Mapping[str, Any], history: xarray.Dataset) -> list[str]:
+    """Return the largest errors of the balances in sentences."""
+    given = dict(summary)
+    if "heat_balance_error" in history:
+        given.setdefault("largest_heat_balance_error", float(history.heat_balance_error.max()))
+    return [text.format(given[key]) for key, text in BALANCES.items() if key in given]
 
 
-def _bodies(images: dict[str, Path]) -> list[Picture | None]:
-    """Return pictures of the bodies at the last half-cycle that has them."""
-    pictures = []
-    for field, text in FIELDS.items():
-        names = [n for n in images if n.startswith(f"bodies_{field}_")]
-        if names:
-            title = f"{text[0].upper()}{text[1:]} at half-cycle {int(names[-1].rpartition('_')[2]):,}"
-            alt = f"Deformed bodies near the contact, coloured by {text}."
-            pictures.append(_figure(images, names[-1], title, alt))
-    return pictures
+def _figures(directory: Path, written: float, history: xarray.Dataset, look: Style) -> dict[str, Picture]:
+    """Return the images of a run in the order of `TEXTS`, without those older than its results.
+
+    Of pictures of the bodies those at the last half-cycle that has them.
+    """
+    images = {path.stem: path for path in sorted((directory / FOLDER).glob("*.png")) if path.stat().st_mtime >= written}
+    captions = {}
+    for start, words in BODY_FIELDS.items():
+        names = [name for name in images if name.startswith(start)]
+        for name in names[-1:]:
+            captions[name] = f"{words} in the deformed bodies, half-cycle {int(name.rpartition('_')[2]):,}."
+    rest = [name for name in images if not name.startswith(tuple(BODY_FIELDS)) and name not in TEXTS]
+    captions |= {name: caption(name, history, look) for name in (*TEXTS, *rest) if name in images}
+    found = {}
+    for name, text in captions.items():
+        found[name] = picture(images[name].read_bytes(), images[name].suffix[1:], text, text)
+    return found

@@ -15,11 +15,16 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.case.names import Names
+from fenwear.case.units import convert
+from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+FORMATS = ("png", "pdf", "svg")
+LEAST, MOST = 50.0, 500.0  # mm
+INCH = 25.4  # mm
 WIDTH = 7.0  # inches
 NARROW = 5.0  # inches: below it letters are smaller
 HIGH_WIDE, HIGH_NARROW = 0.75, 0.5  # of the height of a panel that its axes have
@@ -80,14 +85,56 @@ class Style:
         """Unit of a single value of it."""
         return {"cycles": "", "distance": "m", "time": "s"}[self.axis]
 
-    def name(self, history: xarray.Dataset, half_cycle: int) -> str:
-        """Return a half-cycle in words of the axis, such as its cycle."""
-        row = int(np.flatnonzero(history.half_cycle.values == half_cycle)[0])
+    def at(self, history: xarray.Dataset, row: int) -> str:
+        """Return where a record ends on the axis as text, such as its cycle."""
         value = float(self.course(history)[row])
         return f"{value:,.0f}" if value >= 1000 else f"{value:.4g}"
 
+    def name(self, history: xarray.Dataset, half_cycle: int) -> str:
+        """Return where a half-cycle ends on the axis as text."""
+        return self.at(history, row_of(history, half_cycle))
+
+    def in_words(self, history: xarray.Dataset, row: int) -> str:
+        """Return a record as the title of a panel: cycle 20, or 3 m."""
+        return f"{self.at(history, row)} {self.of_unit}" if self.of_unit else f"cycle {self.at(history, row)}"
+
 
 STANDARD = Style()
+
+
+def row_of(history: xarray.Dataset, half_cycle: int) -> int:
+    """Return the row of a recorded half-cycle."""
+    return int(np.flatnonzero(history.half_cycle.values == half_cycle)[0])
+
+
+def chosen_formats(text: str) -> tuple[str, ...]:
+    """Return the formats of figures that are named with commas between.
+
+    Raises:
+        CaseError: one is not known.
+    """
+    names = [name.strip().lower().removeprefix(".") for name in text.split(",") if name.strip()]
+    unknown = [name for name in names if name not in FORMATS]
+    if unknown or not names:
+        raise CaseError(InputError("--format", f"expected some of {', '.join(FORMATS)} with commas, got {text!r}"))
+    return tuple(dict.fromkeys(names))
+
+
+def chosen_look(width: str, axis: str) -> Style:
+    """Return the look of figures of a width, such as "85 mm", over cycles, distance or time.
+
+    Raises:
+        CaseError: the width is no length or not between 50 and 500 mm, or the axis is not known.
+    """
+    try:
+        size = convert(width, "mm")
+    except ValueError as error:
+        raise CaseError(InputError("--width", str(error))) from None
+    if not LEAST <= size <= MOST:
+        raise CaseError(InputError("--width", f"expected {LEAST:g} to {MOST:g} mm, got {width!r}"))
+    if axis not in AXES:
+        raise CaseError(InputError("--axis", f"expected one of {', '.join(AXES)}, got {axis!r}"))
+    return Style(size / INCH, axis)
 
 
 def direction_style(history: xarray.Dataset, direction: int) -> tuple[str, str, str]:
@@ -114,7 +161,7 @@ def strip_moves(data: xarray.Dataset) -> str:
 
 
 def panels(
-    count: int, height: float, *, columns: int = 1, share_x: bool = True, share_y: bool = False, look: Style = STANDARD
+    count: int, height: float, *, columns: int = 1, share_x: bool = True, look: Style = STANDARD
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of lettered panels below each other, each as high as given for the full width, inches.
 
@@ -130,7 +177,7 @@ def panels(
         above = ABOVE if look.width < NARROW else 0.0
         rows = -(-count // columns)
         figure = Figure(figsize=(look.width, scale * height * rows + above), layout="constrained")
-        shared: Any = "row" if columns > 1 else share_y
+        shared: Any = "row" if columns > 1 else False
         axes = list(figure.subplots(rows, columns, sharex=share_x, sharey=shared, squeeze=False).ravel())
         if count > 1:
             for ax, letter in zip(axes, ascii_lowercase, strict=False):

@@ -1,9 +1,13 @@
-"""A contact surface read back from history.nc: triangles to draw on, and cuts along and across the sliding."""
+"""Contact surfaces read back from history.nc: triangles to draw on, cuts of solids, places and gaps along curves.
+
+A history of a contact whose parts lie apart has the part of each node (`part`, `part_strip`). Parts of rings follow
+from their radii: both sides of a groove begin at the same one. No line is drawn over the gap between two parts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +24,7 @@ from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.tri import Triangulation
 
 POINTS = 301  # along a cut
@@ -33,6 +38,8 @@ ASIDE = 0.12  # of the way along an unrolled part: where its name stands, beside
 HALF = 0.5  # of the way around: longer facets go over the cut
 ROUNDING = 1e-9  # of a map's size: of coordinates
 ARROWS = "→↗↑↖←↙↓↘"
+NEAR = 1e-9  # of the contact's length: places are the same
+BACK = 0.5  # of it: where radii begin anew
 
 
 def model_of(history: xarray.Dataset) -> str:
@@ -50,7 +57,7 @@ class Surface:
         cells: Nodes around each part of the surface (f, 3 or 4).
         sliding: Places along and across the sliding (n, 2), mm.
         seen: The two axes that are left when it is seen along its normal.
-        contact: Name of the contact that each node belongs to (n,); None where it has none.
+        contact: Name of the contact that each node belongs to (n,); empty where contacts have no names.
 
     Parts that would lie over each other, as both faces of a disc, are laid beside each other on maps; what would lie
     over itself, as a bore, is unrolled along the sliding.
@@ -61,7 +68,7 @@ class Surface:
     cells: NDArray[np.int64]
     sliding: Array
     seen: tuple[int, int]
-    contact: NDArray[np.str_] | None = None
+    contact: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=str))
 
     @cached_property
     def part(self) -> NDArray[np.int64]:
@@ -156,8 +163,6 @@ class Surface:
     @cached_property
     def labels(self) -> list[tuple[str, Array]]:
         """Names of contacts and where they stand on the map (2,), mm: in the middle of their parts; unrolled aside."""
-        if self.contact is None:
-            return []
         found = []
         for name in np.unique(self.contact):
             own = self.map[self.contact == name]
@@ -294,11 +299,11 @@ def surface_of(history: xarray.Dataset, body: str = "punch") -> Surface:
     of_punch = np.column_stack([history[axis].values for axis in AXES])
     seen_along = int(np.argmin(np.ptp(of_punch, axis=0)))
     first, second = (k for k in range(3) if k != seen_along)
-    contact = None
-    if f"contact{end}" in history:
-        known = history[f"contact{end}"]
-        contact = np.array(known.attrs["flag_meanings"].split())[known.values]
-    return Surface(body, x, history[f"facets{end}"].values, sliding, (first, second), contact)
+    surface = Surface(body, x, history[f"facets{end}"].values, sliding, (first, second))
+    if f"contact{end}" not in history:
+        return surface
+    known = history[f"contact{end}"]
+    return replace(surface, contact=np.array(known.attrs["flag_meanings"].split())[known.values])
 
 
 class CutPlace(NamedTuple):
@@ -319,7 +324,7 @@ def cut_places(history: xarray.Dataset) -> list[CutPlace]:
     """Return where contacts are cut: each that has a name, or of parts that lie behind each other each."""
     punch = surface_of(history)
     strip = surface_of(history, "strip") if "x_strip" in history else None
-    if punch.contact is not None:
+    if len(punch.contact):
         owns = {name: punch.contact == name for name in history.contact.attrs["flag_meanings"].split()}
     elif punch.overlaps:
         owns = {f"part {k + 1}": punch.part == k for k in range(punch.part.max() + 1)}
@@ -334,7 +339,7 @@ def cut_places(history: xarray.Dataset) -> list[CutPlace]:
 
 def _opposite(strip: Surface, name: str, x: Array) -> Mask:
     """Return the nodes of the strip (n,) that are of a contact: those of its name, or of the part nearest to it."""
-    if strip.contact is not None and name in strip.contact:
+    if name in strip.contact:
         return np.asarray(strip.contact == name)
     middle = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
     return np.asarray(strip.part == strip.part[np.linalg.norm(strip.x - middle, axis=1).argmin()])
@@ -372,3 +377,59 @@ def along_contact(history: xarray.Dataset, body: str = "punch") -> tuple[Array, 
         return history[f"x{end}"].values, ALONG_CONTACT
     r, z = history[f"r{end}"].values, history[f"z{end}"].values
     return (r, "radius r (mm)") if np.ptp(r) >= np.ptp(z) else (z, "height z (mm)")
+
+
+def gaps_of(history: xarray.Dataset) -> Array:
+    """Return the last place before and the first place after each gap of both surfaces (g, 2), mm."""
+    found: list[Array] = [np.zeros((0, 2))]
+    for end in ("", "_strip"):
+        if f"part{end}" in history and f"x{end}" in history:
+            x: Array = history[f"x{end}"].values
+            at = np.flatnonzero(np.diff(history[f"part{end}"].values))
+        elif f"r{end}" in history:
+            x = history[f"r{end}"].values
+            at = np.flatnonzero(np.diff(x) < -BACK * max(float(np.ptp(x)), 1e-300))
+        else:
+            continue
+        found.append(np.stack([x[at], x[at + 1]], axis=1))
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def sides_of(history: xarray.Dataset) -> tuple[str, str] | None:
+    """Return the names of two contacts at the same places, such as the sides of a groove; None of others."""
+    gaps = gaps_of(history)
+    names = history["contact"].attrs.get("flag_meanings", "").split() if "contact" in history else []
+    return (names[0], names[1]) if len(names) == 2 and (gaps[:, 1] < gaps[:, 0]).any() else None
+
+
+def parted(x: Array, values: Array, gaps: Array) -> tuple[Array, Array]:
+    """Return places (n,) and values (..., n) with a place of no value in the middle of each gap (g, 2)."""
+    at = _behind(x, gaps)
+    middles = (x[at - 1] + x[at]) / 2
+    return np.insert(x, at, middles), np.insert(np.asarray(values, dtype=float), at, np.nan, axis=-1)
+
+
+def _behind(x: Array, gaps: Array) -> NDArray[np.int64]:
+    """Return the numbers of the first places behind gaps (g, 2), of places (n,)."""
+    if not len(gaps) or len(x) < 2:
+        return np.zeros(0, dtype=np.int64)
+    ends = np.stack([x[:-1], x[1:]], axis=1)
+    same = np.abs(ends[:, None] - gaps).max(axis=2) <= NEAR * np.ptp(x)
+    return 1 + np.flatnonzero(same.any(axis=1))
+
+
+def part_lines(figures: Iterable[Figure], gaps: Array) -> None:
+    """Break the lines of figures along the contact at gaps (g, 2); behind one that leads back they are dotted."""
+    if not len(gaps):
+        return
+    back = gaps[gaps[:, 1] < gaps[:, 0]]
+    lines = [(ax, line) for figure in figures for ax in figure.axes for line in ax.get_lines()]
+    for ax, line in lines:
+        x, y = (np.asarray(values) for values in line.get_data())
+        if x.shape != y.shape or not np.issubdtype(x.dtype, np.number):
+            continue
+        first = next(iter(_behind(x, back)), len(x))
+        line.set_data(*parted(x[:first], y[:first], gaps))
+        if first < len(x):
+            (other,) = ax.plot(*parted(x[first:], y[first:], gaps), ":", color=line.get_color())
+            other.set(linewidth=line.get_linewidth(), zorder=line.get_zorder())

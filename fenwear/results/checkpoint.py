@@ -1,7 +1,7 @@
 """Checkpoints: a state of a run on disk, whole or not at all, for any number of ranks.
 
-Arrays of the interface go to one NumPy file; temperatures of each body to one of their own with the places of
-the nodes, so that another number of ranks can read them.
+The state goes to one NumPy file, by the paths of its attributes; temperatures of each body to one of their own with the
+places of the nodes, so that another number of ranks can read them.
 """
 
 from __future__ import annotations
@@ -19,41 +19,30 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, la
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, grows
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, OneWay, Rotation
-from fenwear.contact import ContactState
+from fenwear.compat import geometry_dofmap
 from fenwear.cycle.state import RunState
-from fenwear.cycle.totals import SUMS, Totals
+from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
-from fenwear.results import nodal
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import WornDepths
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS, EXTREMES = "case.toml", "state.npz", "extremes.json"
-NUMBERS, WEAR, STATES = (
-    ("half_cycle", "jump_length", "periodic_phases"),
-    ("wear", "wear_strip"),
-    ("pressure", "gap", "rigid"),
-)
-TOTALS = ("totals", "energy", "pressure_sum")
-BETWEEN = "between"  # the state of what lies between the surfaces, without rows where nothing does that changes
-CREPT = "crept"  # the state of what creeps, empty where nothing does
-CARRIED = "carried"  # the states of the strip's material that laws remember, without rows where there are none
-WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 MEMORY, REMEMBERED = "memory", "remembered"  # what a law of contact remembers, and its temperatures
-BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
-FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
-GRID = "grid"  # corner, spacing and counts of the contact grid (3, d - 1), where it grows
+WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
+NEAR = 1e-6  # of the extent: how far a node may be from where it was
 BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
 # A run may go on farther than it was meant to, and keep other things.
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "run.until", "output.", "setup.", "title")
@@ -110,7 +99,7 @@ def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function
     size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES
     on_root(comm, partial(check_room, new, size))
     with writing_together(comm, path):
-        nodal.write(path, function)
+        write_nodal(path, function)
 
 
 def _file(folder: Path, name: str) -> Path:
@@ -148,30 +137,35 @@ def _extremes(folder: Path) -> dict[str, float]:
         raise damaged(folder) from None
 
 
+@dataclass(frozen=True)
+class Checkpoint:
+    """What state.npz holds, besides what the law of contact remembers.
+
+    Attributes:
+        state: Of the run, without temperatures, which have files of their own.
+        track: What is on its way back on a closed track; None where there is none.
+        followed: The wear that the meshes follow; None where they are as made.
+        grid: Corner, spacing and counts of the contact grid (3, d - 1); None of one that stays.
+    """
+
+    state: RunState
+    track: Array | None = None
+    followed: WornDepths | None = None
+    grid: Array | None = None
+
+
 def _write(new: Path, system: Tribosystem, state: RunState) -> None:
-    n, r = len(system.pair.weights), len(system.rigid.resultant)
-    empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
-    contacts = [contact or empty for contact in state.contacts]
+    grid, track = system.pair.punch.grid, None if state.temperature is None else state.temperature.track
+    plain = replace(state, temperature=None, memory=None, finer=None)
+    growing = grid.numbers if grid is not None and grows(system) else None
+    arrays = dict[str, Any]()
+    pack(Checkpoint(plain, track, system.bodies.followed, growing), "", arrays)
+    if state.memory is not None:
+        pack(replace(state.memory, warm=()), MEMORY, arrays)
     with (new / ARRAYS).open("wb") as file:
-        np.savez(
-            file,
-            **{name: getattr(state, name) for name in NUMBERS},
-            **_depths(WEAR, state.worn),
-            **_between(state.worn),
-            **_totals(state.totals),
-            **_bulk(state.temperature),
-            **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
-            **_grid(system),
-            **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
-            **_packed(state.memory),
-        )
+        np.savez(file, **arrays)
         file.flush()
         os.fsync(file.fileno())
-
-
-def _grid(system: Tribosystem) -> dict[str, Any]:
-    own = system.pair.punch.grid
-    return {} if own is None or not grows(system) else {GRID: own.numbers}
 
 
 def _remembered(memory: Any) -> tuple[HeatState, ...]:
@@ -179,46 +173,16 @@ def _remembered(memory: Any) -> tuple[HeatState, ...]:
     return () if memory is None else tuple(memory.warm)
 
 
-def _packed(memory: Any) -> dict[str, Any]:
-    """Return the arrays of what a law of contact remembers, by their paths."""
-    arrays = dict[str, Any]()
-    if memory is not None:
-        pack(replace(memory, warm=()), MEMORY, arrays)
-    return arrays
-
-
 def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
     """Return what a law of contact remembers; collective."""
     if not any(name.startswith(f"{MEMORY}.") for name in arrays):
         return None
-    kind: Any = system.contact_law.memory
-    try:
-        memory = unpack(kind, MEMORY, arrays)
-    except (KeyError, TypeError, ValueError):
-        raise damaged(folder) from None
-    warm, number, bodies = [], 0, system.bodies.heat
-    while bodies is not None and on_root(system.comm, (folder / f"{REMEMBERED}_{number}").is_dir):
-        own = folder / f"{REMEMBERED}_{number}"
+    memory, bodies = _unpacked(system.contact_law.memory, MEMORY, folder, arrays), system.bodies.heat
+    warm: list[HeatState] = []
+    while bodies is not None and on_root(system.comm, (folder / f"{REMEMBERED}_{len(warm)}").is_dir):
+        own = folder / f"{REMEMBERED}_{len(warm)}"
         warm.append(HeatState.nodal(bodies, [read_temperature(own, body) for body in bodies]))
-        number += 1
     return replace(memory, warm=tuple(warm))
-
-
-def _bulk(temperature: HeatState | None) -> dict[str, Any]:
-    track = None if temperature is None else temperature.track
-    return {BULK: np.nan if track is None else track}
-
-
-def _totals(totals: Totals) -> dict[str, Any]:
-    return dict(zip(TOTALS, (totals.sums, totals.energy, totals.pressure), strict=True))
-
-
-def _between(worn: WornDepths) -> dict[str, Any]:
-    return {BETWEEN: worn.between, CREPT: worn.crept, CARRIED: worn.carried}
-
-
-def _depths(names: tuple[str, str], worn: WornDepths) -> dict[str, Any]:
-    return dict(zip(names, (worn.punch, worn.strip), strict=True))
 
 
 def followed(directory: Path, system: Tribosystem) -> WornDepths | None:
@@ -227,8 +191,7 @@ def followed(directory: Path, system: Tribosystem) -> WornDepths | None:
     Raises:
         CaseError: there is no checkpoint, or it is of another case.
     """
-    arrays = on_root(system.comm, lambda: _read(find(directory), system))
-    return WornDepths(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
+    return on_root(system.comm, lambda: _read(find(directory), system)[0].followed)
 
 
 def grid(directory: Path, system: Tribosystem) -> RegularGrid | None:
@@ -241,41 +204,20 @@ def grid(directory: Path, system: Tribosystem) -> RegularGrid | None:
     def read() -> Array | None:
         folder = find(directory)
         check_case(folder, system.case)
-        return _arrays(folder).get(GRID)
+        return _unpacked(Checkpoint, "", folder, _arrays(folder)).grid
 
     found, own = on_root(system.comm, read), system.pair.punch.grid
     return None if found is None or own is None else own.with_numbers(found)
 
 
-@dataclass(frozen=True)
-class LastContact:
-    """The contact of the last cycle of a run, as its checkpoint has it.
-
-    Attributes:
-        half_cycle: It ends with.
-        pressure: Of each phase (phases, n), MPa; NaN where there was none yet.
-        worn: Depths at its end.
-        grid: Corner, spacing and counts of a contact grid that grows (3, d - 1); None of one that stays.
-        followed: The wear that the meshes follow; None where they are as made.
-    """
-
-    half_cycle: int
-    pressure: Array
-    worn: WornDepths
-    grid: Array | None
-    followed: WornDepths | None
-
-
-def last_contact(directory: Path) -> LastContact:
-    """Return the contact of a run's last cycle; for one rank.
+def last_contact(directory: Path) -> Checkpoint:
+    """Return the checkpoint of a run; for one rank.
 
     Raises:
         CaseError: there is no checkpoint, or it is damaged.
     """
-    arrays = _arrays(find(directory))
-    worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
-    follows = WornDepths(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
-    return LastContact(int(arrays["half_cycle"]), arrays["pressure"], worn, arrays.get(GRID), follows)
+    folder = find(directory)
+    return _unpacked(Checkpoint, "", folder, _arrays(folder))
 
 
 def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
@@ -317,22 +259,12 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     """
     comm = system.comm
     folder = on_root(comm, lambda: find(directory))
-    arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
+    found, arrays = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
-        track = None if np.isnan(arrays[BULK]).any() else np.atleast_2d(arrays[BULK])
         read = [read_temperature(folder, body) for body in system.bodies.heat]
-        temperature = HeatState.nodal(system.bodies.heat, read, track)
-    contacts = tuple(
-        None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
-        for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
-    )
-    length, periodic = float(arrays["jump_length"]), int(arrays["periodic_phases"])
-    length = int(length) if length >= 1 else length
-    worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
-    totals = Totals(*(arrays[name] for name in TOTALS))
-    memory = _memory(folder, system, arrays)
-    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)
+        temperature = HeatState.nodal(system.bodies.heat, read, found.track)
+    return replace(found.state, temperature=temperature, memory=_memory(folder, system, arrays))
 
 
 def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
@@ -343,7 +275,7 @@ def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") ->
     """
     comm, values = body.body.mesh.comm, np.full(body.owned, np.nan)
     with suppress(EOFError, KeyError, OSError, ValueError, zipfile.BadZipFile):
-        values = nodal.read(_file(folder, f"{name}_{body.body.name}"), body.space)
+        values = read_nodal(_file(folder, f"{name}_{body.body.name}"), body.space)
     if not comm.allreduce(bool(np.isfinite(values).all()), op=MPI.LAND):
         raise damaged(folder)
     return values
@@ -370,7 +302,7 @@ def find(directory: Path) -> Path:
 def reached(directory: Path) -> int | None:
     """Return the half-cycle of the checkpoint in a run's folder; None where there is none to go on from."""
     try:
-        return int(_arrays(find(directory))["half_cycle"])
+        return int(_arrays(find(directory))["state.half_cycle"])
     except CaseError:
         return None
 
@@ -378,11 +310,20 @@ def reached(directory: Path) -> int | None:
 def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
-            followed = (*(FOLLOWED if set(FOLLOWED) & set(arrays) else ()), *({GRID} & set(arrays)))
-            memory = [name for name in arrays if name.startswith(f"{MEMORY}.")]
-            depths = (*WEAR, BETWEEN, CREPT, CARRIED)
-            return {name: arrays[name] for name in (*NUMBERS, *depths, *TOTALS, BULK, *STATES, *followed, *memory)}
+            return dict(arrays)
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+        raise damaged(folder) from None
+
+
+def _unpacked(kind: Any, path: str, folder: Path, arrays: dict[str, Any]) -> Any:
+    """Return an object of a kind from a checkpoint's arrays.
+
+    Raises:
+        CaseError: they do not hold it.
+    """
+    try:
+        return unpack(kind, path, arrays)
+    except (KeyError, TypeError, ValueError):
         raise damaged(folder) from None
 
 
@@ -414,22 +355,19 @@ def check_case(folder: Path, case: Case) -> None:
         raise CaseError([InputError("--resume", "the checkpoint is of another case"), *problems])
 
 
-def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
+def _read(folder: Path, system: Tribosystem) -> tuple[Checkpoint, dict[str, Any]]:
+    """Return a checkpoint of this case and the arrays that it is made of."""
     check_case(folder, system.case)
     arrays = _arrays(folder)
-    for names in (WEAR, FOLLOWED):
-        for name, unworn in _depths(names, system.unworn()).items():
-            if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
-                raise damaged(folder)
-    unworn = system.unworn()
-    kept = {BETWEEN: unworn.between, CREPT: unworn.crept, CARRIED: unworn.carried}
-    if any(arrays[name].shape != state.shape for name, state in kept.items()):
+    found: Checkpoint = _unpacked(Checkpoint, "", folder, arrays)
+    expected, worn = system.unworn(), found.state.worn
+    for own, like in ((worn, expected), (found.followed or worn, expected), (found.state.totals, none_yet(system))):
+        pairs = [(getattr(own, field.name), getattr(like, field.name)) for field in fields(like)]
+        if any(values.shape != wanted.shape for values, wanted in pairs):
+            raise damaged(folder)
+    if not all(np.isfinite(depth).all() for depth in (worn.punch, worn.strip)):
         raise damaged(folder)
-    if arrays["totals"].shape != (len(SUMS),) or any(
-        arrays[name].shape != system.pair.weights.shape for name in TOTALS[1:]
-    ):
-        raise damaged(folder)
-    return arrays
+    return found, arrays
 
 
 def _flat(tables: Any, path: str = "") -> dict[str, Any]:
@@ -444,31 +382,83 @@ def _flat(tables: Any, path: str = "") -> dict[str, Any]:
 
 
 def pack(value: Any, path: str, into: dict[str, Any]) -> None:
-    """Put a data class, a list of them, an array or a number under its path; None is left out."""
+    """Put a data class, a list or tuple, an array or a number under its path; None is left out."""
+    start = f"{path}." if path else ""
     if is_dataclass(value):
         for field in fields(value):
-            pack(getattr(value, field.name), f"{path}.{field.name}", into)
-    elif isinstance(value, list):
+            pack(getattr(value, field.name), start + field.name, into)
+    elif isinstance(value, list | tuple):
         into[path] = np.asarray(len(value))
         for number, item in enumerate(value):
-            pack(item, f"{path}.{number}", into)
+            pack(item, f"{start}{number}", into)
     elif value is not None:
         into[path] = np.asarray(value)
 
 
 def unpack(kind: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
-    """Return what was put under a path."""
+    """Return what was put under a path, of this type."""
+    start, kinds = f"{path}." if path else "", get_args(kind)
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)
-        return kind(**{f.name: unpack(hints[f.name], f"{path}.{f.name}", arrays) for f in fields(kind)})
-    if get_origin(kind) is tuple:  # of temperatures, which are kept apart
-        return ()
-    inner = next((one for one in get_args(kind) if is_dataclass(one)), None)
-    if get_origin(kind) is not list and inner is not None and any(name.startswith(f"{path}.") for name in arrays):
-        return unpack(inner, path, arrays)
-    if get_origin(kind) is list:
-        return [unpack(get_args(kind)[0], f"{path}.{k}", arrays) for k in range(int(arrays[path]))]
-    if path not in arrays and type(None) in get_args(kind):
+        return kind(**{f.name: unpack(hints[f.name], start + f.name, arrays) for f in fields(kind)})
+    if get_origin(kind) in (list, tuple):
+        return get_origin(kind)(unpack(kinds[0], f"{start}{k}", arrays) for k in range(int(arrays[path])))
+    present = path in arrays or any(name.startswith(start) for name in arrays)
+    if not present and (kind is Any or type(None) in kinds):
         return None
+    inner = next((one for one in kinds if is_dataclass(one)), None)
+    if inner is not None:
+        return unpack(inner, path, arrays)
     values = arrays[path]
     return values if values.ndim else values.item()
+
+
+def write_nodal(path: Path, function: fem.Function) -> None:
+    """Write nodal values of a scalar function with their places; collective.
+
+    Raises:
+        OSError: they cannot be written; on every rank.
+    """
+    space = function.function_space
+    own = space.dofmap.index_map.size_local
+    parts = space.mesh.comm.gather((_places(space), function.x.array[:own])) or []
+
+    def save() -> None:
+        with path.open("wb") as file:
+            np.savez(file, places=np.concatenate([p[0] for p in parts]), values=np.concatenate([p[1] for p in parts]))
+
+    on_root(space.mesh.comm, save)
+
+
+def read_nodal(path: Path, space: fem.FunctionSpace) -> Array:
+    """Return the values of this rank's own nodes (owned,); collective.
+
+    Raises:
+        ValueError: they are of other nodes.
+        EOFError, KeyError, OSError, zipfile.BadZipFile: they cannot be read.
+    """
+    own = _places(space)
+    with np.load(path, allow_pickle=False) as stored:
+        places, values = stored["places"], np.asarray(stored["values"])
+    far, at = cKDTree(places).query(own)
+    if far.max(initial=0.0) > NEAR * np.ptp(places, axis=0).max():
+        raise ValueError("values of other nodes")
+    found: Array = values[at]
+    return found
+
+
+def _places(space: fem.FunctionSpace) -> Array:
+    """Return where this rank's own nodes are, and the middle of the cells around each (owned, 6); collective.
+
+    The middle tells the nodes on both sides of a slit apart, which have the same place.
+    """
+    mesh, index_map = space.mesh, space.dofmap.index_map
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    nodes = space.dofmap.list[:cells]
+    middles = mesh.geometry.x[geometry_dofmap(mesh)[:cells]].mean(axis=1)
+    sums = [fem.Function(space) for _ in range(4)]
+    for function, values in zip(sums, (*middles.T, np.ones(cells)), strict=True):
+        np.add.at(function.x.array, nodes, values[:, None])
+        function.x.scatter_reverse(la.InsertMode.add)
+    own = np.column_stack([function.x.array[: index_map.size_local] for function in sums])
+    return np.hstack([space.tabulate_dof_coordinates()[: len(own)], own[:, :3] / own[:, 3:]])

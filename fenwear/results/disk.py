@@ -7,12 +7,14 @@ So room is claimed before they begin, and a file that is replaced stays whole un
 from __future__ import annotations
 
 import errno
+import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
@@ -52,6 +54,15 @@ def _reason(error: OSError | RuntimeError) -> str:
     if number:  # h5py puts a page of its own into the text
         return os.strerror(number)
     return next(iter(str(error).splitlines()), type(error).__name__)
+
+
+def finite(data: Any) -> Any:
+    """Return tables and lists for JSON: numbers that are not finite are None."""
+    if isinstance(data, Mapping):
+        return {key: finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def write_text(path: Path, text: str) -> None:

@@ -3,12 +3,21 @@
 Nothing here knows the kind of the model: a variable over the records is a column of the course, one over the records
 and the nodes of a surface a column of that surface's profile for each chosen record. A record is a kept half-cycle; in
 partial slip a kept cycle, whose time steps make a file of their own: the loops of force and displacement.
+
+The files of a shape to machine: its profile, its surface as triangles, and the case of the bodies made with it.
+
+The worn surfaces of a run as files for other programs, and for fenwear again: profile, triangles, mesh with depths.
+
+A profile has what a surface lies deeper in its body than the mesh of its case: the wear, and the profile that the
+body had before. As `punch.profile.file` or `strip.profile.file` it makes the worn body of a next run, on the same
+geometry.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -16,12 +25,21 @@ from typing import Any
 
 import numpy as np
 import xarray
+from mpi4py import MPI
+from numpy.typing import NDArray
 
+from fenwear.arrays import Array
+from fenwear.assembly import place_case
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.case import Case, load_case, make_case
+from fenwear.case.csv_table import profile_text
 from fenwear.errors import CaseError, InputError
-from fenwear.results.cycles import by_cycles, resolves
+from fenwear.initial_shape import InitialShape
+from fenwear.parallel import on_root
 from fenwear.results.disk import write_text, writing
-from fenwear.results.history import HISTORY
-from fenwear.results.reading import load_history
+from fenwear.results.history import CASE, HISTORY, make_directory, write_case
+from fenwear.results.reading import by_cycles, load_history, resolves
+from fenwear.results.surfaces import surface_cells
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"
@@ -153,13 +171,176 @@ def _heading(history: xarray.Dataset, name: Any, at: str = "") -> str:
 
 
 def _text(columns: Sequence[Column]) -> str:
+    return csv_text([heading for heading, _ in columns], zip(*(values for _, values in columns), strict=True))
+
+
+def csv_text(heading: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return a table as CSV, its cells empty where there is no number."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([heading for heading, _ in columns])
-    writer.writerows(map(_cells, zip(*(values for _, values in columns), strict=True)))
+    writer.writerow(heading)
+    writer.writerows(["" if isinstance(cell, float) and math.isnan(cell) else cell for cell in row] for row in rows)
     return file.getvalue()
 
 
-def _cells(row: Iterable[Any]) -> list[Any]:
-    """Return the cells of a row, empty where there is no number."""
-    return ["" if isinstance(value, float) and math.isnan(value) else value for value in row]
+PROFILE, SURFACE = "profile.csv", "surface.stl"
+AROUND = 360  # facets around a ring
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL
+
+
+def write_shape(directory: Path, case: Case, shape: InitialShape) -> None:
+    """Write profile.csv, surface.stl and case.toml into a new folder; for one rank.
+
+    Args:
+        directory: The folder.
+        case: That the shape was found for.
+        shape: In addition to the profile that the punch's contact surface has already.
+
+    Raises:
+        CaseError: the folder is not empty.
+        OutputError: it cannot be written.
+    """
+    make_directory(directory)
+    surface = shape.surface
+    profile = profile_of(surface, shape.depth)
+    write_text(directory / PROFILE, profile_text(case.model.kind, profile))
+    thickness = case.model.thickness if case.model.kind == "plane" else 0.0
+    write_stl(directory / SURFACE, surface, shape.depth, thickness)
+    write_case(directory, with_shape(case, profile))
+
+
+def profile_of(surface: ContactSurface, depth: Array) -> dict[str, Any]:
+    """Return the table of a profile at the nodes, mm: a depth, and all that the surface lies below its mesh already."""
+    rows = np.column_stack([surface.places, depth + surface.below_mesh])
+    return {"points": rows.tolist(), "along": "x" if surface.arc is None else "arc"}
+
+
+def with_shape(case: Case, profile: dict[str, Any]) -> Case:
+    """Return a case whose punch is made with the table of a profile."""
+    tables = case.resolved()
+    tables["punch"]["profile"] = profile
+    tables["punch"].pop("topography", None)  # which the points have in them
+    return make_case(tables, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)
+
+
+def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: float) -> None:
+    """Write the machined or worn contact surface as a binary STL, mm, its normals out of the body.
+
+    Args:
+        path: Of the file.
+        surface: Of the punch.
+        depth: At its pressure nodes (n,), mm.
+        thickness: Of a plane model, along y; 0 for rings, which are turned about z, and solids.
+    """
+    x, cells = surface.unworn - depth[:, None] * surface.outward, facing_outward(surface)
+    if surface.dim == 2:
+        turned = np.linspace(0, 2 * np.pi, AROUND + 1)
+        rows = (
+            [np.column_stack([x[:, 0], np.full(len(x), y), x[:, 1]]) for y in (0.0, thickness)]
+            if thickness
+            else [np.column_stack([x[:, 0] * np.cos(a), x[:, 0] * np.sin(a), x[:, 1]]) for a in turned]
+        )
+        pairs = itertools.pairwise(rows)
+        quads = [np.stack([a[cells[:, 0]], a[cells[:, 1]], b[cells[:, 1]], b[cells[:, 0]]], axis=1) for a, b in pairs]
+        corners = np.concatenate(quads)
+    else:
+        corners = x[cells]
+    parts = [corners[:, [0, 1, 2]]] + ([corners[:, [0, 2, 3]]] if corners.shape[1] == 4 else [])
+    triangles = np.zeros(sum(map(len, parts)), dtype=TRIANGLE)
+    triangles["corners"] = np.concatenate(parts)
+    a, b, c = np.moveaxis(triangles["corners"].astype(float), 1, 0)
+    across = np.cross(b - a, c - a)
+    triangles["normal"] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    with writing(path):
+        path.write_bytes(b"fenwear".ljust(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes())
+
+
+def facing_outward(surface: ContactSurface) -> NDArray[np.int64]:
+    """Return the pressure nodes around each linear facet (f, k), counter-clockwise as seen from outside the body.
+
+    Of a line the second node is where the first one sees it to its left along y, so that pulled along y it looks out.
+    """
+    cells = surface_cells(surface)
+    out, x = surface.outward[cells].mean(axis=1), surface.unworn[cells]
+    if surface.dim == 2:
+        along = x[:, 1] - x[:, 0]
+        looks = along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0]
+    else:
+        looks = np.einsum("fi,fi->f", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), out)
+    return np.where(looks[:, None] < 0, cells[:, ::-1], cells)
+
+
+VTK_CELLS = {2: "LINES", 3: "POLYGONS", 4: "POLYGONS"}
+
+
+def export_worn(directory: Path, folder: Path | None = None, at: str = "last") -> list[Path]:
+    """Write the worn surfaces of a run: worn_BODY.csv, .stl and .vtk of each body that wears; collective.
+
+    Args:
+        directory: Of the run.
+        folder: Where to; by default `export` in the run's.
+        at: The kept half-cycle, a number, first or last.
+
+    Returns:
+        The files.
+
+    Raises:
+        CaseError: there is no readable run, or the half-cycle was not kept.
+        OutputError: a file cannot be written.
+    """
+    comm = MPI.COMM_WORLD
+    case = load_case(directory / CASE)
+    depths = on_root(comm, lambda: _depths(directory, at))
+    placed = place_case(case, comm)
+    target = directory / FOLDER if folder is None else folder
+    surfaces = {"punch": placed.pair.punch, "strip": placed.pair.strip}
+
+    def write() -> list[Path]:
+        with writing(target):
+            target.mkdir(parents=True, exist_ok=True)
+        return [
+            path
+            for body, depth in depths.items()
+            if getattr(case.wear, body) is not None
+            for path in _written(target / f"worn_{body}", case, surfaces[body], depth)
+        ]
+
+    return on_root(comm, write)
+
+
+def _depths(directory: Path, at: str) -> dict[str, Array]:
+    """Return the worn depths (n,) of the chosen half-cycle of each body, mm."""
+    history = load_history(directory)
+    rows = chosen_rows(history, next(iter(RECORDS)), at)
+    if len(rows) != 1:
+        raise CaseError(InputError("--at", f"expected one half-cycle for worn surfaces, got {at!r}"))
+    names = {"punch": "wear", "strip": "wear_strip"}
+    return {body: np.asarray(history[name][rows[0]].values) for body, name in names.items() if name in history}
+
+
+def _written(stem: Path, case: Case, surface: ContactSurface, depth: Array) -> list[Path]:
+    """Write the files of one surface; return them."""
+    csv, stl, vtk = (stem.with_suffix(suffix) for suffix in (".csv", ".stl", ".vtk"))
+    write_text(csv, profile_text(case.model.kind, profile_of(surface, depth)))
+    write_stl(stl, surface, depth, case.model.thickness if case.model.kind == "plane" else 0.0)
+    write_text(vtk, _vtk(surface, depth))
+    return [csv, stl, vtk]
+
+
+def _vtk(surface: ContactSurface, depth: Array) -> str:
+    """Return a legacy VTK file of the worn surface with the depths at its nodes; in a plane and of rings a line."""
+    worn, cells = surface.unworn - depth[:, None] * surface.outward, facing_outward(surface)
+    x = np.zeros((len(worn), 3))
+    x[:, [0, 2] if surface.dim == 2 else [0, 1, 2]] = worn
+    head = f"# vtk DataFile Version 3.0\nworn surface of the {surface.body}, mm\nASCII\nDATASET POLYDATA"
+    points = _rows(x)
+    size = cells.shape[1]
+    lines = _rows(np.column_stack([np.full(len(cells), size), cells]))
+    return (
+        f"{head}\nPOINTS {len(x)} double\n{points}\n{VTK_CELLS[size]} {len(cells)} {(size + 1) * len(cells)}\n{lines}\n"
+        f"POINT_DATA {len(x)}\nSCALARS wear_mm double 1\nLOOKUP_TABLE default\n{_rows(depth[:, None])}\n"
+    )
+
+
+def _rows(values: Array | NDArray[np.int64]) -> str:
+    return "\n".join(" ".join(f"{value:.10g}" for value in row) for row in values)

@@ -30,10 +30,9 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
 from fenwear.results import netcdf
-from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import check_room, writing
-from fenwear.results.series import step_of
-from fenwear.results.vtkhdf import append
+from fenwear.results.quantity import KELVIN, degrees_of
+from fenwear.results.vtkhdf import append, step_of
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:

@@ -23,14 +23,12 @@ from fenwear.case import Case
 from fenwear.case.program import stages_of
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
-from fenwear.results import roughness, steps, table_cycle
-from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
+from fenwear.results import roughness, steps
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.netcdf import Netcdf
-from fenwear.results.quantity import Variable, computed
+from fenwear.results.quantity import KELVIN, Variable, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
-from fenwear.results.scar import conforming
-from fenwear.results.surfaces import Column, on_mesh, part_columns, surface_columns
+from fenwear.results.surfaces import Column, conforming, on_mesh, part_columns, surface_columns
 from fenwear.stack import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -80,7 +78,6 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
             **surface_columns(system),
             **part_columns(system, plane=False),
             **steps.columns(system),
-            **table_cycle.columns(system),
             **roughness.columns(system),
         }
     arc = pair.punch.arc is not None

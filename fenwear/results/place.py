@@ -1,4 +1,9 @@
-"""Where bodies find their place: how far each free motion has gone, and a shaft's eccentricity in its bore.
+"""What contact nodes carry in space: the force on the punch at node i is A_i p_i (e_n + tau)_i, A_i its area.
+
+tau is the traction of friction over the pressure. Both are those of the middle position of a half-cycle, as all of its
+records are.
+
+Where bodies find their place: how far each free motion has gone, and a shaft's eccentricity in its bore.
 
 A body that supports leave free moves until pressure and friction balance its loads. Its motion is that of the surfaces
 on which its loads act, in the mean, against where it was meshed (of its whole volume where none acts). Of a shaft in a
@@ -21,9 +26,17 @@ from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
-from fenwear.results.forces import node_forces
 from fenwear.results.quantity import Variable
 from fenwear.sliding.wear import WornDepths
+
+
+def node_forces(block: Block) -> Array:
+    """Return the forces on the punch at the contact nodes in each half-cycle of a block (k, n, d), N."""
+    system = block.system
+    area = system.bodies.punch.thickness * system.pair.weights
+    traction = system.pair.normal + np.array(block.friction_ratio)
+    return np.asarray((area * block.pressure)[:, :, None] * traction)
+
 
 TRUE = 1e-3  # of the radius: how far the points of a round surface may be from a circle
 ARC = 2.5  # radius over the chord of the contact, up to which it is round

@@ -1,4 +1,7 @@
-"""Open what a run has left."""
+"""Histories read back: of a run's folder with the present names, by cycles with their time steps, or of blocks.
+
+`to_dataset` has the blocks of a run as one dataset, with the names, units and words of history.nc.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,17 @@ from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
-from fenwear.results.history import HISTORY
+from fenwear.results.history import HISTORY, columns_of, rows_of, variables_of
 from fenwear.results.netcdf import load
+from fenwear.results.quantity import KELVIN, RECORD, degrees_of, reduced
+from fenwear.results.registry import known
+from fenwear.results.steps import STEP
+from fenwear.results.surfaces import conforming
 
 if TYPE_CHECKING:
     import xarray
@@ -40,13 +51,13 @@ OLDER = (
 )
 
 
-def load_history(directory: Path) -> xarray.Dataset:
+def load_history(directory: Path | str) -> xarray.Dataset:
     """Return all of history.nc of a run, in memory.
 
     Raises:
         CaseError: there is none, it cannot be read, or it is of a version whose names meant something else.
     """
-    path = directory / HISTORY
+    path = Path(directory) / HISTORY
     try:
         history = load(path)
     except (OSError, ValueError) as error:
@@ -98,3 +109,101 @@ def is_older(names: Iterable[Hashable]) -> bool:
 def _unreadable(path: Path, error: Exception) -> CaseError:
     reason = "there is no such file" if isinstance(error, FileNotFoundError) else str(error)
     return CaseError(InputError(str(path), f"no readable history of a run: {reason}"))
+
+
+STEPS = {"displacement": "displacement", "tangential_force": "tangential_force", "pressure": "step_pressure",
+         "traction": "traction", "traction_across": "traction_across", "slip": "slip", "slip_across": "slip_across",
+         "stick": "stick", "surface_stress": "surface_stress", "temperature_punch": "step_temperature_punch",
+         "temperature_strip": "step_temperature_strip"}  # fmt: skip
+
+
+def resolves(history: xarray.Dataset) -> bool:
+    """Return whether a history has the time steps of its half-cycles."""
+    return STEP in history.sizes and "step_fraction" in history
+
+
+def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
+    """Return the whole cycles of a history with time steps, each with all of its steps one after the other.
+
+    Dimensions are `cycle`, whose coordinate is the number of cycles done, `step` and those of the nodes; cycles of
+    fewer steps than others end in NaN (`cycle_at`). Other variables are reduced to one value of each cycle as the
+    registry says: depths and totals at its end, increments added up, pressures and errors the largest.
+    """
+    import xarray  # with pandas, half a second that commands without tables spare themselves
+
+    numbers = history.half_cycle.values.astype(int)
+    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
+    last = np.flatnonzero(numbers % strokes == 0)
+    last = last[last >= strokes - 1]
+    last = last[numbers[last] - numbers[last - strokes + 1] == strokes - 1]
+    rows = last[:, None] + np.arange(-strokes + 1, 1)  # (cycles, strokes)
+    there = np.isfinite(history.step_fraction.values[rows]).reshape(len(rows), -1)  # (cycles, strokes * steps)
+    order = np.argsort(~there, axis=1, kind="stable")[:, : there.sum(axis=1).max(initial=0)]
+    data: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]] = {}
+
+    def one_after_the_other(values: NDArray[Any]) -> NDArray[Any]:
+        inner = values.shape[3:]
+        return np.take_along_axis(
+            values.reshape(len(rows), -1, *inner), order.reshape(*order.shape, *[1] * len(inner)), 1
+        )
+
+    def put(name: str, over: tuple[str, ...], values: NDArray[Any], of: str) -> None:
+        kept = {key: value for key, value in history[of].attrs.items() if key not in ("coordinates",)}
+        data[name] = (over, values, kept)
+
+    for name, of in STEPS.items():
+        if of in history:
+            found = one_after_the_other(history[of].values[rows])
+            put(name, ("cycle", STEP, *map(str, history[of].dims[2:])), found, of)
+    data["stick"] = (data["stick"][0], np.nan_to_num(data["stick"][1]).astype(np.int8), data["stick"][2])
+    for name, one in history.data_vars.items():
+        if one.dims[:1] == RECORD and STEP not in one.dims and name != "weight" and str(name) not in data:
+            values = reduced(one.values[rows], known(str(name)).cycle)
+            put(str(name), ("cycle", *map(str, one.dims[1:])), values, str(name))
+    fixed = {name: one for name, one in history.variables.items() if "half_cycle" not in one.dims and name != STEP}
+    weight = history.weight.isel(half_cycle=-1, drop=True)
+    half = np.where(there, np.repeat(np.arange(1, strokes + 1), history.sizes[STEP]), 0).reshape(*rows.shape, -1)
+    fractions = one_after_the_other(history.step_fraction.values[rows])
+    coordinates = {
+        "cycle": ("cycle", numbers[last] // strokes, {"units": "1", "long_name": "cycles done"}),
+        "fraction": (("cycle", STEP), fractions, history.step_fraction.attrs),
+        "half_cycle_of_step": (("cycle", STEP), one_after_the_other(half), {"units": "1", "long_name": "half-cycle"}),
+        **{str(name): (one.dims, one.values, one.attrs) for name, one in fixed.items()},
+        "weight": (weight.dims, weight.values, weight.attrs),
+    }
+    return xarray.Dataset(data, coordinates, history.attrs)
+
+
+def cycle_at(history: xarray.Dataset, place: int) -> xarray.Dataset:
+    """Return one cycle of `by_cycles` with all of its own time steps."""
+    cycle = history.isel(cycle=place)
+    return cycle.isel({STEP: np.isfinite(cycle.fraction.values)})
+
+
+def to_dataset(blocks: Block | Iterable[Block]) -> xarray.Dataset:
+    """Return all half-cycles of blocks as a dataset, as `read_history` returns those of a run.
+
+    Args:
+        blocks: One, or those that `march`, `jump` or `evolve` yield, in their order.
+
+    Raises:
+        CaseError: there is no block.
+    """
+    import xarray
+
+    found = [blocks] if isinstance(blocks, Block) else list(blocks)
+    if not found:
+        raise CaseError(InputError("blocks", "expected at least one: no half-cycle was computed"))
+    system = found[0].system
+    variables, degrees = variables_of(system), degrees_of(system.case)
+    parts = [rows_of(block, variables) for block in found]
+    data = {name: (c.dimensions, c.values, dict(c.attributes)) for name, c in columns_of(system).items()}
+    for name, (dimensions, unit, text) in variables.items():
+        values = np.concatenate([part[name] for part in parts])
+        if unit == KELVIN.unit:
+            values, unit = degrees.of(values), degrees.unit  # noqa: PLW2901
+        data[name] = (dimensions, values, {"units": unit, "long_name": text})
+    attributes = {"title": system.case.title or "fenwear run", "conforming": int(conforming(system.pair))}
+    if system.case.model.kind != "plane":
+        attributes["model"] = system.case.model.kind
+    return xarray.Dataset(data, attrs=attributes).set_coords([name for name in data if name in ("x", "half_cycle")])

@@ -21,7 +21,7 @@ from fenwear.cycle.state import known_pressures
 from fenwear.cycle.steady_cycle import SteadyCycle
 from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.interface import is_translation
-from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
+from fenwear.results import between, place, roughness, sheet, steps
 from fenwear.results.quantity import RECORD, InTable, Quantity
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ OF_BODIES = (
     *("creep_volume", "largest_creep_depth", "worn_through_of_scar", "worn_through_of_surface", "least_coating"),
     *("roughness_Sa", "roughness_Sq"),
 )
-ROOMS = (between, coating, creep, place, roughness, steps, table_cycle)
+ROOMS = (between, place, roughness, steps)
 
 
 def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
@@ -212,8 +212,8 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
 @cache
 def _prototypes() -> dict[str, Quantity]:
     rooms = {**place.ECCENTRICITY, **steps.VARIABLES, **steps.of_solids(), **between.OF_DEBRIS, **between.OF_FLOW}
-    rooms |= {name: one for body in sheet.BODIES for name, one in {**creep.of_member(body), **coating.of_body(body),
-              **roughness.of_body(body)}.items()}  # fmt: skip
+    for body in sheet.BODIES:
+        rooms |= {**between.of_creeping(body), **between.of_coated(body), **roughness.of_body(body)}
     listed = [*IN_RUN, *OF_STRIP, *OF_PROGRAM, *OF_HEAT, *OF_TRACK, *sheet.SLIDING, *sheet.TURNING]
     for body in sheet.BODIES:
         listed += [*sheet.of_a_body(body), *sheet.of_a_plane_body(body)]
@@ -223,17 +223,20 @@ def _prototypes() -> dict[str, Quantity]:
     return {one.name: one for one in listed}
 
 
-def known(name: str) -> Quantity | None:
-    """Return the quantity of a name that some system has; None where none does."""
+UNKNOWN = Quantity("", ("unknown",), "1", "", attrgetter(""))
+
+
+def known(name: str) -> Quantity:
+    """Return the quantity of a name that some system has; `UNKNOWN`, which has no name, where none does."""
     motion, mode = re.fullmatch(r"(moved|turned)_([xyz])(_\w+)?", name), re.fullmatch(r"lambda_[FM]\w*", name)
-    if motion is not None:
+    if motion:
         text = f"how far a body has {motion[1]} along or about {motion[2]}, from where it was meshed"
         return Quantity(name, RECORD, TURNS[motion[1]], text, attrgetter(name))
-    if mode is not None:
+    if mode:
         unit = "mm" if is_translation(name) else "rad"
         text = "rigid-body wear of the punch in a cycle: its approach, or its rotation"
         return Quantity(name, (), unit, text, attrgetter(name), steady=True)
-    return _prototypes().get(name)
+    return _prototypes().get(name, UNKNOWN)
 
 
 def names_known() -> list[str]:

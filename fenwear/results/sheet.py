@@ -27,8 +27,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
 from fenwear.results.quantity import RECORD, InTable, Quantity, numbers
-from fenwear.results.scar import ScarGeometry, scar_geometry
-from fenwear.results.zone import without_noise
+from fenwear.results.surfaces import ScarGeometry, scar_geometry, without_noise
 
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end

@@ -2,13 +2,18 @@
 
 Half-cycles may have unlike numbers of steps: those with fewer end in NaN. A model of the plane has values along x, in
 a solid they are those along the sliding and across it.
+
+What is told of a cycle that is a table: ways, pressures and cross-shear over it, and wear per million cycles.
+
+Where surfaces slide as a whole the ways are those of the motion. Where nodes stick or slip by themselves they are their
+slips of the last cycle, time step by time step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +23,21 @@ from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.cycle.block import BlockHeat
+from fenwear.cycle.state import known_pressures
 from fenwear.interface import ContactPair
+from fenwear.interface.placement import in_space
 from fenwear.results.quantity import Variable
 from fenwear.results.surfaces import Column
+from fenwear.sliding.ways import SlidingTensor
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.edge import beside, stick_edges, zone_width
 from fenwear.stick.position import along_sliding, directions
 
 if TYPE_CHECKING:
+    from fenwear.assembly import ContactSetup
     from fenwear.stick.coulomb import Steps
     from fenwear.stick.records import TimeStepRecords
 
-S = TypeVar("S", Block, Tribosystem)
-T = TypeVar("T")
 STEP = "step"
 ROUNDING = 1e-9  # of a share
 VARIABLES: dict[str, Variable] = {
@@ -68,19 +76,7 @@ IN_SOLIDS: dict[str, tuple[str, str, str]] = {
 IN_TURNING = {"displacement": "rad", "tangential_force": "N mm"}  # units where the strip turns
 
 
-def of_time_steps(function: Callable[[S], dict[str, T]]) -> Callable[[S], dict[str, T]]:
-    """Let a function of a system or a block return nothing where the law of contact resolves no time steps."""
-
-    @wraps(function)
-    def resolved(given: S) -> dict[str, T]:
-        system = given.system if isinstance(given, Block) else given
-        return function(given) if system.sticks else {}
-
-    return resolved
-
-
-@of_time_steps
-def variables(system: Tribosystem) -> dict[str, Variable]:
+def _step_variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of time steps of a system whose law resolves them; none of others."""
     found = {**VARIABLES, **(HEAT_VARIABLES if system.exchange.conducts else {})}
     if system.pair.punch.dim == 3:
@@ -96,8 +92,7 @@ def of_solids() -> dict[str, Variable]:
     return {**found, **ACROSS}
 
 
-@of_time_steps
-def columns(system: Tribosystem) -> dict[str, Column]:
+def _step_columns(system: Tribosystem) -> dict[str, Column]:
     """Return what of time steps does not change in a run."""
     pair, position = system.pair, system.law_state.problem.interface.middle
     none = Column((STEP,), np.arange(1, most(system) + 1), {"units": "1", "long_name": "time step of the half-cycle"})
@@ -116,9 +111,10 @@ def columns(system: Tribosystem) -> dict[str, Column]:
     }
 
 
-@of_time_steps
 def attributes(system: Tribosystem) -> dict[str, Any]:
-    """Return what a history says of a law that resolves half-cycles."""
+    """Return what a history says of a law that resolves half-cycles; nothing of others."""
+    if not system.sticks:
+        return {}
     problem = system.law_state.problem
     return {"law": system.law, "friction": float(problem.friction[0]), "period": problem.program.period}
 
@@ -128,8 +124,7 @@ def most(system: Tribosystem) -> int:
     return int(np.bincount([step.half_cycle for step in system.law_state.problem.program.steps]).max())
 
 
-@of_time_steps
-def values(block: Block) -> dict[str, NDArray[Any]]:
+def _step_values(block: Block) -> dict[str, NDArray[Any]]:
     """Return the time steps of a block's half-cycles by name: (k, ...), padded with NaN."""
     system = block.system
     rows = [_row(system, steps) for steps in steps_of(block)]
@@ -242,11 +237,10 @@ OF_CYCLE = {
 }
 
 
-@of_time_steps
 def of_cycle(last: Block) -> dict[str, float]:
     """Return the numbers of the time steps of the last cycle, by `OF_CYCLE`; none of a law without them."""
     system = last.system
-    found = values(last)
+    found = _step_values(last)
     cycle = slice(-system.motion.half_cycles, None)
     traction = np.abs(found["traction"][cycle])
     if system.pair.punch.dim == 3:
@@ -269,9 +263,10 @@ def names_of_cycle(system: Tribosystem) -> list[str]:
     return [name for name in OF_CYCLE if name != other] if system.sticks else []
 
 
-@of_time_steps
 def extremes(block: Block) -> dict[str, float]:
-    """Return what is largest over the time steps of a block, by the names of a run's extremes."""
+    """Return what is largest over the time steps of a block, by the names of a run's extremes; nothing without them."""
+    if not block.system.sticks:
+        return {}
     weights = block.system.law_state.problem.weights
     steps = steps_of(block)
     return {
@@ -285,3 +280,167 @@ def hottest(block: Block, heat: BlockHeat) -> Array:
     if not block.system.sticks:
         return heat.largest_temperature
     return np.array([one.records.temperature.max() for one in steps_of(block)])
+
+
+MILLION = 1e6
+
+
+@dataclass(frozen=True)
+class TableCycle:
+    """The last cycle of a block.
+
+    Attributes:
+        ways: What each contact node slides in it (n,), mm.
+        pressure: Of its phases or time steps (m, n), MPa.
+        worn: What it wears off both bodies.
+        tensors: Of the sliding of the punch's and the strip's material, of the work.
+    """
+
+    ways: Array
+    pressure: Array
+    worn: WornDepths
+    tensors: tuple[SlidingTensor, SlidingTensor]
+
+
+def table_cycle(last: Block) -> TableCycle | None:
+    """Return the last cycle of a block; None where it is no table, or where not all of it is known."""
+    system = last.system
+    if not system.motion.steps:
+        return None
+    if system.sticks:
+        return _of_time_steps(last, steps_of(last)[-1])
+    pressure = known_pressures(last.end.contacts)
+    if pressure is None:
+        return None
+    end, shear = last.end, system.ways.shear(pressure)
+    states = [
+        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
+        for k, own in enumerate(pressure)
+    ]
+    tensors = system.ways.tensor(pressure), system.ways.tensor_of_strip(pressure)
+    worn = system.wear.phases(states).begun(end.worn).worn(pressure)
+    return TableCycle(system.path.sum(axis=0), pressure, worn, tensors)
+
+
+def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
+    """Return the cycle of time steps, in which nodes that are open slide nothing."""
+    records, problem, pair = steps.records, last.system.law_state.problem, last.system.pair
+    slip = np.where(records.pressure[:, :, None] > 0, records.slip, 0.0)
+    ways, values, on_strip = np.linalg.norm(slip, axis=2), [], np.zeros((len(pair.strip.weights), 9))
+    for k, own in enumerate(slip):
+        place = problem.program.steps[(steps.first + k) % len(problem.program.steps)].offset
+        position = problem.interface.position(place)
+        vectors = in_space(np.einsum("nmc,nm->nc", position.frame[:, 1:], own))
+        scale = np.divide(records.pressure[k], ways[k], out=np.zeros_like(ways[k]), where=ways[k] > 0)
+        values.append(scale[:, None, None] * vectors[:, :, None] * vectors[:, None, :])
+        back = in_space(position.pair.placement.back(vectors if pair.punch.dim == 3 else vectors[:, [0, 2]]))
+        squares = scale[:, None, None] * back[:, :, None] * back[:, None, :]
+        on_strip += position.pair.wear_projection @ squares.reshape(-1, 9)
+    tensors = SlidingTensor(np.sum(values, axis=0)), SlidingTensor(on_strip.reshape(-1, 3, 3))
+    return TableCycle(ways.sum(axis=0), records.pressure, steps.wear, tensors)
+
+
+PRINCIPAL = tuple(f"principal_{axis}" for axis in "xyz")
+
+
+_OVER = ("half_cycle", "x")
+_MOST = "direction with most of the work of friction in a cycle"
+TABLE_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "cross_shear": (_OVER, "1", "cross-shear ratio of a cycle on the punch: share of the work across its direction"),
+    **{name: (_OVER, "1", f"{_MOST}, along {name[-1]}") for name in PRINCIPAL},
+}
+
+
+def _table_variables(placed: ContactSetup) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """Return the variables of a history of solids that slide in directions of their own at each place."""
+    return TABLE_VARIABLES if placed.slides_many_ways else {}
+
+
+def _table_values(block: Block) -> dict[str, Array]:
+    """Return them of each half-cycle of a block (k, n)."""
+    if not block.sliding:
+        return {}
+    directions = np.array([one.direction for one in block.sliding])
+    return {
+        "cross_shear": np.array([one.ratio for one in block.sliding]),
+        **dict(zip(PRINCIPAL, np.moveaxis(directions, 2, 0), strict=True)),
+    }
+
+
+def _table_columns(placed: ContactSetup) -> dict[str, Column]:
+    """Return what each place slides in each step of a table, and the tracks of the strip's material."""
+    if not placed.slides_many_ways:
+        return {}
+    ways = placed.ways
+    slid = ways.lengths[:, :, None] * ways.directions
+    return {
+        "slid": Column(
+            ("table_step", "node", "axis"),
+            slid,
+            {"units": "mm", "long_name": "way of the strip past each node in each step of the table: x, y and z"},
+        ),
+        "track": Column(
+            ("table_row", "node", "axis"),
+            _tracks(placed),
+            {
+                "units": "mm",
+                "long_name": "where the strip's material is, at each node at first, in each row of the table",
+            },
+        ),
+    }
+
+
+def _tracks(placed: ContactSetup) -> Array:
+    """Return the places of the strip's material that lies at each node of the punch in the first row (rows, n, 3)."""
+    x, screws = placed.pair.punch.x, [phase.way for phase in placed.motion.phases if phase.way is not None]
+    material = screws[0].at(0.0).points_back(x)
+    return np.array([x, *(screw.at(1.0).points(material) for screw in screws)])
+
+
+def sliding_numbers(last: Block) -> dict[str, float]:
+    """Return those of the last cycle for the sheet, or nothing where it is no table."""
+    cycle = table_cycle(last)
+    if cycle is None:
+        return {}
+    areas = last.system.pair.weights * (cycle.pressure.max(axis=0) > 0 if last.system.sticks else 1.0)
+    return {
+        "mean_way_of_cycle_mm": float(areas @ cycle.ways / areas.sum()),
+        "largest_way_of_cycle_mm": float(cycle.ways.max()),
+    }
+
+
+def body_numbers(last: Block, body: str) -> dict[str, float]:
+    """Return those of a body that wears, "punch" or "strip", by the wear of the last cycle; or nothing."""
+    cycle, pair = table_cycle(last), last.system.pair
+    if cycle is None:
+        return {}
+    depth: Array = getattr(cycle.worn, body)
+    areas = last.system.bodies.punch.thickness * (pair.weights if body == "punch" else pair.strip.weights)
+    return {
+        "worn_volume_per_million_cycles_mm3": MILLION * float(areas @ depth),
+        "depth_per_million_cycles_mm": MILLION * float(depth.max()),
+        **_cross_shear(cycle.tensors[body == "strip"], areas),
+    }
+
+
+def _cross_shear(tensor: SlidingTensor, areas: Array) -> Mapping[str, float]:
+    """Return the mean over the work of friction, and the largest where there is a hundredth of the largest work."""
+    work, ratio = tensor.work, tensor.ratio
+    rubbed = work > 0.01 * work.max(initial=0.0)
+    mean = float(areas * work @ ratio) / max(float(areas @ work), 1e-300)
+    return {"mean_cross_shear": mean, "largest_cross_shear": float(np.max(ratio, where=rubbed, initial=0.0))}
+
+
+def variables(system: Tribosystem) -> dict[str, Variable]:
+    """Return the variables of time steps, and of a cycle that is a table."""
+    return {**(_step_variables(system) if system.sticks else {}), **_table_variables(system)}
+
+
+def values(block: Block) -> dict[str, NDArray[Any]]:
+    """Return the values of these variables for each half-cycle of a block (k, ...)."""
+    return {**(_step_values(block) if block.system.sticks else {}), **_table_values(block)}
+
+
+def columns(system: Tribosystem) -> dict[str, Column]:
+    """Return what of time steps and of tables does not change in a run."""
+    return {**(_step_columns(system) if system.sticks else {}), **_table_columns(system)}

@@ -1,26 +1,200 @@
-"""The key numbers of a run, as summary.json has them."""
+"""The largest pressure that contacts between curved surfaces settle under elastically: their shakedown limit.
+
+Under a contact that rolls or slides to and fro, what yields at first leaves residual stresses by which the rest is
+carried elastically, as long as the largest pressure p_0 is at most 4 k in line contact and 4.7 k in point contact. k is
+the yield stress in shear, by von Mises that in tension over sqrt(3) (K. L. Johnson, Contact Mechanics, 1985, 9.1, 9.2;
+A. R. S. Ponter et al., J. Mech. Phys. Solids 33, 1985, 339). These are the limits without friction
+and hardening: friction lowers them, hardening raises them. Beyond them the surface flows in every cycle.
+
+The sheet of each named contact, as summary.json has it beside that of all contacts together.
+
+A geometry names them by its groups, punch_contact_NAME and strip_contact_NAME. What a contact carries is told on the
+punch's surface; what is worn off the punch or the strip on the surface of either that has the name. The volume metered
+of a body is shared among its contacts as the integrals of its depths are.
+
+The key numbers of a run, as summary.json has them.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import ContactSetup, Tribosystem
+from fenwear.bodies.supports import axes
+from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.cycle.totals import approach
+from fenwear.cycle.steady_cycle import SteadyCycle
+from fenwear.cycle.totals import SUMS, approach
 from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.results import between, place, sheet, table_cycle
-from fenwear.results.contacts import CONTACTS, contact_sheets
-from fenwear.results.degrees import degrees_of
-from fenwear.results.quantity import numbers
+from fenwear.results import between, place, sheet, steps
+from fenwear.results.place import node_forces
+from fenwear.results.quantity import degrees_of, numbers
 from fenwear.results.registry import quantities_of
-from fenwear.results.scar import conforming
-from fenwear.results.shakedown import shakedown_limit
-from fenwear.results.surfaces import at_places
-from fenwear.results.zone import ContactNet, contact_net, without_noise
+from fenwear.results.surfaces import ContactNet, at_places, conforming, contact_net, without_noise
+from fenwear.sliding.wear import WornDepths
 from fenwear.stack import versions
+
+LINE, POINT = 4.0, 4.7  # p_0 / k
+
+
+def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
+    """Return the limit, MPa, and the material that has it; None for conforming surfaces, or without a yield stress."""
+    case = placed.case
+    if conforming(placed.pair):
+        return None
+    punch, strip = placed.bodies.regions
+    used = case.punch.materials_at(punch) | case.strip.materials_at(strip)
+    known = {name: case.materials[name].yield_stress for name in sorted(used)}
+    given = {name: value for name, value in known.items() if value is not None}
+    if not given:
+        return None
+    softest = min(given, key=lambda name: given[name])
+    return float(factor(placed) * given[softest] / np.sqrt(3)), softest
+
+
+def factor(placed: ContactSetup) -> float:
+    """Return p_0 / k: in space of a point, else of a line."""
+    return POINT if placed.pair.punch.dim == 3 else LINE
+
+
+CONTACTS = "contacts"  # the table of summary.json
+SCARS = [key for key in sheet.LINES if key.startswith("scar_")]
+OF_BODIES = ("worn_volume_mm3", "largest_depth_mm", *(f"largest_depth_at_{axis}_mm" for axis in sheet.PLACES), *SCARS)
+PLACES = {"eccentricity_mm": "eccentricity", "attitude_angle_deg": "attitude_angle"}
+R = TypeVar("R", bound=Block | SteadyCycle)
+LINES = {
+    **{f"force_{axis}_N": sheet.Line(f"force on the punch, {axis}", "N") for axis in "xyz"},
+    "pressure_integral_N": sheet.LINES["pressure_integral_N"],
+    **{key: sheet.LINES[key] for key in ("eccentricity_mm", "attitude_angle_deg")},
+    "largest_pressure_MPa": sheet.OF_CONTACT["largest_pressure_MPa"],
+    **{f"largest_pressure_at_{axis}_mm": sheet.OF_CONTACT[f"largest_pressure_at_{axis}_mm"] for axis in "rxyz"},
+    **{key: sheet.OF_CONTACT[key] for key in ("mean_pressure_MPa", "contact_area_mm2")},
+    "friction_work_mJ": sheet.LINES["friction_work_mJ"],
+    "largest_energy_mJ_per_mm2": sheet.LINES["largest_energy_mJ_per_mm2"],
+    **{f"largest_temperature_{unit}": sheet.LINES[f"largest_temperature_{unit}"] for unit in ("K", "degC")},
+    **{
+        f"{body}.{key}": sheet.LINES[key]._replace(label=f"{body}: {sheet.LINES[key].label}")
+        for body in sheet.BODIES
+        for key in (
+            "worn_volume_mm3",
+            "largest_depth_mm",
+            *(f"largest_depth_at_{axis}_mm" for axis in sheet.PLACES),
+            *SCARS,
+        )
+    },
+}
+
+
+def within(records: R, contact: str, rate: WornDepths) -> R:
+    """Return records of half-cycles with nothing that presses, wears or is warm beyond a named contact.
+
+    Args:
+        records: A block, or a steady cycle.
+        contact: The name.
+        rate: Depths worn in a cycle, by which the volumes that half-cycles add are shared.
+    """
+    pair, heat = records.system.pair, records.heat
+    own = pair.punch.nodes_of(contact)
+    if heat is not None:
+        sides = (heat.temperature_punch, heat.temperature_strip)
+        warm = [np.where(own, side, -np.inf) for side in sides]
+        heat = replace(heat, temperature_punch=warm[0], temperature_strip=warm[1])
+    adds, changed = records.adds.sums.copy(), dict[str, Any]()
+    if isinstance(records, Block):
+        sums = records.totals.sums.copy()
+        depths = {"wear": records.wear, "wear_strip": records.wear_strip}
+        changed["totals"] = replace(records.totals, sums=sums, energy=np.where(own, records.totals.energy, 0.0))
+    for body, surface in (("punch", pair.punch), ("strip", pair.strip)):
+        if contact in surface.names:
+            nodes, volume = surface.nodes_of(contact), SUMS.index(f"volume_{body}")
+            adds[:, volume] *= _share(surface.weights, getattr(rate, body), nodes)
+            if isinstance(records, Block):
+                key = f"wear{sheet.BODIES[body]}"
+                sums[:, volume] *= _share(surface.weights, depths[key], nodes)
+                changed[key] = np.where(nodes, depths[key], 0.0)
+    pressure = np.where(own, records.pressure, 0.0)
+    return replace(records, pressure=pressure, heat=heat, adds=replace(records.adds, sums=adds), **changed)
+
+
+def _share(weights: Array, depth: Array, nodes: Mask) -> Array:
+    """Return the share of the integral of depths (..., n) that is of some nodes (...)."""
+    whole = np.asarray(depth @ weights)
+    return np.asarray(np.where(nodes, depth, 0.0) @ weights / np.where(whole > 0, whole, 1.0))
+
+
+def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
+    """Return the sheet of each named contact at the end of a run, by their names; empty where none has one.
+
+    Forces, means, largest pressures and areas are of the last cycle.
+    """
+    pair, found, known = last.system.pair, dict[str, dict[str, Any]](), quantities_of(last.system)
+    rate = WornDepths(last.wear[-1], last.wear_strip[-1])
+    for name in dict.fromkeys((*pair.punch.names, *pair.strip.names)):
+        own = found.setdefault(name, {})
+        part = last if name not in pair.punch.names else within(last, name, rate)
+        if name in pair.punch.names:
+            own |= _carried(part, name)
+        for body in sheet.BODIES:
+            if name in getattr(pair, body).names and (worn := sheet.body_numbers(part, body, known.values())):
+                own[body] = {key: value for key, value in worn.items() if key in OF_BODIES}
+    return found
+
+
+def _carried(part: Block, name: str) -> dict[str, Any]:
+    """Return what a named contact carries, rubs and warms to."""
+    system, degrees = part.system, degrees_of(part.system.case)
+    own = system.pair.punch.nodes_of(name)
+    area = system.bodies.punch.thickness * system.pair.weights
+    energy, largest = part.totals.energy[-1], part.pressure[-system.motion.half_cycles :].max(axis=0)
+    where = without_noise(system.pair.punch.x[largest.argmax()], system.pair.punch.extent())
+    known = quantities_of(system)
+    found = {
+        **_force(part, own),
+        **{known[one].key: float(known[one].of_cycle(part)) for one in ("pressure_integral", "largest_pressure")},
+        **{f"largest_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), where, strict=False)},
+        **{known[one].key: float(known[one].of_cycle(part)) for one in ("mean_pressure", "contact_area")},
+        "friction_work_mJ": float(area @ energy),
+        "largest_energy_mJ_per_mm2": float(energy.max()),
+        **{key: float(known[of].of_cycle(part)) for key, at in PLACES.items() if (of := f"{at}_{name}") in known},
+    }
+    if "largest_temperature" in known:
+        warmest = float(known["largest_temperature"].of_cycle(part))
+        found[f"largest_temperature_{degrees.unit}"] = warmest - degrees.zero
+    return found
+
+
+def _force(last: Block, own: Mask) -> dict[str, float]:
+    """Return the force on the punch of contact nodes (n,) of one contact, mean of the last cycle; of rings along z."""
+    system, cycle = last.system, slice(-last.system.motion.half_cycles, None)
+    force = node_forces(last)[cycle][:, own].sum(axis=1).mean(axis=0)
+    force = without_noise(force, float(np.linalg.norm(force)))
+    along = axes(system.pair.punch.dim)
+    if system.bodies.punch.law.kind == "axisymmetric":
+        along = {"z": 1}
+    return {f"force_{axis}_N": float(force[component]) for axis, component in along.items()}
+
+
+def contact_text(summary: Mapping[str, Any]) -> str:
+    """Return the sheets of a summary's named contacts as lines for people, a column each; "" where it has none."""
+    contacts = summary.get(CONTACTS, {})
+    columns = [
+        one | {f"{body}.{key}": value for body in sheet.BODIES for key, value in one.get(body, {}).items()}
+        for one in contacts.values()
+    ]
+    names = Names(**summary.get("names", {}))
+    rows = [
+        (names.told(line.heading), [sheet.shown(one.get(key), line) for one in columns])
+        for key, line in LINES.items()
+        if any(key in one for one in columns)
+    ]
+    return sheet.columns_text(list(contacts), rows)
+
 
 # Over a run, and when; at its end it is largest_temperature.
 HOTTEST, HOTTEST_AT = "largest_temperature_of_run", "largest_temperature_of_run_half_cycle"
@@ -57,9 +231,9 @@ def sheet_of(last: Block) -> dict[str, Any]:
     """Return what the registry has for the tables of a summary, and for its top."""
     known = list(quantities_of(last.system).values())
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
-    sliding |= {**numbers(last, "sliding", known), **table_cycle.sliding_numbers(last)}
+    sliding |= {**numbers(last, "sliding", known), **steps.sliding_numbers(last)}
     bodies = {body: sheet.body_numbers(last, body, known) for body in sheet.BODIES}
-    bodies = {body: own | table_cycle.body_numbers(last, body) for body, own in bodies.items() if own}
+    bodies = {body: own | steps.body_numbers(last, body) for body, own in bodies.items() if own}
     states = {between.STATES: found} if (found := between.states(last)) else {}
     return {"sliding": sliding, **bodies, **states, **numbers(last, "end", known)}
 
@@ -82,16 +256,16 @@ def _at(system: Tribosystem, values: NDArray[np.float64]) -> list[float | None]:
     return [None if np.isnan(one) else float(one) for one in found]
 
 
-def nominal_pressure(placed: ContactSetup, load: float) -> float | None:
-    """Return a load (N) over the contact's area as the load sees it, MPa; None where that is no pressure.
+def nominal_pressure(placed: ContactSetup, load: float) -> dict[str, float]:
+    """Return a load (N) over the contact's area as the load sees it, MPa, by its name; nothing where that is none.
 
     So of surfaces that lie on each other before they wear, and of a shaft in a bore: F / (D L).
     """
     if not (conforming(placed.pair) or place.bores_of(placed)):
-        return None
+        return {}
     seen = np.maximum(np.einsum("id,id->i", placed.pair.normal, approach(placed.rigid)), 0.0)
     area = placed.bodies.punch.thickness * float(placed.pair.weights @ seen)
-    return load / area if area > 0 else None
+    return {"nominal_pressure": load / area} if area > 0 else {}
 
 
 def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
@@ -105,7 +279,7 @@ def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     wanted = [known[name] for name in ("half_cycle", "direction", "largest_pressure", "mean_pressure", *sizes)]
     rows = {one.key: np.asarray(one.compute(last))[cycle] for one in wanted}
     plane = system.case.model.kind == "plane"
-    found: dict[str, Any] = {} if nominal is None else {"nominal_pressure_MPa": nominal}
+    found: dict[str, Any] = {f"{name}_MPa": value for name, value in nominal.items()}
     if plane:
         found |= {"x_mm": _places(system).tolist(), "wear_mm": _at(system, last.wear[-1])}
     for k, pressure in enumerate(map(np.asarray, last.pressure[cycle])):

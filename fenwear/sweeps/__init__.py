@@ -5,7 +5,7 @@ computed of one. engines: by this process, local processes or ranks. store: what
 all. picture, command: what `fenwear sweep` shows.
 """
 
-from fenwear.sweeps.axes import Axis, make_axis, parse_axis, read_table
+from fenwear.sweeps.plan import Axis, make_axis, parse_axis, read_table
 from fenwear.sweeps.sweep import sweep
 
 __all__ = ["Axis", "make_axis", "parse_axis", "read_table", "sweep"]

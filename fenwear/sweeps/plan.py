@@ -1,13 +1,18 @@
-"""The variants of a sweep, in the order in which they share most."""
+"""Keys of a case and the values that a sweep gives them.
+
+The variants of a sweep, in the order in which they share most.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, product
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +20,229 @@ import fenwear
 from fenwear.assembly import Preparation, set_up_by
 from fenwear.case import Case, changed_case
 from fenwear.errors import CaseError, InputError
-from fenwear.sweeps.axes import OPTION, Axis, Value, check_keys, settings, value_at
+from fenwear.files.table import TableError
+from fenwear.files.table import read_table as read_rows
+from fenwear.life.keys import numeric_keys, settings_of, value_of
+
+OPTION = "--over"
+MOST_OF_RANGE = 100_000
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key and its values.
+
+    Attributes:
+        key: Path, such as contact.friction.
+        values: Numbers in the internal unit of the key, or texts as in a case file.
+    """
+
+    key: str
+    values: tuple[Value, ...]
+
+    def setting(self, value: Value) -> str:
+        """Return the override `key.path=value`."""
+        return f"{self.key}={str(value).lower() if isinstance(value, bool) else value}"
+
+
+def make_axis(case: Case, key: str, values: object) -> Axis:
+    """Return a key with its values.
+
+    Args:
+        case: The case that is varied.
+        key: Its path.
+        values: A text as behind --over; or numbers, in the internal unit of the key, and texts.
+
+    Raises:
+        CaseError: there are no values, or a range is none.
+    """
+    if isinstance(values, str):
+        return parse_axis(case, f"{key}={values}")
+    given = list(np.atleast_1d(values)) if isinstance(values, np.ndarray) else _listed(key, values)
+    found: list[Value] = []
+    for value in given:
+        plain = value.item() if isinstance(value, np.generic) else value
+        if isinstance(plain, list | tuple):
+            found.append(_toml_list(plain))
+        elif isinstance(plain, bool | int | float | str):
+            found.append(plain)
+        else:
+            raise CaseError(InputError(f"over {key}", "expected numbers or texts"))
+    return _axis(key, found)
+
+
+def _listed(key: str, values: object) -> list[Any]:
+    if isinstance(values, Sequence | range):
+        return list(values)
+    if isinstance(values, bool | int | float):
+        return [values]
+    raise CaseError(InputError(f"over {key}", "expected a list of values or a text such as '0.1:0.3:9'"))
+
+
+def _toml_list(values: Sequence[Any]) -> str:
+    return "[" + ", ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in values) + "]"
+
+
+def parse_axis(case: Case, text: str) -> Axis:
+    """Return a key with its values from a text.
+
+    Args:
+        case: The case that is varied.
+        text: KEY=VALUES; values with commas between them, each a value as in a case file or a range
+            FIRST:LAST:NUMBER, with :log behind it where their ratio is to be the same.
+
+    Raises:
+        CaseError: it is not of this form, or a range is empty.
+    """
+    key, equals, listed = (part.strip() for part in text.partition("="))
+    if not equals or not key:
+        raise CaseError(InputError(OPTION, f"expected KEY=VALUES such as contact.friction=0.1:0.3:9, got {text!r}"))
+    values: list[Value] = []
+    for item in _split(listed):
+        if not item:
+            raise CaseError(InputError(f"{OPTION} {key}", f"expected values with commas between them, got {listed!r}"))
+        values += _range(case, key, item) if ":" in item and item[0] not in "\"'[{" else [item]
+    return _axis(key, values)
+
+
+def _split(text: str) -> list[str]:
+    """Return what stands between commas that are in no bracket and no quotation."""
+    return [part.strip() for part in re.split(r",(?![^\[{(]*[\]})])(?=(?:[^\"]*\"[^\"]*\")*[^\"]*$)", text)]
+
+
+def _range(case: Case, key: str, text: str) -> list[Value]:
+    """Return the values of FIRST:LAST:NUMBER[:log]."""
+    about = f"{OPTION} {key}"
+    parts = [part.strip() for part in text.split(":")]
+    wrong = InputError(about, f"expected a range FIRST:LAST:NUMBER such as 0.1:0.3:9, or with :log, got {text!r}")
+    if len(parts) not in (3, 4) or not all(parts) or parts[3:] not in ([], ["log"]) or not parts[2].isdigit():
+        raise CaseError(wrong)
+    number = int(parts[2])
+    if not 1 <= number <= MOST_OF_RANGE:
+        raise CaseError(InputError(about, f"expected 1 to {MOST_OF_RANGE:,} values, got {number:,} in {text!r}"))
+    first, last = (_end(case, key, part) for part in parts[:2])
+    if (number == 1) != (first == last):
+        raise CaseError(InputError(about, f"expected a range that is not empty, got {number} values in {text!r}"))
+    if len(parts) == 4 and not (first > 0 and last > 0):
+        raise CaseError(InputError(about, f"expected ends above 0 for a range of equal ratios, got {text!r}"))
+    values = np.geomspace(first, last, number) if len(parts) == 4 else np.linspace(first, last, number)
+    if not isinstance(first, int) or not isinstance(last, int):
+        return list(map(float, values))
+    if np.abs(values - np.round(values)).max() > 1e-9 * max(abs(first), abs(last)):
+        shown = ", ".join(f"{value:g}" for value in values[:4])
+        raise CaseError(InputError(about, f"expected a range of whole numbers, got {shown}, ... of {text!r}"))
+    return [round(value) for value in values]
+
+
+def _end(case: Case, key: str, text: str) -> float:
+    """Return an end of a range: a whole number where the case has one, else in the key's internal unit."""
+    try:
+        number = float(text)
+    except ValueError:
+        return value_of(case, key, text, OPTION)
+    if key in numeric_keys(case) or not isinstance(value_at(case, key)[0], int):
+        return number
+    return int(number) if number.is_integer() else number
+
+
+def _axis(key: str, values: Sequence[Value]) -> Axis:
+    if not values:
+        raise CaseError(InputError(f"{OPTION} {key}", "expected one value or more"))
+    return Axis(key, tuple(values))
+
+
+def check_keys(axes: Sequence[Axis]) -> None:
+    """Check that no key has two axes.
+
+    Raises:
+        CaseError: there is none, or one key has two or holds another one.
+    """
+    if not axes:
+        raise CaseError(InputError(OPTION, "expected one key or more with its values"))
+    keys = [axis.key for axis in axes]
+    for at, key in enumerate(keys):
+        for other in keys[:at]:
+            if key == other:
+                raise CaseError(InputError(f"{OPTION} {key}", "is given twice; expected all its values in one"))
+            if f"{key}.".startswith(f"{other}.") or f"{other}.".startswith(f"{key}."):
+                raise CaseError(InputError(f"{OPTION} {key}", f"is given together with {other}, one inside the other"))
+
+
+def read_table(path: Path) -> list[Axis]:
+    """Return the keys and values of a table: a heading of keys, then a variant in each row.
+
+    Args:
+        path: A CSV file; values as in a case file, or numbers of the unit that stands in brackets behind the key.
+
+    Raises:
+        CaseError: it cannot be read, or rows have another length than the heading.
+    """
+    try:
+        table = read_rows(path, (), keys=True)
+    except TableError as error:
+        raise CaseError(InputError(str(path), str(error))) from None
+    if not table.rows:
+        raise CaseError(InputError(str(path), "expected a heading of keys and a row for each variant"))
+    heading, units = zip(*(_key_and_unit(head.name) for head in table.heads), strict=True)
+    values = [[f"{text} {unit}".strip() for text, unit in zip(row, units, strict=True)] for row in table.rows]
+    return [Axis(key, column) for key, column in zip(heading, zip(*values, strict=True), strict=True)]
+
+
+def _key_and_unit(name: str) -> tuple[str, str]:
+    found = re.fullmatch(r"\s*([^\s(\[]+)\s*[(\[](.*)[)\]]\s*", name)
+    return (found[1], found[2].strip()) if found else (name.strip(), "")
+
+
+def settings(case: Case, given: Mapping[str, tuple[Axis, Value]]) -> list[str]:
+    """Return the overrides that give keys their values; a wear coefficient keeps its number where an exponent changes.
+
+    Args:
+        case: The case that is varied.
+        given: Axis and value of each key.
+    """
+    known = numeric_keys(case)
+    numbers = {key: number for key, (_, v) in given.items() if key in known and (number := _number(v)) is not None}
+    texts = [axis.setting(value) for key, (axis, value) in given.items() if key not in numbers]
+    return [*settings_of(case, numbers), *texts]
+
+
+def _number(value: Value) -> float | None:
+    """Return a value that is a number without a unit."""
+    try:
+        return None if isinstance(value, bool) else float(value)
+    except ValueError:
+        return None
+
+
+def value_at(case: Case, key: str) -> tuple[Value, str]:
+    """Return what a case has at a key, and its unit; "" where it has nothing."""
+    place: Any = case.resolved()
+    for name in key.split("."):
+        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
+            place = place[int(name)]
+        elif isinstance(place, dict) and name in place:
+            place = place[name]
+        else:
+            return "", ""
+    if isinstance(place, str):
+        number, _, unit = place.partition(" ")
+        try:
+            return float(number), unit
+        except ValueError:
+            return place, ""
+    if isinstance(place, bool):
+        return str(place).lower(), ""
+    return (place, "") if isinstance(place, int | float) else (_words(place), "")
+
+
+def _words(place: Any) -> str:
+    if isinstance(place, list):
+        return "[" + ", ".join(map(_words, place)) + "]"
+    if isinstance(place, dict):
+        return "{" + ", ".join(f"{name} = {_words(value)}" for name, value in place.items()) + "}"
+    return str(place)
+
 
 Of = Literal["steady", "optimum", "run"]
 KINDS: tuple[Of, ...] = ("steady", "optimum", "run")
@@ -30,16 +257,21 @@ class Variant:
     Attributes:
         place: Its indices in the dimensions of the sweep.
         settings: What it changes, as `key.path=value`.
-        case: The case; None where the values do not go together.
-        error: Why they do not.
+        case: The case; that which is varied where the values do not go together.
+        error: Why they do not; None where they do.
         name: Of its kept results: the same for the same case, whatever it is swept with.
     """
 
     place: tuple[int, ...]
     settings: tuple[str, ...]
-    case: Case | None
+    case: Case
     error: CaseError | None = None
     name: str = ""
+
+    @property
+    def possible(self) -> bool:
+        """Whether the values go together."""
+        return self.error is None
 
 
 @dataclass(frozen=True)
@@ -114,7 +346,7 @@ def _variant(
     try:
         changed = changed_case(case, *settings(case, given))
     except CaseError as error:
-        return Variant(own, changes, None, error)
+        return Variant(own, changes, case, error)
     return Variant(own, changes, changed, name=_name(changed, of, files))
 
 
@@ -139,7 +371,7 @@ def _check_values(
     for k, axis in enumerate(axes):
         for at in range(len(axis.values)):
             own = [variant for place, variant in zip(places, variants, strict=True) if place[k] == at]
-            if own[0].error is not None and all(variant.case is None for variant in own):
+            if own[0].error and not any(variant.possible for variant in own):
                 row = f"variant {at + 1}: " if zipped else ""
                 problems |= {InputError(p.key, f"{row}{p.message}"): None for p in own[0].error.problems}
     if problems:
@@ -152,7 +384,7 @@ def _coordinate(
     """Return the values of an axis as the cases have them: numbers in one unit, else texts."""
     found: dict[int, tuple[Value, str]] = {}
     for place, variant in zip(places, variants, strict=True):
-        if variant.case is not None and place[k] not in found:
+        if variant.possible and place[k] not in found:
             found[place[k]] = value_at(variant.case, axis.key)
     values, units = zip(*(found[at] for at in range(len(axis.values))), strict=True)
     if len(set(units)) == 1 and all(isinstance(value, int | float) for value in values):
@@ -170,7 +402,6 @@ def preparation_for(case: Case, of: Of) -> Preparation:
 def _sharing(variant: Variant, of: Of) -> tuple[str, str]:
     """Return what two variants share: the bodies, and with them the steps of their heat."""
     case = variant.case
-    assert case is not None
     heat = (
         None
         if case.heat is None
@@ -189,14 +420,6 @@ def in_pieces(left: Sequence[Variant], of: Of, workers: int) -> list[list[Varian
         longest = pieces.pop()
         if len(longest) < 2:
             return [*pieces, longest]
-        half = _cut([keys[variant.place][1] for variant in longest])
+        half = len(longest) // 2
         pieces += [longest[:half], longest[half:]]
     return sorted(pieces, key=lambda piece: keys[piece[0].place])
-
-
-def _cut(keys: Sequence[str]) -> int:
-    """Return where to cut a piece: near its middle, and if it can be where the heat's steps change."""
-    changes = [k for k in range(1, len(keys)) if keys[k] != keys[k - 1]]
-    middle = len(keys) // 2
-    near = [k for k in changes if abs(k - middle) <= len(keys) // 4]
-    return min(near, key=lambda k: abs(k - middle)) if near else int(np.clip(middle, 1, len(keys) - 1))

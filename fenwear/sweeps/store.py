@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from fenwear.assembly.strokes import make_sliding
 from fenwear.case import Case
-from fenwear.results.degrees import KELVIN, degrees_of
+from fenwear.interface import is_translation
+from fenwear.results import registry
 from fenwear.results.disk import writing
-from fenwear.sweeps.evaluate import Values, meaning
-from fenwear.sweeps.plan import Plan
+from fenwear.results.quantity import KELVIN, RECORD, Quantity, degrees_of
+from fenwear.sweeps.plan import Of, Plan, Variant
 
 if TYPE_CHECKING:
     import pandas
@@ -28,6 +29,42 @@ SECONDS = "seconds"
 NODES = ("x", "y", "weight", "direction")  # coordinates where they are the same in all variants
 SAME = 1e-9  # of their range
 Place = tuple[int, ...]
+Values = Mapping[str, NDArray[np.float64]]
+
+
+def _other(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> Quantity:
+    """Return a quantity of sweeps alone, whose values come with the state."""
+    return Quantity(name, dims, unit, long_name, lambda _: np.nan)
+
+
+# What is not of the registry.
+OTHERS = {
+    one.name: one
+    for one in (
+        _other("x", ("node",), "mm", "position along the contact"),
+        _other("y", ("node",), "mm", "position across the contact"),
+        _other("shape", ("node",), "mm", "worn shape without the rigid motion of the punch"),
+        _other("wear_per_cycle", ("node",), "mm", "depth worn off both bodies in a cycle"),
+        _other("nominal_pressure", (), "MPa", "load over the projected area of the contact"),
+        _other("angle", ("half_cycle", "node"), "rad", "angle chi between the normal and the wear velocity"),
+        _other("half_cycles", (), "", "half-cycles done"),
+        _other("iterations", (), "", "Newton iterations"),
+    )
+}
+
+
+def meaning(name: str, of: Of, case: Case) -> Quantity:
+    """Return what a result is, with its dimensions besides those of the sweep."""
+    if name in OTHERS:
+        return OTHERS[name]
+    found = registry.known(name)
+    if not found.name or name.startswith("lambda_"):
+        unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
+        return _other(name, RECORD if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
+    nodes = tuple("node" for d in found.dims[1:])
+    unit, text = registry.in_model(found, on_surface=case.model.kind != "plane")
+    each = name == "direction" or (found.dims and found.cycle != "last")
+    return _other(name, (*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
 
 
 @dataclass(frozen=True)
@@ -36,13 +73,13 @@ class Outcome:
 
     Attributes:
         place: Of the variant in the sweep.
-        values: Its results; None where it failed.
+        values: Its results; none where it failed.
         trouble: Why it failed.
         seconds: That it took.
     """
 
     place: Place
-    values: Values | None
+    values: Values
     trouble: str
     seconds: float
 
@@ -65,14 +102,15 @@ def keep(folder: Path, name: str, values: Values, seconds: float) -> None:
             raise
 
 
-def kept(folder: Path, name: str) -> tuple[Values, float] | None:
-    """Return the results of a variant and the time they took; None where there are none that can be read."""
+def kept(folder: Path, variant: Variant) -> list[Outcome]:
+    """Return the outcome of a variant that a folder has; none where there is none that can be read."""
     try:
-        with np.load(folder / VARIANTS / f"{name}.npz", allow_pickle=False) as file:
-            values = {key: file[key] for key in file.files}
-            return values, float(values.pop(SECONDS))
+        with np.load(folder / VARIANTS / f"{variant.name}.npz", allow_pickle=False) as file:
+            values = dict(file)
+            seconds = float(values.pop(SECONDS))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
+        return []
+    return [Outcome(variant.place, values, "", seconds)] if variant.possible else []
 
 
 def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarray.Dataset:
@@ -83,7 +121,7 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     """
     sizes = plan.dimensions
     dims, shape = tuple(sizes), tuple(sizes.values())
-    good = {place: one.values for place, one in outcomes.items() if one.values is not None}
+    good = {place: one.values for place, one in outcomes.items() if not one.trouble}
     names = list(dict.fromkeys(name for values in good.values() for name in values))
     data, coordinates = {}, _coordinates(plan)
     for name in names:

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from fenwear import Block, Tribosystem, evolve, march, steady
-from fenwear.accuracy import Quantity, Value, shown, uncertainty, uncertainty_of_steady, values_of
+from fenwear.accuracy import (
+    Quantity,
+    Value,
+    uncertainty,
+    uncertainty_of_steady,
+    uncertainty_table,
+    uncertainty_text,
+    values_of,
+)
 from fenwear.accuracy.jumps import by_short_jumps
 from fenwear.accuracy.told import of_mesh
 from fenwear.accuracy.values import values_of_steady
@@ -106,7 +114,7 @@ def test_linear_elements_have_nothing_below(assembled: Assembled) -> None:
     found = uncertainty(system.case, end_of(system))
     assert "geometry.degree" in found.untold["mesh"]
     assert "wear_steps" in found.contributions
-    text, table = shown.text(system, found), shown.table(system, found)
+    text, table = uncertainty_text(system, found), uncertainty_table(system, found)
     assert "not known" in text
     assert "geometry.degree = 2" in text
     assert "punch" not in table  # a sum without the mesh's part would say nothing

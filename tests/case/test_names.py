@@ -16,7 +16,7 @@ from fenwear.case import Case, changed_case, load_case
 from fenwear.case.names import Names
 from fenwear.errors import CaseError
 from fenwear.life.quantities import parse_quantity
-from fenwear.report.draw import field_figures
+from fenwear.report.bodies import field_figures
 from fenwear.report.key_numbers import read_case
 from fenwear.report.page import page
 from fenwear.results.sheet import sheet_text

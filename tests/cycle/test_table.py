@@ -11,7 +11,7 @@ import pytest
 from fenwear import CaseError, Tribosystem, assemble, evolve, jump, load_case, march, steady
 from fenwear.assembly import place_case
 from fenwear.errors import PIVOTS, ConvergenceError
-from fenwear.results.table_cycle import table_cycle
+from fenwear.results.steps import table_cycle
 from tests.results.test_contacts import COARSE as PADS
 
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -21,7 +21,6 @@ from fenwear.errors import CaseError
 from fenwear.heat.field import HeatState
 from fenwear.life.model import Model
 from fenwear.life.quantities import evaluate, parse_quantity
-from fenwear.life.sensitivity import _method
 from fenwear.sliding.wear import WornDepths
 
 HEIGHTS, FAR, SLOPE = (2.0, 3.0), (90.0, 20.0), 0.02
@@ -383,7 +382,6 @@ def test_derivative_of_a_warm_steady_state() -> None:
     """dT/dmu of Kirchhoff's transform, (sum of k_i(T) / h_i) dT = p v dmu: properties of each state, by differences."""
     mu, p, speed, step = 0.5, 4.0, 400.0, 5e-4
     model, quantity = Model(rubbing(mu, p, speed, degree=2)), parse_quantity("steady temperature")
-    assert _method(model, quantity, None) == "differences"
     low, high = (evaluate(model, quantity, {"contact.friction": mu + sign * step})[0] for sign in (-1, 1))
     top = (low + high) / 2
     exact = p * speed / sum(k0 * (1 + SLOPE * top) / h for k0, h in zip(K0, HEIGHTS, strict=True))

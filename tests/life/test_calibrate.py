@@ -24,10 +24,10 @@ from fenwear.life import (
     calibrate,
     measured_folder,
     read_data,
-    repeated,
 )
 from fenwear.life.keys import nearest_possible
-from fenwear.life.trials import Trials
+from fenwear.life.least_squares import Trials
+from tests.benchmarks.calibration import repeated
 
 BETA, LOAD, AMPLITUDE = 3.926990816987242e-8, 1e4, 1.5
 K, B = "wear.punch.coefficient", "wear.punch.pressure_exponent"
@@ -160,7 +160,7 @@ def test_offset_and_tilt_of_a_trace_are_found(small: Callable[..., Case], profil
 def coverage(problem: LeastSquares, repetitions: int) -> None:
     """Check that 95 % intervals hold the truth so often, within what chance allows; and that errors are as wide."""
     m = len(problem.unknowns)
-    deviations, errors = repeated(problem, [0.0] * m, repetitions)
+    deviations, errors = repeated(problem, repetitions)
     held = (np.abs(deviations) <= stats.norm.ppf(0.975) * errors).sum(axis=0)
     chance = stats.binom(repetitions, 0.95)
     outside = 1e-3 / m  # probability that a right program fails

@@ -67,18 +67,18 @@ def test_an_interrupted_sampling_goes_on(small: Callable[..., Case], tmp_path: P
     case = small("example2")
     scatter = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 50 %)")
     whole = lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, comm=MPI.COMM_SELF)
-    path = tmp_path / "samples.csv"
-    lines = path.read_text().splitlines(keepends=True)
+    path, table = tmp_path / "trials.jsonl", tmp_path / "samples.csv"
+    lines, rows = path.read_text().splitlines(keepends=True), table.read_text()
     path.write_text("".join(lines[:4]) + lines[4][:20])  # the write of the fourth sample was cut short
     told: list[int] = []
     again = lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, resume=True, comm=MPI.COMM_SELF,
                      progress=lambda done, _: told.append(done))  # fmt: skip
     np.testing.assert_array_equal(again.lives, whole.lives)
     assert told[0] == 3
-    assert path.read_text().splitlines() == [line.rstrip() for line in lines]
-    for change, expected in (({"seed": 1}, "another sample"), ({"until": "volume 2 mm^3"}, "another sampling")):
+    assert table.read_text() == rows
+    for change in ({"seed": 1}, {"until": "volume 2 mm^3"}):
         arguments = {"until": UNTIL, "samples": 8, **change}
-        with pytest.raises(CaseError, match=expected):
+        with pytest.raises(CaseError, match=r"--resume: .*trials\.jsonl"):
             lifetime(case, scatter=scatter, folder=tmp_path, resume=True, comm=MPI.COMM_SELF, **arguments)
     with pytest.raises(CaseError, match="exists already"):
         lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, comm=MPI.COMM_SELF)

@@ -18,8 +18,6 @@ from fenwear.life import Model, evaluate, parse_quantity, sensitivity
 from fenwear.life.model import Snapshot, edge_moved
 from fenwear.life.quantities import Path
 
-ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
-            "motion.amplitude")  # fmt: skip
 TWO_WORN = (
     "contact.friction",
     "punch.loads.0.force.1",
@@ -41,26 +39,23 @@ def central(case: Case, text: str, key: str, value: float, relative: float = 1e-
 @pytest.mark.parametrize(
     ("name", "settings", "keys", "quantity"),
     [
-        ("example1", (), ONE_WORN, "steady pressure at 12 mm"),
-        ("example1", (), ONE_WORN, "steady lambda_F"),
-        ("monotonic-lz20", STRIP, TWO_WORN, "steady lambda_F"),
         ("monotonic-lz20", STRIP, TWO_WORN, "steady pressure at 12 mm"),
-        ("example1-heat", (), HOT, "steady pressure at 12 mm"),
         ("example1-heat", (), HOT, "steady temperature"),
     ],
 )
-def test_implicit_derivatives_are_those_of_differences(
+def test_derivatives_of_steady_states(
     small: Callable[..., Case], name: str, settings: tuple[str, ...], keys: tuple[str, ...], quantity: str
 ) -> None:
-    """One and two worn bodies, with and without heat: within 1e-5 of central differences, for five keys."""
+    """Two worn bodies, and heat: within 1e-5 of central differences with other steps, for five keys."""
     case = small(name, *settings)
     found = sensitivity(case, [quantity], keys, spread=0, comm=MPI.COMM_SELF)[0]
     influential = 0
     for row in found.derivatives:
-        assert row.method == "implicit"
+        assert row.method == "differences"
         expected = central(case, quantity, row.key, row.key_value)
         size = abs(found.value / row.key_value)  # derivatives of no influence are small against this
         assert row.derivative == pytest.approx(expected, rel=1e-5, abs=1e-7 * size)
+        assert row.error <= 1e-5 * max(abs(row.derivative), 1e-2 * size)
         influential += abs(row.derivative) > 1e-3 * size
     assert influential >= 2
 
@@ -152,23 +147,20 @@ def test_what_makes_no_sense_is_refused(small: Callable[..., Case], quantity: st
 
 
 @pytest.mark.parametrize(
-    ("law", "keys", "method"),
+    ("law", "keys"),
     [
-        ("coefficient={expression='2e-8 * (1 + x / 100)', unit='1/MPa'}", ("contact.friction",), "implicit"),
         (
             "coefficient={regions={punch_lower=2e-8, punch_upper=1e-8}, unit='1/MPa'}",
             ("wear.punch.coefficient.regions.punch_lower", "contact.friction"),
-            "implicit",
         ),
-        ("pressure_cap='60 MPa'", ("contact.friction", "wear.punch.pressure_cap"), "differences"),
+        ("pressure_cap='60 MPa'", ("contact.friction", "wear.punch.pressure_cap")),
     ],
 )
-def test_laws_that_vary(small: Callable[..., Case], law: str, keys: tuple[str, ...], method: str) -> None:
-    """Place, region and cap: within 1e-3 of central differences, implicitly only where the equations hold."""
+def test_laws_that_vary(small: Callable[..., Case], law: str, keys: tuple[str, ...]) -> None:
+    """Region and cap: within 1e-3 of central differences with other steps."""
     case = small("example1", f"wear.punch.{law}")
     found = sensitivity(case, ["steady pressure at 12 mm"], keys, spread=0, comm=MPI.COMM_SELF)[0]
     for row in found.derivatives:
-        assert row.method == method
         expected = central(case, "steady pressure at 12 mm", row.key, row.key_value)
         assert row.derivative == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(found.value / row.key_value))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenwear.errors import CaseError, InputError
-from fenwear.life.window import over_window
+from fenwear.life.sensitivity import over_window
 
 
 def test_powers_are_exact() -> None:

@@ -12,22 +12,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fenwear import CaseError, load_case
-from fenwear.report.chosen import chosen_formats, chosen_look
-from fenwear.report.course import convergence_figure, heat_balance_figure, peak_figure, scar_figure, volume_figure
-from fenwear.report.draw import draw_figures
-from fenwear.report.figures import (
-    all_figures,
+from fenwear.report.bodies import element_edges
+from fenwear.report.course import course_figure, heat_balance_figure
+from fenwear.report.figures import all_figures, draw_figures, read_history
+from fenwear.report.lines import (
+    LATE,
     chosen_half_cycles,
-    early_half_cycles,
-    mean_pressure_figure,
-    pressure_figure,
-    read_history,
-    shape_figure,
-    temperature_figure,
+    fields_of,
+    lines_figure,
+    pressure_top,
+    profile_figure,
+    wear_map_figure,
+    with_late_pressures,
 )
-from fenwear.report.sections import element_edges
-from fenwear.report.shapes import profile_figure, wear_map_figure
-from fenwear.report.style import COLOURS, Style, shades
+from fenwear.report.style import COLOURS, Style, chosen_formats, chosen_look, shades
 from fenwear.results.reading import load_history
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
@@ -62,22 +60,24 @@ def test_all_figures_are_images(folder: Path, history: xarray.Dataset) -> None:
 
 def test_curves_along_the_contact_are_the_history(history: xarray.Dataset) -> None:
     """What is drawn is what was computed: pressure of each direction, their mean in a cycle, depth in micrometres."""
-    axes = pressure_figure(history, [10, 20]).axes
+    fields = fields_of(history)
+    axes = lines_figure(history, [fields["pressure"]], [10, 20]).axes
     directions = [d for d in (1, -1) if (history.direction == d).any()]
-    assert len(axes) >= len(directions)
+    assert len(axes) == len(directions)
     assert sum(len(_lines(ax)) for ax in axes) == 2 * len(directions)
-    for ax, d in zip(axes, directions, strict=False):
+    for ax, d in zip(axes, directions, strict=True):
         for number, drawn in _lines(ax).items():
             row = history.sel(half_cycle=number)
             assert row.direction == d
             np.testing.assert_array_equal(drawn, row.pressure)
-    (ax,) = shape_figure(history, [20]).axes
+    (ax,) = lines_figure(history, [fields["wear"]], [20]).axes
     np.testing.assert_allclose(_lines(ax)[20], 1e3 * history.wear[-1], rtol=1e-12)
     if len(directions) == 2:
-        (ax,) = mean_pressure_figure(history, [9, 20]).axes
+        late = with_late_pressures(history)
+        (ax,) = lines_figure(late, [fields_of(late)[LATE]], [9, 20]).axes
         means = _lines(ax)
-        assert set(means) == {10, 20}
-        for last, first in ((10, 9), (20, 19)):  # the last tenth, from the end of a cycle on
+        assert set(means) == {8, 20}
+        for last, first in ((8, 7), (20, 19)):  # the last tenth, from the end of a cycle on
             since = history.pressure.sel(half_cycle=slice(first, last)).values
             np.testing.assert_allclose(means[last], since.mean(axis=0), rtol=1e-12)
 
@@ -87,8 +87,8 @@ def test_curves_over_the_half_cycles_are_the_history(history: xarray.Dataset) ->
     hot = ("largest_temperature",) if "largest_temperature" in history else ()
     directions = [d for d in (1, -1) if (history.direction == d).any()]
     for figure, names in (
-        (peak_figure(history), ("largest_pressure", "contact_width", *hot)),
-        (convergence_figure(history), ("periodicity", "optimum_distance")),
+        (course_figure(history, "peaks"), ("largest_pressure", "contact_width", *hot)),
+        (course_figure(history, "convergence"), ("periodicity", "optimum_distance")),
     ):
         assert len(figure.axes) == len(names)
         for ax, name in zip(figure.axes, names, strict=True):
@@ -101,7 +101,9 @@ def test_curves_over_the_half_cycles_are_the_history(history: xarray.Dataset) ->
 @pytest.mark.parametrize("folder", ["example1-heat"], indirect=True)
 def test_curves_of_heat_are_the_history(history: xarray.Dataset) -> None:
     """Temperatures of both surfaces; in the balance the other terms add up to what friction makes."""
-    for ax, body in zip(temperature_figure(history, [10, 20]).axes, ("punch", "strip"), strict=True):
+    bodies = ("punch", "strip")
+    fields = [fields_of(history)[f"temperature_{body}"] for body in bodies]
+    for ax, body in zip(lines_figure(history, fields, [10, 20]).axes, bodies, strict=True):
         for number, drawn in _lines(ax).items():
             np.testing.assert_array_equal(drawn, history[f"temperature_{body}"].sel(half_cycle=number))
     (ax,) = heat_balance_figure(history).axes
@@ -148,19 +150,19 @@ def test_nothing_collides(history: xarray.Dataset, axis: str, width: str) -> Non
             assert not any(box.overlaps(other) for other in boxes[k + 1 :]), (name, k)
 
 
-def test_first_peaks_are_never_cut_off(history: xarray.Dataset) -> None:
-    """States far beyond all later ones have their own panel; every line lies within its axis; the last is shown."""
+def test_first_peaks_have_their_size(history: xarray.Dataset) -> None:
+    """An axis of pressure ends above the later states: of one far beyond them the legend has the largest pressure."""
     flat = history.copy(deep=True)
     flat.pressure.values[:2, 0] *= 50
     chosen = chosen_half_cycles(flat)
     assert chosen[-1] == flat.half_cycle.values[-1]
-    assert early_half_cycles(flat, chosen)[:1] == [1]
-    for data in (history, flat):
-        figure = pressure_figure(data, chosen)
-        for ax in figure.axes:
-            for line in ax.lines:
-                assert np.max(line.get_ydata()) <= ax.get_ylim()[1]
-    assert len(figure.axes) == 1 + len(np.unique(history.direction))
+    for data, beyond in ((history, 0), (flat, 1)):
+        top = pressure_top(data, chosen)
+        for ax in lines_figure(data, [fields_of(data)["pressure"]], chosen).axes:
+            assert ax.get_ylim()[1] <= top
+            told = [line for line in ax.lines if f"(to {np.max(line.get_ydata()):.3g})" in str(line.get_label())]
+            assert len(told) >= beyond
+            assert all(np.max(line.get_ydata()) <= top for line in ax.lines if line not in told)
 
 
 def test_no_colour_fades_on_white() -> None:
@@ -184,10 +186,10 @@ def test_profiles_and_maps(history: xarray.Dataset) -> None:
     values = np.asarray(map_of.get_array())
     assert not values[0].any()
     np.testing.assert_allclose(values[1:], 1e3 * history.wear, rtol=1e-12)
-    line = volume_figure(history, Style(axis="distance")).axes[0].lines[0]
+    line = course_figure(history, "volume").axes[0].lines[0]
     np.testing.assert_allclose(line.get_xdata(), 1e-3 * history.sliding_distance, rtol=1e-12)
     np.testing.assert_array_equal(line.get_ydata(), history.worn_volume)
-    np.testing.assert_array_equal(scar_figure(history).axes[1].lines[0].get_ydata(), history.scar_width)
+    np.testing.assert_array_equal(course_figure(history, "scar").axes[1].lines[0].get_ydata(), history.scar_width)
 
 
 @pytest.mark.parametrize("folder", ["monotonic-lz20"], indirect=True)

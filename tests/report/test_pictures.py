@@ -10,14 +10,14 @@ import pytest
 import xarray
 from matplotlib.image import imread
 
-from fenwear.report.magnification import magnification
-from fenwear.report.pictures import (
+from fenwear.report.bodies import (
     FIELDS,
     DrawingError,
     common_view,
     deformed,
     draw_pictures,
     field_files,
+    magnification,
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 import xarray
 
 from fenwear.case.reading import load_case
-from fenwear.report.maps import quantities
-from fenwear.report.roughness_figures import roughness_of, with_surfaces
+from fenwear.report.course import course_figure, course_figures
+from fenwear.report.lines import fields_of
+from fenwear.report.maps import with_surfaces
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
@@ -33,8 +35,8 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
 
 def test_the_figure_has_the_numbers_of_the_history(history: xarray.Dataset) -> None:
     """Sa and Sq of both bodies over the run, µm."""
-    (ax,) = roughness_of(history)["roughness"].axes
-    names = [f"roughness_{kind}{end}" for end in ("", "_strip") for kind in ("Sa", "Sq")]
+    (ax,) = course_figure(history, "roughness").axes
+    names = [f"roughness_{kind}{end}" for kind in ("Sa", "Sq") for end in ("", "_strip")]
     for line, name in zip(ax.lines, names, strict=True):
         np.testing.assert_allclose(line.get_ydata(), 1e3 * history[name])
 
@@ -59,7 +61,7 @@ def test_heights_are_less_what_has_worn_and_its_form(history: xarray.Dataset) ->
         assert abs(heights.mean()) < 1e-15
         rms = float(here[f"roughness_Sq{end}"])
         assert np.sqrt((heights**2).mean()) == pytest.approx(rms, rel=1e-9)
-    assert {"surface_map", "surface_strip_map"} <= quantities(found).keys()
-    smooth = history.drop_vars([name for name in map(str, history.variables) if name.startswith("topography")])
+    assert {"surface", "surface_strip"} <= fields_of(found).keys()
+    smooth = history.drop_vars([name for name in map(str, history.variables) if re.match("topography|roughness", name)])
     assert with_surfaces(smooth, [last]).equals(smooth)
-    assert not roughness_of(smooth)
+    assert "roughness" not in course_figures(smooth)

@@ -16,12 +16,13 @@ from matplotlib.tri import TriContourSet
 from numpy.typing import NDArray
 
 from fenwear import load_case
+from fenwear.report.bodies import common_view, deformed, displacement, draw_pictures, points
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.course import is_conforming
 from fenwear.report.figures import all_figures, read_history
-from fenwear.report.maps import LEVELS, map_figure, quantities
+from fenwear.report.lines import fields_of
+from fenwear.report.maps import LEVELS, map_figure
 from fenwear.report.page import numbers_of
-from fenwear.report.pictures import common_view, deformed, displacement, draw_pictures, points
 from fenwear.report.style import by_powers
 from fenwear.report.surface import Surface, along_contact, centre_of_wear, model_of, surface_of
 from fenwear.run import run_case
@@ -88,7 +89,7 @@ def test_the_page_loads_nothing(folder: Path) -> None:
     parsed = Elements(re.sub(r"<(meta|link|img|br)\b([^>]*)>", r"<\1\2></\1>", text))
     sources = [a[key] for _, a in parsed.all for key in ("src", "href", "srcset") if key in a]
     assert len(sources) > 3
-    assert all(source.startswith("data:") for source in sources)
+    assert all(source.startswith(("data:", "#")) for source in sources)
     (policy,) = (a["content"] for tag, a in parsed.all if tag == "meta" and "http-equiv" in a)
     assert not [tag for tag, _ in parsed.all if tag == "script"]
     assert "script-src" not in policy
@@ -132,15 +133,15 @@ def test_titles_of_maps_do_not_meet(folders: dict[str, Path]) -> None:
         late = history.assign_coords(half_cycle=last + 1_234_500)
         for one in (history, late.assign(pressure=10 * late.pressure)):
             chosen = [int(n) for n in one.half_cycle.values][-6:]
-            for quantity in quantities(one).values():
-                figure = map_figure(one, quantity, chosen)
+            for field in fields_of(one).values():
+                figure = map_figure(one, field, chosen)
                 figure.canvas.draw()
                 boxes = [ax.title.get_window_extent() for ax in figure.axes] + [
                     ax._left_title.get_window_extent() for ax in figure.axes if ax.get_visible()
                 ]
                 boxes = [box for box in boxes if box.width > 0]
                 overlapping = [a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :]]
-                assert not any(overlapping), (name, quantity.variable)
+                assert not any(overlapping), (name, field.variable)
 
 
 def grid(degree: int = 1) -> Surface:

@@ -11,7 +11,7 @@ import xarray
 from fenwear import assemble, load_case, march, vary
 from fenwear.cycle import evolve
 from fenwear.results import place
-from fenwear.results.contacts import contact_sheets
+from fenwear.results.summary import contact_sheets
 from fenwear.run import run_case
 
 MU, CLEARANCE = 0.1, 0.02

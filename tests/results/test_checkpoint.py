@@ -94,7 +94,7 @@ def test_a_signal_loses_nothing(fenwear: Run, tmp_path: Path, number: signal.Sig
         assert "--resume" in messages
         assert "Traceback" not in messages
     with np.load(folder / "checkpoint" / "state.npz") as moment:
-        reached = int(moment["half_cycle"])
+        reached = int(moment["state.half_cycle"])
     assert (np.diff(history(folder).half_cycle) > 0).all()
     on = options(f"run.half_cycles={reached + 20}", "output.every=10")
     done = fenwear("run", "example1-heat", "-o", str(folder), *on, "--resume")

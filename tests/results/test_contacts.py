@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenwear import CaseError, assemble, load_case, make_case
 from fenwear.report.surface import surface_of
-from fenwear.results.contacts import contact_text
+from fenwear.results.summary import contact_text
 from fenwear.run import run_case
 from tests.bodies.test_parts import tables
 

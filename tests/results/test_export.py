@@ -14,9 +14,8 @@ import xarray
 
 from fenwear import CaseError, load_case
 from fenwear.errors import OutputError
-from fenwear.results.cycles import by_cycles
 from fenwear.results.export import export
-from fenwear.results.reading import load_history
+from fenwear.results.reading import by_cycles, load_history
 from fenwear.run import run_case
 
 BARE = ("output.fields_at=[]", "output.report=false", "output.uncertainty=false")

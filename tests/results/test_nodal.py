@@ -11,7 +11,7 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh, create_mesh
 from mpi4py import MPI
 
-from fenwear.results import nodal
+from fenwear.results.checkpoint import read_nodal, write_nodal
 
 
 def slit_square(comm: MPI.Comm) -> Mesh:
@@ -54,7 +54,7 @@ def test_slit(tmp_path: Path) -> None:
         for number, (wrote, reads) in enumerate(((many, one), (one, many))):
             path = tmp_path / f"{degree}-{number}.npz"
             if wrote is many or MPI.COMM_WORLD.rank == 0:
-                nodal.write(path, jumping(wrote))
+                write_nodal(path, jumping(wrote))
             MPI.COMM_WORLD.Barrier()
             expected = jumping(reads).x.array[: reads.dofmap.index_map.size_local]
-            np.testing.assert_allclose(nodal.read(path, reads), expected, rtol=1e-12)
+            np.testing.assert_allclose(read_nodal(path, reads), expected, rtol=1e-12)

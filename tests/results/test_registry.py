@@ -15,7 +15,7 @@ from fenwear.cycle import evolve
 from fenwear.cycle.steady_cycle import cycle_of_state
 from fenwear.life import Model, evaluate, parse_quantity, read_data
 from fenwear.report.key_numbers import flat, read_summary
-from fenwear.results import coating
+from fenwear.results import between
 from fenwear.results.quantity import RECORD, Quantity
 from fenwear.results.reading import current_names, load_history
 from fenwear.results.registry import known, quantities_of
@@ -88,7 +88,7 @@ def test_nominal_and_mean_pressure() -> None:
     bushing = assemble(load_case("bushing", [*JUMPS, f"{FINE}=160"]))
     radius = float(np.linalg.norm(bushing.pair.strip.x, axis=1).mean())  # of the shaft
     area = 2 * radius * bushing.bodies.punch.thickness
-    found = nominal_pressure(bushing, bushing.normal_force)
+    found = nominal_pressure(bushing, bushing.normal_force)["nominal_pressure"]
     assert found == pytest.approx(bushing.normal_force / area, rel=2e-3)  # of the bore, wider by a thousandth
     case = load_case(
         "fretting",
@@ -105,7 +105,7 @@ def test_nominal_and_mean_pressure() -> None:
         float(quantities_of(last.system)[f"{name}_pressure"].of_cycle(last)) for name in ("mean", "largest")
     )
     assert mean == pytest.approx(np.pi / 4 * largest, rel=0.08)
-    assert nominal_pressure(last.system, 1.0) is None
+    assert nominal_pressure(last.system, 1.0) == {}
 
 
 def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
@@ -117,7 +117,7 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
     pair = SimpleNamespace(weights=weights, strip=SimpleNamespace(weights=weights))
     system = SimpleNamespace(pair=pair, coatings=(np.ones(len(weights)), np.zeros(len(weights))))
     block: Any = SimpleNamespace(system=system, wear=depth, wear_strip=0 * depth)
-    found = coating.values(block)
+    found = between.coating_values(block)
     assert found["worn_through_of_scar"] == pytest.approx([0.5])
     assert found["worn_through_of_surface"] == pytest.approx([0.1])
 

@@ -10,7 +10,7 @@ import pytest
 from fenwear import Tribosystem, load_case
 from fenwear.assembly import place_case
 from fenwear.bodies.subcells import linear_cells
-from fenwear.results.scar import EDGE, conforming, extents, scar_geometry
+from fenwear.results.surfaces import EDGE, conforming, extents, scar_geometry
 
 
 def grid(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from fenwear.results.reading import load_history
 from fenwear.results.registry import quantities_of
 from fenwear.results.sheet import sheet_rows, sheet_text
 from fenwear.results.summary import sheet_of
-from fenwear.results.zone import without_noise
+from fenwear.results.surfaces import without_noise
 from fenwear.run import run_case
 
 Assemble = Callable[..., Tribosystem]

@@ -15,7 +15,7 @@ from fenwear import ConvergenceError, load_case
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.errors import InterruptedRunError
 from fenwear.results.reading import load_history
-from fenwear.results.scar import EDGE
+from fenwear.results.surfaces import EDGE
 from fenwear.run import run_case
 
 NO_PICTURES = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]")

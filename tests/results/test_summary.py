@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fenwear import Case, load_case, make_case
+from fenwear.report.course import program_figure
 from fenwear.report.page import page
-from fenwear.report.program import program_figure
 from fenwear.results.export import export
 from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet_text

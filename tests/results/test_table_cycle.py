@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenwear import load_case
-from fenwear.report.tracks import tracks_of
+from fenwear.report.maps import has_tracks, tracks_figure
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
@@ -40,9 +40,10 @@ def test_tracks_and_cross_shear(tmp_path: Path) -> None:
     assert float(last.cross_shear.where(last.dissipated_energy > 0.05 * last.dissipated_energy.max(), 0).max()) <= (
         work + 1e-9
     )
-    picture = tracks_of(history)["tracks"]
+    picture = tracks_figure(history)
     assert [ax.get_title(loc="left") for ax in picture.axes[:2]] == [
         "tracks over a cycle",
         "cross-shear and main direction",
     ]
-    assert not tracks_of(history.drop_vars("track"))
+    assert has_tracks(history)
+    assert not has_tracks(history.drop_vars("track"))

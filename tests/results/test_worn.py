@@ -12,9 +12,8 @@ from fenwear.assembly import build_bodies, place_case
 from fenwear.bodies.contact_surface import profiled
 from fenwear.case.bodies import Profile
 from fenwear.errors import FenwearError
-from fenwear.results.machining import TRIANGLE, profile_of
+from fenwear.results.export import TRIANGLE, export_worn, profile_of
 from fenwear.results.reading import load_history
-from fenwear.results.worn import export_worn
 
 QUIET = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]", "geometry.follow_wear='never'")
 PLANE = ("geometry.parameters.elements_along_contact=12", "run.integration='explicit'", *QUIET)

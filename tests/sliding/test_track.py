@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import place_case
 from fenwear.case import load_case, make_case
 from fenwear.cycle import march, steady
-from fenwear.results.scar import extents, scar_geometry
+from fenwear.results.surfaces import extents, scar_geometry
 from fenwear.sliding.track import _part_below
 
 DISC = ("geometry.degree=2", "wear.strip.coefficient=2e-8", "geometry.parameters.disc_layers=2",

@@ -13,8 +13,7 @@ from work import half_cycles_whose_work_is_heat
 
 from fenwear import Tribosystem, assemble, load_case, march
 from fenwear.report.figures import all_figures
-from fenwear.results.cycles import by_cycles
-from fenwear.results.reading import load_history
+from fenwear.results.reading import by_cycles, load_history
 from fenwear.run import run_case
 from fenwear.stick.heat import read_at
 from fenwear.stick.records import TimeStepRecords
@@ -108,7 +107,7 @@ def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:
         difference, expected = np.abs(resumed[variable] - whole[variable]), np.abs(whole[variable])
         assert float(difference.max()) < 1e-9 * float(expected.max())
     if MPI.COMM_WORLD.rank == 0:
-        assert {"temperature_map", "heat_balance", "zones"} <= set(all_figures(load_history(tmp_path / "whole")))
+        assert {"temperature_punch_map", "heat_balance", "zones"} <= set(all_figures(load_history(tmp_path / "whole")))
 
 
 @pytest.mark.mpi

@@ -14,8 +14,7 @@ from scipy.spatial import cKDTree
 from fenwear import CaseError, load_case
 from fenwear.cli.partial_slip import check_text, final_of, final_text
 from fenwear.report.page import write_report
-from fenwear.results.cycles import by_cycles
-from fenwear.results.reading import load_history
+from fenwear.results.reading import by_cycles, load_history
 from fenwear.run import run_case
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.position import surface_gradient, surface_strain

@@ -13,8 +13,7 @@ from work import half_cycles_whose_work_is_heat
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
 from fenwear.cli.partial_slip import final_of
-from fenwear.results.cycles import by_cycles
-from fenwear.results.reading import load_history
+from fenwear.results.reading import by_cycles, load_history
 from fenwear.run import run_case
 from fenwear.stick.heat import balance_error
 from fenwear.stick.records import TimeStepRecords

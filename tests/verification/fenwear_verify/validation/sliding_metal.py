@@ -14,9 +14,9 @@ from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.life import calibrate, read_data
+from fenwear.life.keys import parse_unknown
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
-from fenwear.life.unknowns import parse_unknown
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, percentage_error, table
 
 GRAVITY = 9.80665e-3  # N/g

@@ -1,30 +1,49 @@
-"""Pictures of the deformed bodies near the contact, from the files in DIR/fields.
+"""Figures of the bodies from the files in DIR/fields: geometry, stress at the surface, and pictures when deformed.
 
-Planes and rings are drawn as they are meshed, solids in a section along the sliding through the middle of the contact.
-Displacement and wear are magnified together, by the factor that the picture names: else worn bodies would seem to sink
-into each other. `fields/fields.hdf` has the whole bodies, for ParaView and pyvista.
+Pictures show planes and rings as they are meshed, solids in a section along the sliding through the middle of the
+contact. Displacement and wear are magnified together, by the factor that the picture names: else worn bodies would seem
+to sink into each other. `fields/fields.hdf` has the whole bodies, for ParaView and pyvista.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
+from fenwear.case.names import Names, renamed
+from fenwear.case.units import convert
 from fenwear.report.course import shown_unit
 from fenwear.report.key_numbers import names_in
-from fenwear.report.magnification import magnification
-from fenwear.report.style import direction_words, further, name_bodies, save, strip_moves
+from fenwear.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    STANDARD,
+    Style,
+    contact_axis,
+    direction_words,
+    further,
+    legend_beside,
+    name_bodies,
+    panels,
+    run_style,
+    save,
+    strip_moves,
+    wrapped,
+)
 from fenwear.results.netcdf import load
 
 if TYPE_CHECKING:
-    import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FIELDS, FIGURES = "fields", "figures"
@@ -37,6 +56,172 @@ FADES = 0.1  # of the contact's length: over which wear, as it is drawn, fades i
 NEAR = (0.72, 0.5, 0.75)  # of the length: half of what is shown along it, and most below and above the contact
 MARGIN, NEIGHBOURS = 0.04, 4
 HEXAHEDRON, TETRAHEDRON = 12, 10  # VTK's numbers
+COMPONENTS = {"xx": "σ xx", "zz": "σ zz", "xz": "σ xz"}
+CLOSE_UP = 0.75  # of the contact's width: what a close view has of the bodies above and below
+APART = 5.0  # of the distance of contact nodes: from which on two are of two parts
+BETWEEN = 0.1  # of the mean length of parts: the gap between two of them
+ROUND = 0.5  # height of a contact over its width: from which on the close view has all of it
+PLATE: Any = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1}
+FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
+
+
+def field_files(directory: Path) -> list[Path]:
+    """Return the files of a run's fields by half-cycle."""
+    return sorted((directory / FIELDS).glob("half_cycle_*.nc"))
+
+
+def field_figures(directory: Path, case: Mapping[str, Any], look: Style = STANDARD) -> dict[str, Figure]:
+    """Return geometry and surface stress by the fields of the last half-cycle that has them, by name."""
+    files = field_files(directory)
+    if not files:
+        return {}
+    fields = load(files[-1])
+    drawn = {"geometry": geometry_figure(fields, renamed(case, Names.of(case).by_role), look)}  # fields name groups so
+    if "punch_stress_xx" in fields:
+        drawn["surface_stress"] = stress_figure(fields, look)
+    return wrapped(drawn)
+
+
+def stress_figure(fields: xarray.Dataset, look: Style = STANDARD) -> Figure:
+    """Return the components of the stress and von Mises' stress along the contact surfaces of both bodies."""
+    figure, axes = panels(2, 3.0, look=look)
+    contact = _along(fields.punch_contact_x.values, fields.punch_contact_z.values)
+    margin = 0.25 * np.ptp(contact)
+    for ax, body in zip(axes, BODIES, strict=True):
+        x = _along(*(fields[f"{body}_contact_{axis}"].values for axis in "xz"))
+        nodes = _contact_nodes(fields, body)
+        order = np.argsort(x)
+        for number, (part, text) in enumerate(COMPONENTS.items()):
+            values = fields[f"{body}_stress_{part}"].values[nodes][order]
+            ax.plot(x[order], values, label=text, **run_style(number))
+        values = fields[f"{body}_von_mises"].values[nodes][order]
+        ax.plot(x[order], values, label="von Mises", **run_style(len(COMPONENTS)))
+        ax.set_ylabel(f"stress of the {body} (MPa)")
+        legend_beside(ax, "")
+    contact_axis(axes[-1])
+    axes[-1].set_xlim(contact.min() - margin, contact.max() + margin)
+    return figure
+
+
+def _along(x: Array, z: Array) -> Array:
+    """Return where contact nodes are along a contact (n,), mm: x, or the arc length, which is x in the middle."""
+    if (np.diff(x) > 0).all():
+        return x
+    steps = np.hypot(np.diff(x), np.diff(z))
+    far = steps > APART * np.median(steps)
+    arc = np.append(0.0, np.cumsum(np.where(far, BETWEEN * steps[~far].sum() / (1 + far.sum()), steps)))
+    middle = int(np.abs(arc - arc[-1] / 2).argmin())
+    return np.asarray(arc - arc[-1] / 2 if far.any() else arc - arc[middle] + x[middle])
+
+
+def _contact_nodes(fields: xarray.Dataset, body: str) -> NDArray[np.int64]:
+    """Return which nodes of a body its contact nodes are."""
+    points = np.column_stack([fields[f"{body}_{a}"].values for a in "xz"])
+    return cKDTree(points).query(np.column_stack([fields[f"{body}_contact_{a}"].values for a in "xz"]))[1]
+
+
+def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style = STANDARD) -> Figure:
+    """Return both bodies with their elements, supports, loads and coordinates: whole, and near the contact."""
+    from matplotlib.lines import Line2D
+
+    figure, axes = panels(2, 4.2, share_x=False, look=look)
+    x, z = fields.punch_contact_x.values, fields.punch_contact_z.values
+    width = float(np.ptp(x))
+    steps = np.hypot(np.diff(x), np.diff(z))
+    apart = 1 + np.flatnonzero(steps > APART * np.median(steps))  # parts of the contact
+    for ax in axes:
+        for body in BODIES:
+            _elements(ax, fields, body)
+            _ends(ax, fields, body, case)
+        ax.plot(*np.insert(np.stack([x, z]), apart, np.nan, axis=1), color=GREEN, linewidth=2.0)
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_xlabel("x (mm)")
+        ax.set_ylabel("z (mm)")
+    low, high = float(z.min()) - CLOSE_UP * width, float(z.min()) + CLOSE_UP * width
+    if np.ptp(z) > ROUND * width:
+        low, high = float(z.min()) - 0.25 * width, float(z.max()) + 0.25 * width
+    axes[1].set_xlim(x.min() - 0.5 * width, x.max() + 0.5 * width)
+    axes[1].set_ylim(low, high)
+    _sliding(axes[1], fields, float(x.mean()), low, width)
+    named = {"contact": GREEN, "held": RED, "loaded": BLUE}
+    handles = [Line2D([], [], color=colour, linewidth=2.5, label=name) for name, colour in named.items()]
+    figure.legend(handles=handles, loc="outside upper right", frameon=False, ncols=len(named), fontsize="small")
+    figure.set_layout_engine("compressed")  # the axes keep their aspect
+    return figure
+
+
+def _elements(ax: Axes, fields: xarray.Dataset, body: str) -> None:
+    """Draw the elements of a body: the edges of its linear cells that lie on an element's boundary."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    cells = fields[f"{body}_cells"].values
+    points = np.column_stack([fields[f"{body}_{a}"].values for a in "xz"])
+    parts = int(fields[f"{body}_cells"].attrs["degree"]) ** 2  # linear cells of an element
+    ax.add_collection(PolyCollection(points[cells], facecolors=FILLS[body], edgecolors="none", rasterized=True))
+    lines = element_edges(cells, parts)
+    ax.add_collection(LineCollection(list(points[lines]), colors=GREY, linewidths=0.3))
+    ax.update_datalim(points)
+    ax.autoscale_view()
+
+
+def element_edges(cells: NDArray[np.int64], parts: int) -> NDArray[np.int64]:
+    """Return the edges (e, 2) that belong to one linear cell alone of the `parts` of its element.
+
+    Args:
+        cells: Corners of the linear cells (count, 4), those of an element one after the other.
+        parts: Linear cells of an element.
+    """
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    element = np.repeat(np.arange(len(cells)) // parts, cells.shape[1])
+    keep = edges[:, 0] != edges[:, 1]  # of triangles the last corner stands twice
+    keyed, counts = np.unique(np.column_stack([element, edges])[keep], axis=0, return_counts=True)
+    return np.unique(keyed[counts == 1, 1:], axis=0)
+
+
+def _ends(ax: Axes, fields: xarray.Dataset, body: str, case: Mapping[str, Any]) -> None:
+    """Draw what holds a body, and what loads it."""
+    size = 0.05 * float(np.hypot(*(np.ptp(fields[f"{body}_{a}"].values) for a in "xz")))
+    for kind, colour, mark in (("supports", RED, "^"), ("loads", BLUE, "o")):
+        for part in case.get(body, {}).get(kind, ()):
+            for line in _group(fields, body, part):
+                ax.plot(*line.T, color=colour, linewidth=2.5, marker=mark if len(line) == 1 else None, zorder=3)
+    for part in case.get(body, {}).get("loads", ()):
+        key, unit = ("force", "N") if "force" in part else ("traction", "MPa")
+        lines, way = _group(fields, body, part), np.array([convert(component, unit) for component in part[key]])
+        if lines and np.linalg.norm(way) > 0:
+            points = np.concatenate(lines)
+            step = size * way / np.linalg.norm(way)
+            for end in points[np.unique(np.linspace(0, len(points) - 1, 5).round().astype(int))]:
+                ax.annotate("", end, end - step, arrowprops={"arrowstyle": "-|>", "color": BLUE}, zorder=4)
+
+
+def _group(fields: xarray.Dataset, body: str, part: Mapping[str, Any]) -> list[Array]:
+    """Return the lines (2, 2) or points (1, 2) of the group that a support or a load is on, mm."""
+    if "at" in part:
+        return [np.array([[convert(c, "mm") for c in part["at"]]])]
+    name = f"{body}_group_{part['on']}"
+    return list(fields[name].values) if name in fields else []
+
+
+def _sliding(ax: Axes, fields: xarray.Dataset, x: float, z: float, width: float) -> None:
+    """Draw the axes and the way of the strip."""
+    turns = strip_moves(fields) == "strip turns"
+    if not turns:
+        ax.annotate("", (x + 0.25 * width, z + 0.12 * width), (x - 0.25 * width, z + 0.12 * width),
+                    arrowprops={"arrowstyle": "<|-|>", "color": "0"}, zorder=5)  # fmt: skip
+    ax.annotate(
+        "strip turns" if turns else "strip slides",
+        (x, z + 0.14 * width),
+        ha="center",
+        va="bottom",
+        fontsize="small",
+        bbox=PLATE,
+        zorder=5,
+    )
+    for end, text in (((0.16, 0.06), "x"), ((0.06, 0.20), "z")):
+        ax.annotate("", end, (0.06, 0.06), xycoords="axes fraction", textcoords="axes fraction",
+                    arrowprops={"arrowstyle": "-|>", "color": "0"}, zorder=6)  # fmt: skip
+        ax.text(*end, text, transform=ax.transAxes, bbox=PLATE, zorder=6)
 
 
 class DrawingError(Exception):
@@ -73,11 +258,6 @@ class View:
         seen, box = self.seen(x), np.array(self.box).reshape(2, 2)
         aside = np.abs((x - self.centre) @ np.cross(self.along, self.normal)) < self.length
         return np.asarray(aside & ((seen >= box[:, 0]) & (seen <= box[:, 1])).all(axis=1))
-
-
-def field_files(directory: Path) -> list[Path]:
-    """Return the files of a run's fields by half-cycle."""
-    return sorted((directory / FIELDS).glob("half_cycle_*.nc"))
 
 
 def draw_pictures(directory: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
@@ -227,3 +407,12 @@ def _way(data: xarray.Dataset, model: str) -> str:
     if "turns" in moves:  # its axis points away from who looks at a plane
         return moves if model == "axisymmetric" else f"{moves} (seen against its axis)"
     return f"{moves} →" if direction > 0 else f"← {moves}"
+
+
+def magnification(largest: float, width: float) -> float:
+    """Return a round factor that shows the largest displacement as about a tenth of the width."""
+    if largest <= 0:
+        return 1.0
+    target = 0.1 * width / largest
+    power = 10.0 ** np.floor(np.log10(target))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= target))

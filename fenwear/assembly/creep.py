@@ -373,8 +373,8 @@ def creep_of(
         for which, law in enumerate(laws)
         if law.creeps
     ]
-    if given is not None and placed.layers.winkler is not None:
-        members.append(CreepingLayer(Retardation.of(given), placed.layers.winkler))
+    if given is not None and placed.layers.linear is not None:
+        members.append(CreepingLayer(Retardation.of(given), placed.layers.linear))
     durations = np.array([phase.duration for phase in placed.motion.phases])
     found = [  # on a grid the strip answers opposite the punch in each of its places
         moved if face is own else (moved[0], by_supports(1, own.strip))

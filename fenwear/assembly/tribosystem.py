@@ -281,7 +281,7 @@ def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> 
 
 def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
-    interface = condensed.join(placed.rigid, placed.layers.winkler)
+    interface = condensed.join(placed.rigid, placed.layers.linear)
     under = _under_all(condensed, placed)
     found: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
@@ -293,7 +293,7 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
         else:
             own = under[id(bodies)]
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
-            layer = placed.layers.winkler
+            layer = placed.layers.linear
             found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
     parts = {name: getattr(placed, name) for name in ContactSetup.__dataclass_fields__}
     interfaces = tuple(found)

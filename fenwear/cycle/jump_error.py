@@ -163,7 +163,5 @@ def _debris_difference(system: Tribosystem, before: RunState, whole: RunState, h
     Beside what a jump wears, in many of its lives, it is next to nothing: an error of that says nothing of it.
     """
     first, one, other = (system.layers.thickness(state.worn) for state in (before, whole, halves))
-    if first is None or one is None or other is None:
-        return 0.0
     weights = system.pair.weights
     return float(weights @ np.abs(one - other)) / max(float(weights @ first), float(weights @ other), 1e-300)

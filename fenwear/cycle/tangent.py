@@ -191,11 +191,11 @@ def _laws(
     worn: WornDepths | None = None,
 ) -> _Laws:
     n, conditions = len(pressure), _conditions(system, phase, pressure, heat, state, worn)
-    lies = () if conditions.debris is None else (conditions.debris,)
+    lies = () if system.layers.debris is None else (np.asarray(conditions.debris),)
     around = (pressure, *conditions.temperatures, *lies)
 
     def at(p: Array, punch: Array, strip: Array, *debris: Array) -> ContactConditions:
-        return replace(conditions, pressure=p, temperatures=(punch, strip), debris=debris[0] if debris else None)
+        return replace(conditions, pressure=p, temperatures=(punch, strip), debris=debris[0] if debris else 0.0)
 
     def friction(*values: Array) -> Array:
         return system.friction.values(at(*values))

@@ -44,12 +44,11 @@ class Sources:
     heat: Array
     ambient: Array
 
-    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the values (r,) or (r, k), see `Fluxes.of`."""
         n = self.first.shape[1]
         total = self.first @ bare[:n] + self.second @ bare[n:]
-        if heat is not None:
-            total += self.heat @ heat
+        total += self.heat @ heat
         return total + _down(bare.ndim)(self.ambient) * ambient
 
 
@@ -101,7 +100,7 @@ class Exchanged:
         """Return the matrix of the system for (q_1, q_2) (2 n, 2 n)."""
         return self.rows(np.arange(len(self.conductance)))
 
-    def right(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def right(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the right-hand side of the system, see `Fluxes.of`."""
         conducts, own, jump = self.row_factors()
         n, loss, down = len(conducts), self.loss, _down(bare.ndim)
@@ -109,10 +108,9 @@ class Exchanged:
         right = np.concatenate(
             [down(jump) * (second - first) - down(loss) * (first - ambient), -down(loss) * (second - ambient)]
         )
-        if heat is not None:
-            kept = down(conducts * (1 - self.debris)) * heat
-            right[:n] += down(own * self.partition) * kept
-            right[n:] += kept
+        kept = down(conducts * (1 - self.debris)) * heat
+        right[:n] += down(own * self.partition) * kept
+        right[n:] += kept
         return right
 
     def sources(self, rows: Array) -> Sources:
@@ -131,12 +129,12 @@ class Exchanged:
 class Fluxes(Protocol):
     """The fluxes (q_1, q_2) of a step, both surfaces concatenated, linear in what they come from."""
 
-    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return them (2 n,) or (2 n, k), mW/mm².
 
         Args:
             bare: The surfaces' temperatures without flux (2 n,) or (2 n, k), K.
-            heat: Of friction (n,) or (n, k), mW/mm²; None for none.
+            heat: Of friction (n,) or (n, k), mW/mm².
             ambient: Temperature of the surroundings, K.
         """
 
@@ -164,11 +162,10 @@ class FluxMap:
         made = step.sources(scipy.linalg.inv(step.matrix()))
         return cls(np.hstack([made.first, made.second]), made.heat, made.ambient)
 
-    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the fluxes."""
         total = self.by_temperature @ bare
-        if heat is not None:
-            total += self.by_heat @ heat
+        total += self.by_heat @ heat
         if ambient:
             total += _down(bare.ndim)(self.by_ambient) * ambient
         return total
@@ -203,7 +200,7 @@ class FluxFactor:
         self._factor = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
         self._adjoint: dict[tuple[int, float], Array] = {}  # rows Z of nodes and their conductances
 
-    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the fluxes."""
         return self.solve(self.step.right(bare, heat, ambient))
 
@@ -287,7 +284,7 @@ class FluxUpdate:
             )
         )
 
-    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the fluxes."""
         right = self.base.step.right(bare, heat, ambient)
         right[self.changed] += self.added.of(bare, heat, ambient)

@@ -249,4 +249,4 @@ class PreparedStep:
     def _followed(self, rows: Sources) -> tuple[Array, Array, Array]:
         """Return rows of what the fluxes come from as rows of the coordinates, a constant, and rows of the heat."""
         by_state = np.hstack([rows.first @ self._bare[0], rows.second @ self._bare[1]])
-        return by_state, rows.of(self._bare_source, None, self._ambient), rows.heat
+        return by_state, rows.of(self._bare_source, np.zeros(rows.heat.shape[1]), self._ambient), rows.heat

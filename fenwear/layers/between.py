@@ -59,7 +59,7 @@ class Layers:
     Attributes:
         nodes: n.
         closure: The law by which it gives way; None where it does not, or in proportion to the pressure.
-        winkler: Closure over pressure of a linear layer (n,), mm/MPa; None without.
+        winkler: Closure over pressure of a linear layer (n,), mm/MPa; 0 without.
         debris: Of the third body; None without.
         hardness: Largest pressure, MPa.
         softness: By how much surfaces give way in a solve, over the pressure beyond the hardness, mm/MPa.
@@ -71,7 +71,7 @@ class Layers:
 
     nodes: int
     closure: Law | None = None
-    winkler: Array | None = None
+    winkler: Array | float = 0.0
     debris: Debris | None = None
     hardness: float = np.inf
     softness: float = 0.0
@@ -104,7 +104,7 @@ class Layers:
     def given(self, pressure: Array, closure: Closure | None = None) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm, by default without what coatings do."""
         closure = closure or self.closure
-        found = np.zeros_like(pressure) if self.winkler is None else self.winkler * pressure
+        found = self.winkler * pressure
         return found if closure is None else found + closure.closure(pressure)
 
     @property
@@ -168,11 +168,11 @@ class Layers:
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)
 
-    def thickness(self, worn: WornDepths | None) -> Array | None:
-        """Return the thickness of the debris (n,), mm, by default that at the start; None without at the nodes."""
+    def thickness(self, worn: WornDepths | None) -> Array:
+        """Return the thickness of the debris at the nodes (n,), mm, by default that at the start."""
         here = self.debris_here
         if here is None:
-            return None
+            return np.zeros(self.nodes)
         if worn is None or not len(worn.between):
             return np.full(self.nodes, here.initial)
         return np.asarray(worn.between[self.row(DEBRIS[0])])
@@ -181,11 +181,16 @@ class Layers:
         """Return the thickness of the debris that the strip carries (n_strip,), mm; None without."""
         return np.asarray(worn.carried[0]) if self.strip_carries and len(worn.carried) else None
 
-    def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array | None:
+    @cached_property
+    def linear(self) -> Array | None:
+        """Closure over pressure of a linear layer (n,), mm/MPa, as compliances have it; None without."""
+        return np.broadcast_to(self.winkler, (self.nodes,)) if np.any(self.winkler) else None
+
+    def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array:
         """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
 
         What the strip carries is what lies opposite each node, which laws know of: where it is heaped up, quadratic
-        elements fall below nothing beside it. None without.
+        elements fall below nothing beside it.
         """
         if not self.strip_carries or self.debris is None:
             return self.thickness(worn)
@@ -357,7 +362,8 @@ def layers_of(
     Raises:
         CaseError: a value is not positive somewhere.
     """
-    n, winkler, debris = len(pair.weights), None, None
+    n, debris = len(pair.weights), None
+    winkler: Array | float = 0.0
     closure: Law | None = None
     x = in_space(pair.punch.x)
     place = {name: np.asarray(x[:, axis]) for axis, name in enumerate("xyz")}

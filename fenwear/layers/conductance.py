@@ -43,12 +43,11 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
     share = 1 / (resistance * modulus)  # 2 k_1 k_2 / (k_1 + k_2) over E*
 
     def conductance(pressure: Array) -> Array:
-        given_way = np.zeros_like(pressure) if layers.winkler is None else layers.winkler
         closure, carried = layers.closure, np.maximum(pressure, 0.0)
         if isinstance(closure, SharedClosure):  # the spots conduct that asperities make
             carried = closure.carried(carried)
             closure = closure.law
-        slope = given_way if closure is None else given_way + closure.slope(carried)
+        slope = layers.winkler if closure is None else layers.winkler + closure.slope(carried)
         return np.asarray(share / slope)
 
     return conductance

@@ -186,7 +186,7 @@ class ContactConditions:
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
         states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
-        debris: Thickness of the third body (n,), mm; None without.
+        debris: Thickness of the third body (n,), mm.
         edge: Distance from the edge of the contact (n,), mm; None where nothing asks for it.
         friction_temperature: Which one friction depends on, see `FRICTION_TEMPERATURES`.
         covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`.
@@ -202,7 +202,7 @@ class ContactConditions:
     cycle: CycleShear | None = None
     states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     covered: tuple[Array | float, Array | float] = (0.0, 0.0)
-    debris: Array | None = None
+    debris: Array | float = 0.0
     edge: Array | None = None
     friction_temperature: str = "mean"
 
@@ -258,7 +258,7 @@ class ContactConditions:
             "z": z,
             "depth": self.depths[own],
             "s": self.slid,
-            "debris": none if self.debris is None else self.debris,
+            "debris": none + self.debris,
             "edge": none if self.edge is None else self.edge,
             "cs": none if self.cycle is None else self.cycle.ratio[own],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,

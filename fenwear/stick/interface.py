@@ -166,7 +166,7 @@ class StickInterface(OppositeBodies):
             operator.under(body.with_loads(())).by_load if body.moved else np.zeros_like(operator.by_load)
             for operator, body in zip(operators, bodies, strict=True)
         ]
-        closure = found.closure if self.layers.winkler is None else self.layers.winkler
+        closure = found.closure + self.layers.winkler
         behind = None if bodies[0].reach is None else operators
         return replace(found, moved=(moved[0], moved[1]), closure=closure, behind=behind)
 
@@ -224,9 +224,7 @@ class StickInterface(OppositeBodies):
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        found = position_of(
-            rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.winkler
-        )
+        found = position_of(rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.linear)
         return along_tangents(found) if self.far else found
 
 

@@ -134,7 +134,7 @@ class LocalLaws:
         worn: WornDepths | None = None,
         slid: Array | None = None,
         states: States = ({}, {}),
-        debris: Array | None = None,
+        debris: Array | float = 0.0,
         touching: Mask | None = None,
         cycle: CycleShear | None = None,
     ) -> ContactConditions:
@@ -148,7 +148,7 @@ class LocalLaws:
             worn: Depths; by default none.
             slid: What each node has slipped from the start (n,), mm; by default nothing.
             states: That laws remember, as those of punch and strip know them.
-            debris: Thickness of the third body (n,), mm; None without.
+            debris: Thickness of the third body (n,), mm.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
             cycle: What the last cycle tells of cross-shear and mean pressure; None before the first.
         """

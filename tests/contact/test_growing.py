@@ -256,7 +256,6 @@ def finite() -> Case:
 
 def crept(block: Block) -> Array:
     """Return how far punch and strip have crept at the end of a block (2, n), mm."""
-    assert block.system.creep is not None
     return np.array(list(block.system.creep.depths(block.end.worn.crept).values()))
 
 

@@ -44,7 +44,6 @@ def end(system: Tribosystem, how: str, count: int | None = None, tolerance: floa
 
 
 def crept(block: Block) -> np.ndarray:
-    assert block.system.creep is not None
     return block.system.creep.depth(block.end.worn.crept)
 
 
@@ -84,7 +83,6 @@ def test_a_bar_gets_shorter() -> None:
     """By J(t) / J(0) - 1 times its elastic shortening under a constant load, of both bodies, at every time."""
     one, other = ({"terms": [{"compliance": c, "time": tau}]} for c, tau in ((0.5, 2.0), (3.0, 7.0)))
     system = blocks({"creep": one}, {"creep": other}, 1.0)
-    assert system.creep is not None
     first = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).rigid[0, 0]
     block = next(march(system, 20))
     time = np.arange(1, 21)

@@ -99,7 +99,7 @@ def test_jumps_go_through_the_end_as_marches_do(law: str, bodies: str) -> None:
     system, cycles = coated(law, thickness, "", *more), 200
     *_, marched = march(system, 2 * cycles)
     for depth, thick in zip((marched.wear[-1], marched.wear_strip[-1]), system.coatings, strict=True):
-        if thick is not None:
+        if thick.any():
             assert 0.05 < (depth >= thick).mean() < 0.95
     errors = []
     for tolerance in (3e-2, 1e-3):
@@ -124,7 +124,6 @@ def test_jumps_see_where_friction_ends() -> None:
     system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 240
     *_, marched = march(system, half_cycles)
     thickness, exact = system.coatings[0], marched.wear[-1]
-    assert thickness is not None
     assert 0.1 < (exact >= thickness).mean() < 0.9
     errors = []
     for tolerance in (0.3, 0.1):
@@ -142,7 +141,6 @@ def test_per_area(law: str) -> None:
     settings = [*SMALLEST, f"contact.law='{law}'", *stick, "contact.friction=0.3", wear % (UNEVEN % size)]
     system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 100
     thickness = system.coatings[0]
-    assert thickness is not None
     *_, marched = march(system, half_cycles)
     touched = marched.wear[-1] > 0
     assert 0.1 < (marched.wear[-1][touched] >= thickness[touched]).mean() < 0.9
@@ -175,7 +173,6 @@ def test_a_coating_whose_law_is_another_one(law: str, name: str) -> None:
     wear = UNLIKE[name] % (UNEVEN % thickness)
     system = assemble(load_case("fretting-partial-slip", [*SMALLEST, f"contact.law='{law}'", *stick, wear]))
     thick = system.coatings[0]
-    assert thick is not None
     rates = {
         "base by its pressure": (lambda p: 1e-7 * p, lambda p: 2e-7 * (1 + p / 200) * p),
         "per area, then by pressure": (lambda p: 4e-5 * np.minimum(p / 5, 1), lambda p: 4e-7 * p),
@@ -329,7 +326,6 @@ def test_jumps_through_soft_coatings_as_marches(assembled: Assemble) -> None:
     system, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 240
     marched = [list(march(system, half_cycles, implicit=way))[-1].wear[-1] for way in (True, False)]
     exact, thickness = sum(marched) / 2, system.coatings[0]  # of which the errors of first order go
-    assert thickness is not None
     assert 0.05 < (exact >= thickness).mean() < 0.5
     hard = assembled("example2", *SMALL, (SOFT % "punch").replace(", modulus='20 MPa'", ""))
     assert np.abs(list(march(hard, half_cycles))[-1].wear[-1] - exact).max() > 0.1 * exact.max()

@@ -34,7 +34,6 @@ def case_of(*more: str) -> Case:
 
 
 def crept(block: Block) -> np.ndarray:
-    assert block.system.creep is not None
     return block.system.creep.depth(block.end.worn.crept)
 
 

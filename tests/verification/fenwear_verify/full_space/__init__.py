@@ -34,9 +34,8 @@ def nothing_condensed() -> Iterator[None]:
         return whole(sliding, [system.loaded[k] for k in phases])
 
     def passed(system: Tribosystem, phase: int, **_how: Any) -> FullContact:
-        interface = system.interfaces[phase] if system.creep is None else system.creep.grown[phase]
-        factors = None if system.creep is None else system.creep.factors(phase)
-        softer = None if factors is None else [(factors[0], factors[1])]
+        interface, factors = system.creep.grown[phase], system.creep.factors(phase)
+        softer = [(factors[0], factors[1])]
         both = [(system.loaded[phase].punch, system.loaded[phase].strip)]
         return FullContact([SlidingContact(interface, system.friction_ratios()[phase])], both, softer)
 

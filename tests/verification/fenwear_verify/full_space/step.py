@@ -43,7 +43,7 @@ class FullStep(Step):
     def _solve(self, whole: WholeBodies, status: ContactStatus) -> StatusSolution:
         position, r, loose = self.position, self.position.modes.shape[1], self.imposed.force is not None
         count, size = self.d * self.n, whole.stiffness.shape[0]
-        softer = (1.0, 1.0, 1.0) if self.creep is None else self.creep.factors(self.imposed.duration)
+        softer = self.creep.factors(self.imposed.duration)
         gives, closed_at_none = self._given_way(status)
         A, B = self._laws_of(status, gives)
         rigid = csr_array(position.modes * self.units)

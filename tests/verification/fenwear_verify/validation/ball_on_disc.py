@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+import xarray as xr
 
-from fenwear import load_case
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
-from fenwear_verify.validation.runs import history_of, with_settings
+from fenwear_verify.validation.runs import history_of
 
+RADIUS = 5.0  # of the ball, mm
 WORK = 10.0 * 1e6  # load times sliding distance, N mm
 DISCS = {  # settings of the disc's material
     "steel": (),
@@ -29,8 +28,7 @@ SHORT = (
     calibrated="One wear coefficient for each disc, from the worn volume: k = V / (F s).",
     predicted="Width of the scar at the end, and how it grows.",
     verdict="The width follows from the volume by geometry. A width is a weak measure: 13 % of it are 51 % of the "
-    "volume, "
-    "so that the scatter between laboratories is one of the wear coefficient.",
+    "volume, so that the scatter between laboratories is one of the wear coefficient.",
 )
 def compare(scope: Scope) -> Finding:
     """Return the comparison of both discs."""
@@ -39,24 +37,18 @@ def compare(scope: Scope) -> Finding:
     for at, (disc, settings) in enumerate(DISCS.items()):
         width, deviation = measured["scar (mm)"][at], measured["scar deviation (mm)"][at]
         coefficient = 1e-3 * measured["volume (1e-3 mm3)"][at] / WORK
-        asked = with_settings([*settings, f"wear.punch.coefficient={coefficient}"], SHORT, scope)
-        history, _ = history_of(load_case(Path(__file__).with_name("ball_on_disc.toml"), asked))
-        distance = 1e-3 * history["sliding_distance"].values
-        volume = history["worn_volume"].values
-        scar = history["scar_width"].values
+        history, _ = history_of("ball_on_disc.toml", [*settings, f"wear.punch.coefficient={coefficient}"], SHORT, scope)
+        distance, scar = 1e-3 * history["sliding_distance"].values, history["scar_width"].values
+        volume, u_num = float(history["worn_volume"][-1]), _half_node(history)
+        cap = float(np.pi * scar[-1] ** 4 / (64 * RADIUS))
         # Volume goes with the fourth power of the width: what scatters in one scatters four times as much in the other.
-        comparisons.append(
-            Comparison(f"width of the scar, {disc} disc (mm)", width, float(scar[-1]), deviation, _half_node(history))
-        )
-        cap = np.pi * scar[-1] ** 4 / (64 * 5.0)
-        comparisons.append(
-            Comparison(f"volume of the cap of that width, {disc} disc (mm³)", float(volume[-1]), float(cap))
-        )
+        comparisons += [
+            Comparison(f"width of the scar, {disc} disc (mm)", width, float(scar[-1]), deviation, u_num),
+            Comparison(f"volume of the cap of that width, {disc} disc (mm³)", volume, cap),
+        ]
         curves += [
-            Curve(
-                f"{disc} disc, measured", np.array([1000.0]), np.array([width]), np.array([deviation]), measured=True
-            ),
-            Curve(f"{disc} disc", distance, scar),
+            Curve(f"{disc} disc, measured", np.array([1000.0]), np.array([width]), np.array([deviation]), True),
+            Curve(f"{disc} disc", distance, scar, np.full(len(scar), u_num)),
         ]
     percent = float(max((c.percent for c in comparisons[::2]), key=abs))
     scatter = 100 * measured["scar deviation (mm)"][0] / measured["scar (mm)"][0]
@@ -67,7 +59,7 @@ def compare(scope: Scope) -> Finding:
     )  # fmt: skip
 
 
-def _half_node(history: object) -> float:
+def _half_node(history: xr.Dataset) -> float:
     """Return the standard uncertainty of a width that the spacing of nodes leaves, mm: its edge lies between two."""
-    x = np.unique(np.round(history["x"].values, 6))  # type: ignore[index]
+    x = np.unique(np.round(history["x"].values, 6))
     return float(np.diff(x).max() / np.sqrt(12) * np.sqrt(2))

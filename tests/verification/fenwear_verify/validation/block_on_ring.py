@@ -6,18 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear import load_case
-from fenwear.arrays import Array
 from fenwear.life import measured_folder
-from fenwear_verify.validation.experiment import (
-    Comparison,
-    Curve,
-    Finding,
-    Scope,
-    experiment,
-    root_mean_square,
-)
-from fenwear_verify.validation.runs import area_below, history_of, width_below, with_settings
+from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, root_mean_square
+from fenwear_verify.validation.runs import area_below, depth_uncertainty, history_of, widths
 
 DISTANCE, LINE_LOAD = 3.6e6, 65 / 6  # mm, N/mm
 OUTSIDE = 1.5  # beyond it the block is not worn, mm: the trace's zero is its mean there
@@ -30,8 +21,8 @@ SHORT = ("geometry.parameters.elements_along_contact=24",)
     name="block-on-ring",
     title="Block on ring, three tests: the shape of the worn block",
     source="A. Cruzado, A. Zabala, M. A. Urchegui, X. Gomez, Revista de Metalurgia 46 (2010) 106-114, Fig. 12; "
-    "digitised by "
-    "I. Llavori (LevelSetWear, BSD 3-Clause, Copyright (c) 2026 Inigo Llavori, Mondragon Unibertsitatea).",
+    "digitised by I. Llavori (LevelSetWear, BSD 3-Clause, Copyright (c) 2026 Inigo Llavori, Mondragon "
+    "Unibertsitatea).",
     measured="Three worn profiles after 3,600 m, every 0.05 mm. The coefficients of the three tests scatter by 11 %.",
     given="65 N on 6 mm, ring of radius 20 mm, steel on steel, friction 0.65.",
     calibrated="One coefficient for each test, from its worn area alone: k = A / (P' s).",
@@ -41,46 +32,41 @@ SHORT = ("geometry.parameters.elements_along_contact=24",)
 def compare(scope: Scope) -> Finding:
     """Return the comparison of the three shapes."""
     folder = measured_folder()
-    comparisons, curves, differences, depths = [], [], [], []
+    comparisons, curves, misfits, depths = [], [], [], []
     for number in (1, 2, 3):
-        x, depth = _trace(folder / f"block_on_ring_{number}.csv")
-        coefficient = area_below(x, 1e-3 * depth) / (LINE_LOAD * DISTANCE)
-        settings = with_settings([f"wear.punch.coefficient={coefficient}"], SHORT, scope)
-        history, summary = history_of(load_case(folder / "block_on_ring.toml", settings))
-        at, worn = history["x"].values, 1e3 * history["wear"].isel(half_cycle=-1).values
-        u_num = 1e3 * float(summary.get("uncertainty", {}).get("punch", {}).get("largest_depth_mm", 0.0))
-        middle = np.abs(x) <= MIDDLE
-        differences.append(np.interp(x, at, worn, left=0.0, right=0.0) - depth)
-        depths.append(depth[middle].mean())
-        rough = float(np.std(depth[middle]) / np.sqrt(middle.sum()))  # of the mean of a rough bottom
-        comparisons += [
-            Comparison(
-                f"test {number}: width at {level:g} µm (mm)", width_below(x, depth, level), width_below(at, worn, level)
-            )
-            for level in LEVELS
-        ]
+        measured = _trace(folder / f"block_on_ring_{number}.csv", f"test {number}")
+        coefficient = 1e-3 * area_below(measured) / (LINE_LOAD * DISTANCE)
+        settings = [f"wear.punch.coefficient={coefficient}"]
+        history, summary = history_of(folder / "block_on_ring.toml", settings, SHORT, scope)
+        x, height = history["x"].values, -1e3 * history["wear"].isel(half_cycle=-1).values
+        u_num = depth_uncertainty(summary, "punch")
+        predicted = Curve(f"k = {1e9 * coefficient:.2f}e-9 mm²/N", x, height, np.full(len(x), u_num))
+        middle = np.abs(measured.x) <= MIDDLE
+        bottom = -measured.y[middle]
+        depths.append(bottom.mean())
+        misfits.append(predicted.misfit(measured))
+        comparisons += widths(measured.name, measured, predicted, LEVELS)
         comparisons.append(
             Comparison(
-                f"test {number}: mean depth in the middle (µm)", depths[-1],
-                float(np.interp(x[middle], at, worn).mean()), rough, u_num,
+                f"mean depth in the middle, {measured.name} (µm)", depths[-1],
+                -float(predicted.at(measured.x[middle]).mean()),
+                float(np.std(bottom) / np.sqrt(len(bottom))),  # of the mean of a rough bottom
+                u_num,
             )
         )  # fmt: skip
-        curves += [
-            Curve(f"test {number}", x, -depth, measured=True),
-            Curve(f"k = {1e9 * coefficient:.2f}e-9 mm²/N", at, -worn),
-        ]
-    number_um = root_mean_square(np.concatenate(differences))
-    percent = 100 * number_um / float(np.mean(depths))
+        curves += [measured, predicted]
+    misfit = root_mean_square(np.array(misfits))
+    percent = 100 * misfit / float(np.mean(depths))
     return Finding(
-        f"root mean square difference of the profiles {number_um:.1f} µm ({percent:.0f} % of the mean depth)",
+        f"root mean square difference of the profiles {misfit:.1f} µm ({percent:.0f} % of the mean depth)",
         percent, comparisons, ("x (mm)", "height of the block (µm)"), curves,
     )  # fmt: skip
 
 
-def _trace(path: Path) -> tuple[Array, Array]:
-    """Return places (n,), mm, and depths (n,), µm, below the mean of the unworn surface on both sides."""
+def _trace(path: Path, name: str) -> Curve:
+    """Return the measured heights, µm, above the mean of the unworn surface on both sides."""
     rows = [line.split(",") for line in path.read_text("utf-8").splitlines() if line and line[0] in "-0123456789"]
     x, height = np.array(rows, dtype=float).T
     unworn = np.abs(x) >= OUTSIDE
     line = np.polyfit(x[unworn], height[unworn], 1)
-    return x, np.polyval(line, x) - height
+    return Curve(name, x, height - np.polyval(line, x), measured=True)

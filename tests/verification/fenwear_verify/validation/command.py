@@ -15,12 +15,13 @@ from mpi4py import MPI
 
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
-from fenwear.report.style import COLOURS, panels
+from fenwear.report.style import COLOURS, Style, panels
 from fenwear.results.history import CASE, free_directory, make_directory
 from fenwear.stack import versions
 from fenwear_verify.validation.experiment import Comparison, Experiment, Finding, Scope, experiments
 
 DEFAULT, NUMBERS = Path("results") / "validation", "validation.json"
+COLUMN = Style(85 / 25.4)  # as wide as a journal's column, inches
 
 
 def titles() -> dict[str, str]:
@@ -110,7 +111,7 @@ def _percent(c: Comparison) -> str:
 
 def draw(finding: Finding) -> bytes:
     """Return the figure of an experiment as a PNG: measured points with error bars, and predicted curves with bands."""
-    canvas, (ax,) = panels(1, 3.8)
+    canvas, (ax,) = panels(1, 3.4, look=COLUMN)
     points, drawn = 0, 0
     for curve in finding.curves:
         if curve.measured:
@@ -129,7 +130,7 @@ def draw(finding: Finding) -> bytes:
     ax.set(xlabel=finding.axes[0], ylabel=finding.axes[1], xscale=finding.scales[0], yscale=finding.scales[1])
     ax.legend(frameon=False, fontsize="small", loc="best")
     buffer = io.BytesIO()
-    canvas.savefig(buffer, format="png", dpi=130)
+    canvas.savefig(buffer, format="png", dpi=220)
     return buffer.getvalue()
 
 

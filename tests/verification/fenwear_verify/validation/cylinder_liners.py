@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from scipy.stats import t as student
 
-from fenwear import load_case
-from fenwear.arrays import Array
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, percentage_error, table
 from fenwear_verify.validation.runs import history_of
 
@@ -23,62 +19,49 @@ LAWS = {"running-in": "1e-6*(1 + s/100)**-0.5", "Archard": "1e-6"}  # coefficien
     source="M. Giorgio, M. Guida, G. Pulcini: 64 readings of 32 liners over years; two of the liners are given.",
     measured="Wear depths at four times of each liner. No scatter of a reading is published.",
     given="Times of the readings. Pressure and speed are not published: they are held constant.",
-    calibrated="One coefficient for each liner, on its first two readings. Its law is a "
-    "coefficient that falls with the square root of the distance slid (running-in), beside a constant one (Archard). "
-    "The square root was chosen with all eight readings in sight, so the error below is not a blind one.",
+    calibrated="One coefficient for each liner, on its first two readings. Its law is a coefficient that falls with "
+    "the square root of the distance slid (running-in), beside a constant one (Archard). The square root was chosen "
+    "with all eight readings in sight, so the error below is not a blind one.",
     predicted="The later two readings, with an interval of 95 %: the scatter of the four fitted readings about both "
-    "curves "
-    "(two degrees of freedom), and that of the coefficient. Other liners are predicted in the same way.",
+    "curves (two degrees of freedom), and that of the coefficient. Other liners are predicted in the same way.",
     verdict="Constant coefficients overpredict the later readings: the liners run in. The square root is an "
-    "assumption; a "
-    "law with the distance slid, fitted to the first readings of many liners, would narrow the interval.",
+    "assumption; a law with the distance slid, fitted to the first readings of many liners, would narrow the "
+    "interval.",
 )
-def compare(scope: Scope) -> Finding:  # noqa: ARG001 (both scopes take a second)
+def compare(scope: Scope) -> Finding:
     """Return the predicted later readings of both liners."""
-    measured = table("cylinder_liners.csv")
+    data = table("cylinder_liners.csv")
     liners = [
-        (measured["time (years)"][own], measured["depth (mm)"][own])
-        for own in (measured["liner"] == 1, measured["liner"] == 2)
+        Curve(f"liner {number}", data["time (years)"][own], data["depth (mm)"][own], measured=True)
+        for number, own in ((1, data["liner"] == 1), (2, data["liner"] == 2))
     ]
     comparisons, curves, rows = [], [], [("liner", "years", "predicted (mm)", "95 % from", "to", "measured (mm)")]
-    later: dict[str, list[tuple[Array, Array]]] = {law: [] for law in LAWS}
+    errors = {}
     for law, coefficient in LAWS.items():
-        time, depth = _unit_curve(coefficient)
-        shapes = [np.interp(years, time, depth) for years, _ in liners]
-        factors = [np.exp(np.mean(np.log(d[:FIRST] / s[:FIRST]))) for (_, d), s in zip(liners, shapes, strict=True)]
-        missed = [np.log(f * s[:FIRST] / d[:FIRST]) for f, s, (_, d) in zip(factors, shapes, liners, strict=True)]
+        shape = _shape(coefficient, scope)
+        ratios = [np.log(liner.y[:FIRST] / shape.at(liner.x[:FIRST])) for liner in liners]
         free = len(liners) * (FIRST - 1)
-        scatter = float(np.sqrt(np.sum(np.square(missed)) / free))
-        wide = student.ppf(0.975, free) * scatter * np.sqrt(1 + 1 / FIRST)
-        for number, ((years, measured_depth), shape, factor) in enumerate(zip(liners, shapes, factors, strict=True), 1):
-            predicted = factor * shape
-            later[law].append((predicted[FIRST:], measured_depth[FIRST:]))
-            if law == "running-in":
-                curves.append(Curve(f"liner {number}", years, measured_depth, measured=True))
-                curves.append(
-                    Curve(f"liner {number}, running-in", time, factor * depth, factor * depth * np.expm1(wide))
-                )
-                rows += [
-                    (
-                        str(number),
-                        f"{y:.2f}",
-                        f"{p:.2f}",
-                        f"{p * np.exp(-wide):.2f}",
-                        f"{p * np.exp(wide):.2f}",
-                        f"{m:.2f}",
-                    )
-                    for y, p, m in zip(years[FIRST:], predicted[FIRST:], measured_depth[FIRST:], strict=True)
-                ]
-            comparisons += [
+        scatter = float(np.sqrt(sum(np.sum((r - r.mean()) ** 2) for r in ratios) / free))
+        wide = np.exp(student.ppf(0.975, free) * scatter * np.sqrt(1 + 1 / FIRST))
+        of_law = []
+        for liner, ratio in zip(liners, ratios, strict=True):
+            depth = np.exp(ratio.mean()) * shape.y
+            predicted = Curve(f"{liner.name}, {law}", shape.x, depth, depth * (wide - 1))
+            later = list(zip(liner.x[FIRST:], predicted.at(liner.x[FIRST:]), liner.y[FIRST:], strict=True))
+            of_law += [
                 Comparison(
-                    f"liner {number} after {y:.2f} years, {law} (mm)", m, p, u_input=p * scatter * np.sqrt(1 / FIRST)
+                    f"{liner.name} after {year:.2f} years, {law} (mm)", d, s, u_input=s * scatter / np.sqrt(FIRST)
                 )
-                for y, p, m in zip(years[FIRST:], predicted[FIRST:], measured_depth[FIRST:], strict=True)
+                for year, s, d in later
             ]
-    errors = {
-        law: percentage_error(np.concatenate([p for p, _ in found]), np.concatenate([m for _, m in found]))
-        for law, found in later.items()
-    }
+            if law == "running-in":
+                curves += [liner, predicted]
+                rows += [
+                    (liner.name[-1], *(f"{value:.2f}" for value in (year, s, s / wide, s * wide, d)))
+                    for year, s, d in later
+                ]
+        errors[law] = percentage_error(np.array([c.predicted for c in of_law]), np.array([c.measured for c in of_law]))
+        comparisons += of_law
     return Finding(
         f"root mean square error of the four later readings {errors['running-in']:.0f} % with running-in, "
         f"{errors['Archard']:.0f} % with a constant coefficient",
@@ -86,9 +69,9 @@ def compare(scope: Scope) -> Finding:  # noqa: ARG001 (both scopes take a second
     )  # fmt: skip
 
 
-def _unit_curve(coefficient: str) -> tuple[Array, Array]:
-    """Return times (n,), years, and depths (n,), in an arbitrary unit, of a flat contact with this coefficient."""
+def _shape(coefficient: str, scope: Scope) -> Curve:
+    """Return the depth over years, in an arbitrary unit, of a flat contact with this coefficient."""
     law = f'wear.punch.coefficient={{expression = "{coefficient}", unit = "1/MPa"}}'
-    case = load_case(Path(__file__).with_name("cylinder_liners.toml"), [law])
-    history, _ = history_of(case)
-    return YEARS * history["half_cycle"].values / case.run.half_cycles, history["wear"].mean("x").values
+    history, _ = history_of("cylinder_liners.toml", [law], (), scope)
+    cycles = history["half_cycle"].values
+    return Curve(coefficient, YEARS * cycles / cycles[-1], history["wear"].mean("x").values)

@@ -83,6 +83,14 @@ class Curve:
     spread: Array = field(default_factory=lambda: np.zeros(0))
     measured: bool = False
 
+    def at(self, x: Array) -> Array:
+        """Return the values at places (n,), between its own by straight lines."""
+        return np.interp(x, self.x, self.y)
+
+    def misfit(self, measured: Curve) -> float:
+        """Return the root mean square difference from a measured curve at its places."""
+        return root_mean_square(self.at(measured.x) - measured.y)
+
 
 @dataclass(frozen=True)
 class Finding:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenwear import load_case
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
-from fenwear_verify.validation.runs import history_of, with_settings
+from fenwear_verify.validation.runs import history_of
 
 YEARS, CYCLES = 10, 10_000_000  # a million cycles a year
 PINS = 0  # row of the flat pins of GUR 1050 in the table of wear factors
@@ -21,8 +20,8 @@ SHORT = ("geometry.parameters.across=4", "geometry.parameters.around=3", "run.ju
     name="hip-in-patients",
     title="Hips in patients: penetration of the head over ten years",
     source="Penetration: Int. Orthop. 36 (2012) 485-490 (PMC3291767) and josr-online.com/content/8/1/20 (CC BY), "
-    "abstracts. Wear factor: B. J. Hunt, T. J. Joyce, Lubricants 4 (2016) 25 (CC BY). A million cycles a year: "
-    "V. Saikko, Wear 176 (1994) 207-212, whose abstract takes 4.1 mg in a million cycles as 5 µm a year.",
+    "abstracts. Wear factor: B. J. Hunt, T. J. Joyce, Lubricants 4 (2016) 25 (CC BY). A million cycles a year: V. "
+    "Saikko, Wear 176 (1994) 207-212, whose abstract takes 4.1 mg in a million cycles as 5 µm a year.",
     measured="Cobalt chromium on conventional polyethylene. Ten years after the operation 0.96 mm (95 % interval of "
     "the mean 0.68 to 1.23), by radiostereometry; in 22 other patients 0.133 ± 0.045 mm a year.",
     given="Wear factor of flat pins of GUR 1050 in serum, 3.64 ± 0.39e-6 mm³/(N m), and a million cycles a year. The "
@@ -39,7 +38,7 @@ def compare(scope: Scope) -> Finding:
     measured, factors = table("hip_in_patients.csv"), table("polyethylene.csv")
     factor, deviation = factors["wear factor (1e-6 mm3/Nm)"][PINS], factors["deviation"][PINS]
     settings = [f"wear.punch.coefficient={1e-9 * factor} 1/MPa", f"run.half_cycles={CYCLES}"]
-    history, _ = history_of(load_case("ball-in-cup", with_settings(settings, SHORT, scope)))
+    history, _ = history_of("ball-in-cup", settings, SHORT, scope)
     years, depth = 1e-6 * history["half_cycle"].values, history["largest_depth"].values
     share = float(np.sqrt((deviation / factor) ** 2 + DIAMETER**2 + ACTIVITY**2 + WEIGHT**2))
     curves = [Curve("from the pins' wear factor", years, depth, share * depth)]

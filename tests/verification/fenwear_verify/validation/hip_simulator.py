@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from fenwear import load_case
+from fenwear.arrays import Array
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
-from fenwear_verify.validation.runs import history_of, with_settings
+from fenwear_verify.validation.runs import history_of
 
 FIRST = 1e-9  # coefficient of the run that the calibration scales, mm²/N
 PENALTY, DEVIATION = 7.5, 0.87  # published 6 to 9 % of wear for each mm of diameter: mean and standard deviation, %
@@ -20,15 +18,15 @@ SHORT = ("geometry.parameters.across=4", "geometry.parameters.around=3", "run.ju
     title="Hip simulator: wear of polyethylene cups by the diameter of the head",
     source="Hip-simulator ranking of polyethylene wear: Comparisons between ceramic heads of different sizes. The "
     "abstract alone was at hand (scilit.com/publications/64289e6e6b72826d39a6324680edadad).",
-    measured="Volumes lost in a million cycles: 23 mm³ with a head of 22 mm and up to 32 mm³ with 28 mm, precision "
-    "9 %. Each mm of diameter adds 6 to 9 % of wear.",
+    measured="Volumes lost in a million cycles: 23 mm³ with a head of 22 mm and up to 32 mm³ with 28 mm, precision 9 "
+    "%. Each mm of diameter adds 6 to 9 % of wear.",
     given="Diameters, and a sinusoidal load with a peak of 2 kN. The abstract has neither motion nor clearance: "
     "rocking by 23° about two axes and 0.1 mm are assumptions, which are the same for both heads.",
     calibrated="One wear coefficient, on the volume of the head of 22 mm.",
     predicted="The volume of the head of 28 mm, and the wear that each mm of diameter adds.",
     verdict="Archard's law makes wear grow with the path, which grows with the diameter. Measured wear grows faster, "
-    "between the diameter and its square. Wear that falls with the pressure would give that: a coefficient of the mean "
-    "pressure (pm), or wear by the area of contact (per_area).",
+    "between the diameter and its square. Wear that falls with the pressure would give that: a coefficient of the "
+    "mean pressure (pm), or wear by the area of contact (per_area).",
 )
 def compare(scope: Scope) -> Finding:
     """Return the comparison of both heads."""
@@ -58,9 +56,8 @@ def compare(scope: Scope) -> Finding:
     )  # fmt: skip
 
 
-def _volume(diameter: float, coefficient: float, scope: Scope) -> tuple[np.ndarray, np.ndarray]:
+def _volume(diameter: float, coefficient: float, scope: Scope) -> tuple[Array, Array]:
     """Return cycles (n,) and the volumes lost until then (n,), mm³."""
     settings = [f"geometry.parameters.radius={diameter / 2} mm", f"wear.punch.coefficient={coefficient} 1/MPa"]
-    case = load_case(Path(__file__).with_name("hip_simulator.toml"), with_settings(settings, SHORT, scope))
-    history, _ = history_of(case)
+    history, _ = history_of("hip_simulator.toml", settings, SHORT, scope)
     return history["half_cycle"].values, history["worn_volume"].values

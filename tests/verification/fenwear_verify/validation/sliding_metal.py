@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t as student
 
-from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.life import calibrate, read_data
@@ -18,6 +17,7 @@ from fenwear.life.keys import parse_unknown
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, percentage_error, table
+from fenwear_verify.validation.runs import case_of
 
 GRAVITY = 9.80665e-3  # N/g
 LOADS = (10, 100)  # g
@@ -34,23 +34,21 @@ SHORT = ("geometry.parameters.elements_along_contact=24",)
     "specimens.",
     measured="Widths of scars after eight numbers of cycles at 10 g and at 100 g. Widths at 50 g are kept apart.",
     given="Loads and cycles. The geometry is not published: the case is a cylinder on a flat, so that exponents and "
-    "ratios "
-    "alone count.",
-    calibrated="Coefficient k and pressure exponent b of the law k p^b, on the 16 widths at 10 g and 100 g. Each width "
-    "has the same relative weight, which was chosen after a first fit with equal absolute weights had left 12 to 16 %.",
+    "ratios alone count.",
+    calibrated="Coefficient k and pressure exponent b of the law k p^b, on the 16 widths at 10 g and 100 g. Each "
+    "width has the same relative weight, which was chosen after a first fit with equal absolute weights had left 12 "
+    "to 16 %.",
     predicted="Widths at 50 g at the same eight numbers of cycles, with intervals of 95 %.",
-    verdict="Archard's law (b = 1) has exponents 1/3 of the cycles and 1/3 of the load. Measured are 0.20 and 0.65. "
-    "A law "
-    "k p^b on a line contact has 1/(2+b) and b/(2+b): with b = 3 both are nearly met. A wear rate that falls with "
-    "the "
-    "cycles, as below a growing oxide, would free the two exponents from each other.",
+    verdict="Archard's law (b = 1) has exponents 1/3 of the cycles and 1/3 of the load. Measured are 0.20 and 0.65. A "
+    "law k p^b on a line contact has 1/(2+b) and b/(2+b): with b = 3 both are nearly met. A wear rate that falls with "
+    "the cycles, as below a growing oxide, would free the two exponents from each other.",
 )
 def compare(scope: Scope) -> Finding:
     """Return the fit at two loads and the prediction at the third."""
     measured = table("sliding_metal.csv")
     cycles = measured["cycles"]
     widths = [measured[f"width at {load} g (um)"] for load in LOADS]
-    case = load_case(Path(__file__).with_name("sliding_metal.toml"), SHORT if scope == "short" else ())
+    case = case_of("sliding_metal.toml", (), SHORT, scope)
     unknowns = ["wear.punch.coefficient=1e-14..1e-4", "wear.punch.pressure_exponent=0.5..6"]
     with tempfile.TemporaryDirectory() as folder:
         files = [_data(Path(folder), load, cycles, width) for load, width in zip(LOADS, widths, strict=True)]

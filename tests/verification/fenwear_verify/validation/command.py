@@ -22,6 +22,7 @@ from fenwear_verify.validation.experiment import Comparison, Experiment, Finding
 
 DEFAULT, NUMBERS = Path("results") / "validation", "validation.json"
 COLUMN = Style(85 / 25.4)  # as wide as a journal's column, inches
+SHORT_NAME = 22  # letters: two names of this length fit beside each other
 
 
 def titles() -> dict[str, str]:
@@ -123,12 +124,12 @@ def draw(finding: Finding) -> bytes:
         colour = COLOURS[drawn % len(COLOURS)]
         ax.plot(curve.x, curve.y, color=colour, linewidth=1.3, label=curve.name)
         if len(curve.spread):
-            ax.fill_between(
-                curve.x, curve.y - curve.spread, curve.y + curve.spread, color=colour, alpha=0.2, linewidth=0
-            )
+            below, above = np.broadcast_to(curve.spread, (2, len(curve.y)))
+            ax.fill_between(curve.x, curve.y - below, curve.y + above, color=colour, alpha=0.2, linewidth=0)
         drawn += 1
     ax.set(xlabel=finding.axes[0], ylabel=finding.axes[1], xscale=finding.scales[0], yscale=finding.scales[1])
-    ax.legend(frameon=False, fontsize="small", loc="best")
+    columns = 2 if max(len(curve.name) for curve in finding.curves) <= SHORT_NAME else 1
+    ax.legend(frameon=False, fontsize="small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns)
     buffer = io.BytesIO()
     canvas.savefig(buffer, format="png", dpi=220)
     return buffer.getvalue()

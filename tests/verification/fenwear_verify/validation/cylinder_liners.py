@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import t as student
 
-from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, percentage_error, table
+from fenwear_verify.validation.experiment import (
+    Comparison,
+    Curve,
+    Finding,
+    Scope,
+    between_factors,
+    experiment,
+    percentage_error,
+    table,
+)
 from fenwear_verify.validation.runs import history_of
 
 FIRST = 2  # readings of each liner that its coefficient is fitted to
@@ -46,7 +55,7 @@ def compare(scope: Scope) -> Finding:
         of_law = []
         for liner, ratio in zip(liners, ratios, strict=True):
             depth = np.exp(ratio.mean()) * shape.y
-            predicted = Curve(f"{liner.name}, {law}", shape.x, depth, depth * (wide - 1))
+            predicted = Curve(f"{liner.name}, {law}", shape.x, depth, between_factors(depth, wide))
             later = list(zip(liner.x[FIRST:], predicted.at(liner.x[FIRST:]), liner.y[FIRST:], strict=True))
             of_law += [
                 Comparison(

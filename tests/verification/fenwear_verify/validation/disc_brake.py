@@ -67,7 +67,7 @@ def compare(scope: Scope) -> Finding:
     return Finding(
         f"root mean square difference {misfits[0]:.0f} K ({percent:.0f} % of the largest rise) with nothing fitted, "
         f"{misfits[1]:.0f} K with the heat capacity of the mean temperature, {misfits[2]:.0f} K with round elements",
-        percent, comparisons, ("time (s)", "temperature 1 mm below the surface (°C)"), curves,
+        percent, comparisons, ("time (s)", "temperature 1 mm deep (°C)"), curves,
     )  # fmt: skip
 
 

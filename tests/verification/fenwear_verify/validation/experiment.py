@@ -73,7 +73,8 @@ class Curve:
     Attributes:
         name: In the legend.
         x, y: Places and values.
-        spread: Half-width of the error bars of points, or of the band about a line; empty for none.
+        spread: Half-width of the error bars of points, or of the band about a line; below and above (2, n) where they
+            differ; empty for none.
         measured: Whether it is measured (points) or predicted (a line).
     """
 
@@ -180,6 +181,11 @@ def table(name: str) -> dict[str, Array]:
     rows = list(csv.reader(line for line in text.splitlines() if line and not line.startswith("#")))
     values = np.array([[float(cell) for cell in row] for row in rows[1:]])
     return {heading.strip(): values[:, at] for at, heading in enumerate(rows[0])}
+
+
+def between_factors(values: Array, factor: Array | float) -> Array:
+    """Return the spread (2, n) of a band from the values over a factor to the values times it."""
+    return np.stack([values - values / factor, values * factor - values])
 
 
 def root_mean_square(values: Array) -> float:

@@ -16,7 +16,16 @@ from fenwear.life import calibrate, read_data
 from fenwear.life.keys import parse_unknown
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
-from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, percentage_error, table
+from fenwear_verify.validation.experiment import (
+    Comparison,
+    Curve,
+    Finding,
+    Scope,
+    between_factors,
+    experiment,
+    percentage_error,
+    table,
+)
 from fenwear_verify.validation.runs import case_of
 
 GRAVITY = 9.80665e-3  # N/g
@@ -71,7 +80,7 @@ def compare(scope: Scope) -> Finding:
     curves = [
         *(Curve(f"{load} g", cycles, width, measured=True) for load, width in zip(LOADS, widths, strict=True)),
         *(Curve(f"{load} g, fitted", cycles, width) for load, width in zip(LOADS, fitted, strict=True)),
-        Curve(f"{KEPT} g, predicted", cycles, predicted, predicted * (factor - 1)),
+        Curve(f"{KEPT} g, predicted", cycles, predicted, between_factors(predicted, factor)),
     ]
     comparisons = [
         Comparison(f"exponent of the cycles at {load} g", _slope(cycles, width), _slope(cycles, fit))

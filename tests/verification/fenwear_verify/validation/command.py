@@ -112,7 +112,9 @@ def _percent(c: Comparison) -> str:
 
 def draw(finding: Finding) -> bytes:
     """Return the figure of an experiment as a PNG: measured points with error bars, and predicted curves with bands."""
-    canvas, (ax,) = panels(1, 3.4, look=COLUMN)
+    from matplotlib.ticker import LogFormatter
+
+    canvas, (ax,) = panels(1, 4.0, look=COLUMN)
     points, drawn = 0, 0
     for curve in finding.curves:
         if curve.measured:
@@ -128,6 +130,8 @@ def draw(finding: Finding) -> bytes:
             ax.fill_between(curve.x, curve.y - below, curve.y + above, color=colour, alpha=0.2, linewidth=0)
         drawn += 1
     ax.set(xlabel=finding.axes[0], ylabel=finding.axes[1], xscale=finding.scales[0], yscale=finding.scales[1])
+    if finding.scales[1] == "log":
+        ax.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 1)))
     columns = 2 if max(len(curve.name) for curve in finding.curves) <= SHORT_NAME else 1
     ax.legend(frameon=False, fontsize="small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns)
     buffer = io.BytesIO()

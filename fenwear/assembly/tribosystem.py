@@ -60,7 +60,7 @@ class Condensed:
     strip_moves: bool
     passed: Array | None = None
 
-    def join(self, rigid: RigidEquilibrium, layer: Array | None = None) -> Interface:
+    def join(self, rigid: RigidEquilibrium, layer: Array) -> Interface:
         """Return both joined at the place of a pair, with a linear layer."""
         strip, moves = self.facing(rigid)
         return Interface(rigid, self.punch, strip, moves, layer=layer)

@@ -18,8 +18,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Nodes
+from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import contact_tag
+from fenwear.bodies.convolution import Convolution, GridOperator
 from fenwear.bodies.correction import Correction, Ground, below, cell_constants, coefficients, correct, interpolation
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import entries
@@ -43,7 +44,7 @@ SAME = 1e-9  # of a material's constants: one material
 
 
 @dataclass(frozen=True)
-class FineBody:
+class FineBody(GridOperator):
     """A half-space and what a finite body does otherwise.
 
     Attributes:
@@ -73,57 +74,21 @@ class FineBody:
         """Displacement by the loads (q, d), mm."""
         return self.weights.to_nodes(self.loaded)
 
-    @cached_property
-    def cost(self) -> float:
-        """Of a product."""
-        longest = max(factor.shape[1] for factor in self.weights.factors)
-        return self.half.cost + 2.0 * len(self.places) * longest * self.half.dim
-
     @property
     def places(self) -> NDArray[np.int64]:
         """Whole numbers of each node along the axes of the grid (q, d - 1)."""
         return self.half.places
 
-    def table(self, traction: Array) -> Array:
-        """Return the half-space's displacement along the first direction by a force (d,) at all distances."""
-        return self.half.table(traction)
-
-    def smooth(self, traction: Array) -> tuple[TensorWeights, Array]:
-        """Return L, and what forces along a traction (d,) at points do along the first direction (m, m)."""
-        return self.weights, self.correction.response[:, 0] @ traction
-
-    @property
-    def tables(self) -> Array:
-        """The half-space's displacements by unit forces at all distances (2 m - 1, ..., a, d), mm."""
-        return self.half.tables
-
-    @property
-    def mixed(self) -> tuple[TensorWeights, Array]:
-        """L, and what forces at points do along the directions (m, a, m, d)."""
-        return self.weights, self.correction.response
+    @cached_property
+    def convolution(self) -> Convolution:
+        """C along its directions, by forces along the model's axes."""
+        return replace(self.half.convolution, smooth=[(self.weights, self.correction.response)])
 
     def at(self, x: Array) -> FineBody:
         """Return the same with its nodes at other places of the body (q, d), mm."""
         half = self.half.at(x)
         weights = at_nodes(self.correction, self.grid, half.places, x[:, self.grid.axes], half.spacing)
         return replace(self, half=half, weights=weights)
-
-    def apply(self, forces: Array) -> Array:
-        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
-        moved: Array = np.asarray(
-            np.tensordot(self.correction.response, self.weights.to_points(forces), ((2, 3), (0, 1)))
-        )
-        return np.asarray(self.half.apply(forces) + self.weights.to_nodes(moved))
-
-    def entries(self, rows: Nodes, columns: Nodes) -> Array:
-        """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""
-        smooth = np.tensordot(self.weights.rows(rows), self.correction.response, 1)
-        besides = np.tensordot(smooth, self.weights.rows(columns), (2, 1))
-        return self.half.entries(rows, columns) + np.moveaxis(besides, 3, 2)
-
-    def diagonal(self) -> Array:
-        """Return the displacements at each node from unit forces at itself (q, a, d)."""
-        return self.half.diagonal() + self.weights.diagonal(self.correction.response.transpose(0, 2, 1, 3))
 
     def under(self, elastic: ElasticBody) -> FineBody:
         """Return the same under the loads of a body that differs by them alone; collective."""

@@ -26,26 +26,24 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.algorithms import extract_coefficients
 
-from fenwear.arrays import Array, Nodes
+from fenwear.arrays import Array
+from fenwear.bodies.convolution import EVERY, Convolution, GridOperator
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import Isotropic
 from fenwear.bodies.response import Request
 from fenwear.errors import CaseError, InputError
 
-TRANSFORM = 85.0  # numbers that memory could give while one is transformed, there and back over two (measured)
 UNEVEN = 0.01  # of the spacing: how far a node may be off the grid
 WIDE = 1.25  # of a cell: what a node has at most; 1.5 between cells of one spacing and of two
 SAME = 1e-9  # of a material's constants: one material
-EVERY = slice(None)
 
 
 @dataclass(frozen=True)
-class HalfSpace:
+class HalfSpace(GridOperator):
     """An elastic half-space, or half-plane, under forces that are even over the cells of a regular grid.
 
     Vectors have the grid's axes first and the outward normal last; `axes` says which of the model's they are.
@@ -91,100 +89,20 @@ class HalfSpace:
         return np.zeros((len(self.places), self.dim))
 
     @cached_property
-    def _shape(self) -> tuple[int, ...]:
-        """Nodes of the whole grid along its axes."""
-        return tuple(int(count) for count in np.ptp(self.places, axis=0) + 1)
-
-    @cached_property
-    def _at(self) -> NDArray[np.int64]:
-        """Places counted from the grid's corner (q, d - 1)."""
-        return self.places - self.places.min(axis=0)
-
-    @property
-    def cost(self) -> float:
-        """Of a product: transforms of each component there, and of each displacement back."""
-        return TRANSFORM * 2.0 ** (self.dim - 1) / 4 * float(np.prod(self._shape)) * (self.dim + len(self._directions))
-
-    @cached_property
-    def _parts(self) -> Array:
-        """Displacements by unit forces at all distances of two nodes (a, d, 2 m - 1, ...), mm."""
-        found = _influences(self._shape, self.spacing, self.shear, self.poisson, self.depth)
+    def convolution(self) -> Convolution:
+        """C along its directions, by forces along the model's axes."""
+        places = self.places - self.places.min(axis=0)
+        shape = tuple(int(count) for count in places.max(axis=0) + 1)
+        found = _influences(shape, self.spacing, self.shear, self.poisson, self.depth)
         into = np.eye(self.dim)[list(self.axes)]  # the model's vectors along the grid, then into the body
         into[-1] *= -self.outward
-        return np.asarray(np.tensordot(self._directions @ into.T, np.tensordot(into.T, found, (1, 1)), (1, 1)))
-
-    @property
-    def _table(self) -> Array:
-        """The same (2 m - 1, ..., a, d)."""
-        return np.moveaxis(self._parts, (0, 1), (-2, -1))
-
-    @cached_property
-    def _kernels(self) -> dict[int, NDArray[np.complex128]]:
-        """Transforms of the table's parts (a, ...), their zero distance first, over twice the grid, by the axis."""
-        return {}
-
-    def _kernel(self, axis: int) -> NDArray[np.complex128]:
-        """Return the transform of the displacements by forces along an axis (a, ...)."""
-        if axis not in self._kernels:
-            wrapped = np.zeros((len(self._directions), *(2 * count for count in self._shape)))
-            to = np.ix_(*(np.arange(1 - count, count) % (2 * count) for count in self._shape))
-            for k in range(len(wrapped)):
-                image: Array = wrapped[k]
-                image[to] = self._parts[k, axis]
-            self._kernels[axis] = np.asarray(scipy.fft.rfftn(wrapped, axes=range(1, self.dim)))
-        return self._kernels[axis]
-
-    def table(self, traction: Array) -> Array:
-        """Return the displacement along the first direction by a force (d,) at all distances of two nodes."""
-        return np.asarray(np.tensordot(traction, self._parts[0], 1))
-
-    def smooth(self, traction: Array) -> None:
-        """Return what it is besides: nothing."""
-        del traction
-
-    @property
-    def tables(self) -> Array:
-        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
-        return self._table
-
-    @property
-    def mixed(self) -> None:
-        """What it is besides, along all axes: nothing."""
-        return
+        table = np.tensordot(self._directions @ into.T, np.tensordot(into.T, found, (1, 1)), (1, 1))
+        return Convolution(places, np.asarray(table))
 
     def at(self, x: Array) -> HalfSpace:
         """Return the same with its nodes at other places (q, d), mm: it does not know where they are."""
         flat = x[:, list(self.axes[:-1])]
         return replace(self, places=np.rint((flat - flat.min(axis=0)) / self.spacing).astype(np.int64))
-
-    def apply(self, forces: Array) -> Array:
-        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
-        q, d, *rest = forces.shape
-        found = np.empty((q, len(self._directions), int(np.prod(rest))))
-        inner, size = tuple(range(1, d)), tuple(2 * count for count in self._shape)
-        at = (EVERY, *self._at.T)
-        for k, force in enumerate(forces.reshape(q, d, -1).transpose(2, 1, 0)):
-            pushed = np.flatnonzero(force.any(axis=1))
-            if not len(pushed):
-                found[:, :, k] = 0.0
-                continue
-            grid = np.zeros((len(pushed), *self._shape))
-            grid[at] = force[pushed]
-            waves = scipy.fft.rfftn(grid, size, axes=inner)
-            image = sum(self._kernel(int(axis)) * wave for axis, wave in zip(pushed, waves, strict=True))
-            found[:, :, k] = scipy.fft.irfftn(image, size, axes=inner)[at].T
-        return found.reshape(q, -1, *rest)
-
-    def entries(self, rows: Nodes, columns: Nodes) -> Array:
-        """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""
-        seen, pushed = self._at[rows], self._at[columns]
-        apart = seen[:, None] - pushed + np.array(self._shape) - 1
-        return self._table[tuple(np.moveaxis(apart, -1, 0))].transpose(0, 2, 1, 3)
-
-    def diagonal(self) -> Array:
-        """Return the displacements at each node from unit forces at itself (q, a, d)."""
-        middle = self._table[tuple(count - 1 for count in self._shape)]
-        return np.broadcast_to(middle, (len(self.places), *middle.shape))
 
     def under(self, elastic: ElasticBody) -> HalfSpace:
         """Return the same: loads displace nothing."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Nodes
+from fenwear.bodies.convolution import Convolution, GridOperator
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.operators import SurfaceOperator
 
@@ -64,35 +65,15 @@ class Scaled:
         return type(self)(self.operator.under(elastic), self.factor, self.moved)
 
 
-class ScaledConvolution(Scaled):
+class ScaledOnGrid(GridOperator, Scaled):
     """The same of an operator that is a convolution on a grid."""
 
     operator: Any
 
-    @property
-    def places(self) -> NDArray[np.int64]:
-        """Whole numbers of each node along the axes of the grid (q, d - 1)."""
-        return np.asarray(self.operator.places)
-
-    def table(self, traction: Array) -> Array:
-        """Return the displacement by a force (d,) at all distances of two nodes (2 m - 1, ...)."""
-        return np.asarray(self.factor * self.operator.table(traction))
-
-    @property
-    def tables(self) -> Array:
-        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
-        return np.asarray(self.factor * self.operator.tables)
-
-    @property
-    def mixed(self) -> tuple[Any, Array] | None:
-        """Values at points to the nodes, and what forces at points do (k, a, k, d); None for none."""
-        found = self.operator.mixed
-        return None if found is None else (found[0], self.factor * found[1])
-
-    def smooth(self, traction: Array) -> tuple[Array, Array] | None:
-        """Return values at points to the nodes (q, k), and what forces along it at points do (k, k); None for none."""
-        found = self.operator.smooth(traction)
-        return None if found is None else (found[0], self.factor * found[1])
+    @cached_property
+    def convolution(self) -> Convolution:
+        """C along its directions, by forces along the model's axes."""
+        return self.operator.convolution.times(self.factor)
 
 
 def scaled(operator: SurfaceOperator, factor: float, moved: Array | None = None) -> SurfaceOperator:
@@ -105,5 +86,5 @@ def scaled(operator: SurfaceOperator, factor: float, moved: Array | None = None)
     """
     if factor == 1:
         return operator
-    kind = ScaledConvolution if hasattr(operator, "table") and hasattr(operator, "smooth") else Scaled
+    kind = ScaledOnGrid if isinstance(operator, GridOperator) else Scaled
     return kind(operator, factor, np.zeros_like(operator.by_load) if moved is None else moved)

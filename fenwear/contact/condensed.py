@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -28,7 +28,8 @@ from fenwear.contact.inequality import TOLERANCE, Inequality
 from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
 from fenwear.errors import FULL_START, PIVOTS, SOFTER_START, ConvergenceError, Remedies
 from fenwear.interface import Interface
-from fenwear.interface.convolution import Convolution
+from fenwear.interface.compliance import EVERY
+from fenwear.interface.convolution import GridCompliance
 from fenwear.parallel import Team
 
 T = TypeVar("T")
@@ -216,11 +217,13 @@ class CondensedContact:
         if self._splits and interface.cost is not None and np.ptp(ratio, axis=0).any():
             even = self._even.setdefault(k, np.broadcast_to(ratio.mean(axis=0), ratio.shape))
             compliance = interface.compliance(even, scale, self._tables)
-            if isinstance(compliance, Convolution):
+            if (on_grid := compliance.on_grid) is not None:
                 self._beside[k] = (ratio - even) * interface.pair.weights[:, None]
-                return PhaseBlock(compliance, compliance.diagonal(), modes, balance, iterated=alone)
+                return PhaseBlock(on_grid, on_grid.diagonal(), modes, balance, iterated=alone)
         compliance = interface.compliance(ratio, scale, self._tables)
-        known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
+        known: Any = compliance.on_grid or compliance
+        if compliance.cost is None:
+            known = Columns(len(modes), partial(compliance.entries, EVERY))
         return PhaseBlock(known, compliance.diagonal(), modes, balance, iterated=alone)
 
     def press(self, factor: float) -> None:
@@ -312,7 +315,7 @@ class CondensedContact:
     @property
     def gridded(self) -> bool:
         """Whether all compliances are convolutions on a grid."""
-        return bool(self.blocks) and all(isinstance(block.compliance, Convolution) for block in self.blocks)
+        return bool(self.blocks) and all(isinstance(block.compliance, GridCompliance) for block in self.blocks)
 
     @cached_property
     def _grid(self) -> PhasesGrid:

@@ -23,20 +23,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.interface.convolution import Box, Convolution, back, forward, in_cache, over_period
+from fenwear.bodies.convolution import Waves, back, forward, in_cache, over_period
+from fenwear.interface.convolution import OnBox
 
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
 SAME = 1e-12  # of symbols, and of modes
 MARGIN = 1.0  # of a box: the period of what is solved, which does not end
-
-Waves = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True)
@@ -62,18 +60,15 @@ class EndlessGrid:
     that moves along the first axis, are matrices of phases for each i.
 
     Args:
-        of: The compliance.
-        box: Where fields are.
+        of: The compliances on a box, whose first one is that of all.
         passing: Of each phase; None where the strip does not wear.
     """
 
-    def __init__(self, of: Convolution, box: Box, passing: Sequence[Passing] | None) -> None:
-        self.box = box
-        self.period = tuple(scipy.fft.next_fast_len(int(MARGIN * count) + 2, real=True) for count in box.counts)
-        cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, box.counts, strict=True))
-        waves = scipy.fft.rfftn(over_period(of.numbers[cut], self.period))
-        symbol = _rows(waves).real * float(of.weights.max())
-        symbol += 0.0 if of.local is None else float(of.local.mean())
+    def __init__(self, of: OnBox, passing: Sequence[Passing] | None) -> None:
+        self.box = of.box
+        self.period = tuple(scipy.fft.next_fast_len(int(MARGIN * count) + 2, real=True) for count in self.box.counts)
+        waves = scipy.fft.rfftn(over_period(of.of[0].table[0, 0], self.period))
+        symbol = _rows(waves).real * of.largest + float(of.local[0].mean())
         self._symbol = np.maximum(symbol, LEAST * np.median(np.abs(symbol)))
         self._read = self._put = None
         if passing is not None:

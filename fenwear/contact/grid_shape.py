@@ -48,8 +48,8 @@ class GridShape(ShapeRows):
 
     def gaps(self, pressure: Array) -> Array:
         """Return what pressures open in all phases (m, n)."""
-        on = self.grid.whole
-        return on.box.values(on.products.apply(on.box.spread(pressure)))
+        on = self.grid.boxes.whole
+        return on.box.values(on.products.apply(on.box.spread(pressure)[:, None])[:, 0])
 
     def derivative(self, wear: Sequence[csr_array], held: Array) -> WornGrid:
         """Return the left side's derivative with wear.
@@ -121,10 +121,10 @@ class _Near:
         self.worn = free[m * n : (m + 1) * n] & (sums > 0)
         self.alone = np.where(of.held > 0, of.held, 1.0)
         self.length = min(LONGEST, 1 / max(float(of.held[self.worn].max(initial=0.0)), 1e-300))
-        self.on = on = self.equations.grid.around(touched)
+        self.on = on = self.equations.grid.boxes.around(touched)
         self.touching = on.box.spread(touching.astype(float))
         rate = np.array([own.diagonal()[touched].mean() for own in of.wear])
-        endless = EndlessGrid(self.equations.grid.of[0], on.box, None)
+        endless = EndlessGrid(on.products, None)
         endless.take(self.length * rate, None, 0.0)
         moved, balanced = (
             on.box.spread(values.reshape(-1, n)).reshape(m, r, *on.box.counts) * self.touching[:, None]

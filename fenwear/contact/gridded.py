@@ -25,7 +25,7 @@ from fenwear.contact.endless import SAME, EndlessGrid, Passing, Patch
 from fenwear.contact.krylov import flexible
 from fenwear.contact.operators import Indices, Solve
 from fenwear.interface import ContactPair
-from fenwear.interface.convolution import Box, Convolution, OnBox
+from fenwear.interface.convolution import Box, Boxes, GridCompliance, OnBox
 
 ACCURACY = 1e-12  # residual over the right-hand side
 FAR = 1e-5  # the same that is no solution, where the accuracy was not reached
@@ -36,7 +36,6 @@ SHARE = 0.3  # of a residual that is enough, to be below it with all nodes, too
 FALLS = 0.5  # of the residual on a set that stays: by less rounding is at its end
 RESTART, RESTARTS = 40, 15
 SLIGHT = 1e-2  # of pressures: what brings them into balance
-WASTE = 1.3  # of a box: how much larger than needed it may be
 
 
 @dataclass(frozen=True)
@@ -78,22 +77,9 @@ class PhasesGrid:
 
     def __init__(self, blocks: Sequence[PhaseBlock], pairs: Sequence[ContactPair]) -> None:
         self.blocks, self.pairs = list(blocks), list(pairs)
-        self.of = [block.compliance for block in blocks if isinstance(block.compliance, Convolution)]
-        self.places, self.shape = self.of[0].places, self.of[0].shape
-        self._box: PhasesBox | None = None
-
-    @cached_property
-    def whole(self) -> PhasesBox:
-        """Products on all of it."""
-        return PhasesBox(self, Box.around(self.places, self.shape))
-
-    def around(self, touched: NDArray[np.int64]) -> PhasesBox:
-        """Return a box that holds these nodes, the last one if it does."""
-        last, box = self._box, Box.around(self.places, self.shape, touched)
-        size = float(np.prod(box.counts))
-        if last is None or not last.box.holds(self.places[touched]) or np.prod(last.box.counts) > WASTE * size:
-            self._box = last = PhasesBox(self, box)
-        return last
+        self.of = [block.compliance for block in blocks if isinstance(block.compliance, GridCompliance)]
+        self.places, self.shape = self.of[0].of.places, self.of[0].of.counts
+        self.boxes = Boxes(self.places, self.shape, lambda box: PhasesBox(self, box))
 
     @cached_property
     def passing(self) -> list[Passing]:
@@ -133,7 +119,7 @@ class PhasesBox:
 
     def multiply(self, p: Array, a: Array, by: Opened | None) -> tuple[Array, Array]:
         """Return the gaps (m, ...) of pressures and of rigid motions (m, r), and the forces (m, r) of pressures."""
-        gaps, (m, r) = self.products.apply(p), a.shape
+        gaps, (m, r) = self.products.apply(p[:, None])[:, 0], a.shape
         if by is not None:
             gaps += self.opened(by, p)
         size = p[0].size  # of the box: there may be no rigid motions
@@ -148,7 +134,7 @@ class PhasesBox:
     def endless(self) -> EndlessGrid:
         """The inverse on an endless grid."""
         wears = any(pair.wear_projection.nnz for pair in self.grid.pairs)
-        return EndlessGrid(self.grid.of[0], self.box, self.grid.passing if wears else None)
+        return EndlessGrid(self.products, self.grid.passing if wears else None)
 
     @cached_property
     def _strip(self) -> tuple[csr_array, csr_array]:
@@ -186,11 +172,11 @@ class GriddedPhases:
     def __init__(self, grid: PhasesGrid, opened: Opened | None = None) -> None:
         self.grid, self.opened = grid, opened
         self.m, self.n, self.size = len(grid.blocks), grid.blocks[0].nodes, grid.blocks[0].size
-        self._slopes = None if opened is None else grid.whole.slopes(opened)
+        self._slopes = None if opened is None else grid.boxes.whole.slopes(opened)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        parts, on = x.reshape(self.m, -1), self.grid.whole
+        parts, on = x.reshape(self.m, -1), self.grid.boxes.whole
         gaps, forces = on.multiply(on.box.spread(parts[:, : self.n]), parts[:, self.n :], self._slopes)
         return np.concatenate([on.box.values(gaps), forces], axis=1).ravel()
 
@@ -206,7 +192,7 @@ class GriddedPhases:
         touched = np.flatnonzero(parts[:, : self.n].any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
-        on = self.grid.around(touched)
+        on = self.grid.boxes.around(touched)
         slopes = None if self.opened is None else on.slopes(self.opened)
         closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]) > 0, parts[:, self.n :])
 
@@ -241,7 +227,7 @@ class GriddedPhases:
         touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -below)).any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
-        on = self.grid.around(touched)
+        on = self.grid.boxes.around(touched)
         slopes = None if self.opened is None else on.slopes(self.opened)
         change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
         p, a, touches = change.solve(enough, below)

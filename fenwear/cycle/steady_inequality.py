@@ -17,7 +17,6 @@ from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import ConvergenceError
-from fenwear.interface.convolution import Convolution
 from fenwear.layers import Evolution
 from fenwear.layers.step import LayerEvolution
 from fenwear.optimum import Optimum
@@ -115,10 +114,10 @@ class SteadyInequality:
         if self.system.pair.punch.grid is None or any(own.cost is None for own in interfaces):
             return None
         known: dict[bytes, Array] = {}
-        found = [own.compliance(ratio, scale, known) for own, ratio in zip(interfaces, ratios, strict=True)]
-        if not all(isinstance(one, Convolution) for one in found):
+        found = [own.compliance(ratio, scale, known).on_grid for own, ratio in zip(interfaces, ratios, strict=True)]
+        if None in found:
             return None
-        blocks = [PhaseBlock(one, one.diagonal(), modes, balances[k]) for k, one in enumerate(found)]
+        blocks = [PhaseBlock(one, one.diagonal(), modes, balances[k]) for k, one in enumerate(found) if one is not None]
         return PhasesGrid(blocks, self.system.pairs)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None = None) -> None:  # noqa: ARG002

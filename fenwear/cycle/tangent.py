@@ -12,7 +12,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Creep, Tribosystem, heating_friction
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
-from fenwear.interface import PressureCompliance
+from fenwear.interface import Compliance
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear, WornDepths
@@ -60,7 +60,7 @@ def phase_tangent(
     laws, rigid = _laws(system, phase, pressure, heat, state, worn), interface.rigid
     dim = laws.mu_s.shape[1]
     friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
-    by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu
+    by_mu = Compliance(interface, (further - friction_ratio)[:, :, None], {}).matrix()  # all are linear in mu
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
     gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)

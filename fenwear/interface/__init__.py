@@ -4,17 +4,17 @@ Which nodes are opposite is found by `patches` and `overlap`, gaps and weights a
 `compliance.Interface`, and which rigid motions the contact balances `equilibrium`.
 """
 
-from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance
+from fenwear.interface.compliance import NOTHING, Compliance, Interface
 from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium
 from fenwear.interface.pair import ContactPair, check_distance, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
 __all__ = [
+    "NOTHING",
+    "Compliance",
     "ContactPair",
-    "FrameCompliance",
     "Interface",
     "Placement",
-    "PressureCompliance",
     "RigidEquilibrium",
     "check_distance",
     "is_translation",

@@ -12,7 +12,7 @@ tractions that go with the unknowns: a pressure with its friction, or one along 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -22,12 +22,12 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.condensation import product
 from fenwear.bodies.operators import SurfaceOperator
-from fenwear.interface.convolution import Convolution, convolution
+from fenwear.interface.convolution import GridCompliance, on_one_grid
 from fenwear.interface.equilibrium import RigidEquilibrium
-from fenwear.interface.frame_convolution import FrameConvolution, frame_convolution
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
 
+NOTHING: Array = np.zeros(())
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
 GRIDDED = 400  # nodes of a grid from where products along all axes are faster
@@ -48,7 +48,7 @@ class Interface:
         strip_moves: Which of the two.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
         like: One that differs by its loads or by where the strip's material is: what bodies answer is known of it.
-        layer: Closure along e_n by unit pressures of what lies between (n,), mm/MPa; None where nothing gives way.
+        layer: Closure along e_n by unit pressures of what lies between (n,), or of all nodes (), mm/MPa.
     """
 
     rigid: RigidEquilibrium
@@ -57,7 +57,7 @@ class Interface:
     strip_moves: bool
     frame: Array | None = None
     like: Interface | None = None
-    layer: Array | None = None
+    layer: Array = field(default_factory=lambda: NOTHING)
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
         """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
@@ -89,20 +89,14 @@ class Interface:
         """Return the relative displacements (n, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
         if self.cost is None:
             return product(self.dense(), forces)
-        found = self._by_bodies(forces)
-        if self.layer is not None:
-            found[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
+        found = self.opened(*self.displaced(forces))
+        found[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
         return found
 
     @cached_property
     def _closing(self) -> Array:
         """Closure of what lies between by unit forces along the axes of space at its own node (n, d)."""
-        closure = np.zeros(len(self.pair.weights)) if self.layer is None else self.layer
-        return np.asarray((closure / self.pair.weights)[:, None] * self.axes[:, 0])
-
-    def _by_bodies(self, forces: Array) -> Array:
-        """Return what the bodies alone answer to forces."""
-        return self.opened(*self.displaced(forces))
+        return np.asarray((self.layer / self.pair.weights)[:, None] * self.axes[:, 0])
 
     def displaced(self, forces: Array) -> tuple[Array, Array]:
         """Return what forces on the punch (n, d, ...) and their reactions do to each body at its operator's patterns.
@@ -183,7 +177,7 @@ class Interface:
             d = on_strip.shape[-1]
             on_strip = self.pair.placement.vectors(on_strip.reshape(-1, d)).reshape(on_strip.shape)
         found = on_punch + on_strip
-        if self.layer is not None:
+        if self.layer.any():
             to, by = np.equal.outer(own, np.arange(len(self.pair.weights))[columns]).nonzero()
             found[to, 0, by] += self._closing[own[to]]
         return found
@@ -226,7 +220,7 @@ class Interface:
 
     def compliance(
         self, friction_ratio: Array | float, scale: float = 1.0, known: dict[bytes, Array] | None = None
-    ) -> PressureCompliance | Convolution:
+    ) -> Compliance:
         """Return S, mm/MPa: the gap from unit pressures with their friction.
 
         Args:
@@ -234,13 +228,13 @@ class Interface:
             scale: A factor of S.
             known: Tables of convolutions that were made for other phases.
         """
-        traction = self.pair.normal + friction_ratio
-        if not self.strip_moves and self.cost is not None and self.frame is None:
-            tables = {} if known is None else known
-            found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables, self.layer)
-            if found is not None:
-                return found
-        return PressureCompliance(self, scale * traction)
+        traction = scale * (self.pair.normal + friction_ratio)
+        return Compliance(self, traction[:, :, None], {} if known is None else known)
+
+    @cached_property
+    def along_axes(self) -> Compliance:
+        """C, mm/MPa: displacements along the axes from unit tractions along them."""
+        return Compliance(self, self.axes.transpose(0, 2, 1), {})
 
     @cached_property
     def pressure_scale(self) -> float:
@@ -266,115 +260,93 @@ class Interface:
         count, compliance = len(pair.weights), self.compliance(0.0)
         step = 1 if self.cost is None else max(count // SOME, 1)
         runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]
-        parts = [np.abs(compliance.columns(EVERY, run) - modes[run] @ rigid).sum(axis=1) for run in runs]
+        parts = [np.abs(compliance.entries(run, EVERY) - modes[run] @ rigid).sum(axis=1) for run in runs]
         return float(np.concatenate(parts).mean())
 
 
-@dataclass(frozen=True)
-class PressureCompliance:
-    """S (n, n): the gap from unit pressures, each with the traction that goes with it, mm/MPa.
+class Compliance:
+    """S (a n, b n): displacements along axes of the contact by unit tractions, mm/MPa.
 
-    Attributes:
+    Of all components, one after the other: those along e_n of all nodes first. A convolution where both bodies are on
+    one grid; where they answer by numbers a matrix, which is kept for several components.
+
+    Args:
         interface: The surfaces.
-        traction: On the punch by a unit pressure (n, d).
+        traction: On the punch by units of the unknowns (n, d, b): a pressure with its friction, or one along each axis.
+        known: Tables of convolutions that were made for other phases.
     """
 
-    interface: Interface
-    traction: Array
-
-    @cached_property
-    def _force(self) -> Array:
-        return self.traction * self.interface.pair.weights[:, None]
+    def __init__(self, interface: Interface, traction: Array, known: dict[bytes, Array]) -> None:
+        self.interface, self._traction, self._known = interface, traction, known
+        n, _, self.components = traction.shape
+        self._n, self._local = n, interface.layer * np.einsum("id,id->i", interface.axes[:, 0], traction[:, :, 0])
+        self._force = traction * interface.pair.weights[:, None, None]
+        self._keeps = self.components > 1 and (interface.cost is None or n <= MATRIX)
 
     @property
     def cost(self) -> float | None:
         """Of a product; see `Interface`."""
         return self.interface.cost
 
-    def apply(self, pressure: Array) -> Array:
-        """Return the gaps (n,) of pressures (n,)."""
-        return self.interface.apply(self._force * pressure[:, None])[:, 0]
-
-    def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
-        """Return the columns of some nodes (n, k), or some rows of them."""
-        return np.einsum("ijd,jd->ij", self.interface.entries(rows, nodes)[:, 0], self._force[nodes])
-
-    def entries(self, rows: Nodes, columns: Nodes) -> Array:
-        """Return the numbers of some rows and columns."""
-        return self.columns(columns, rows)
-
-    def diagonal(self) -> Array:
-        """Return the diagonal (n,)."""
-        return np.einsum("id,id->i", self.interface.diagonal()[:, 0], self._force)
-
-    def matrix(self) -> Array:
-        """Return all of it (n, n)."""
-        return self.columns(EVERY)
-
-
-class FrameCompliance:
-    """C (d n, d n): displacements along the contact frame from unit tractions along it, mm/MPa.
-
-    Of all components, one after the other: those along e_n of all nodes first. What bodies answer by numbers is one
-    matrix, which is kept.
-
-    Args:
-        interface: The surfaces, with a frame.
-    """
-
-    def __init__(self, interface: Interface) -> None:
-        self.interface = interface
-        self._n = len(interface.pair.weights)
-        self._numbers = interface.cost is None or self._n <= MATRIX
-        self._force = interface.axes.transpose(0, 2, 1) * interface.pair.weights[:, None, None]
+    @cached_property
+    def on_grid(self) -> GridCompliance | None:
+        """The same as a convolution; None where the surfaces are on no common grid, or pass each other."""
+        own = self.interface
+        few = self.components > 1 and self._n < GRIDDED
+        if few or own.strip_moves or own.cost is None or own.pair.placement.turn != ZERO:
+            return None
+        axes, bodies = own.axes[:, : self.components], [own.punch, own.strip]
+        return on_one_grid(bodies, axes, self._traction, own.pair.weights, self._local, self._known)
 
     def _block(self, rows: Nodes, nodes: Nodes) -> Array:
         """Return what components of some nodes do to those of others (components, nodes, components, rows)."""
         return np.einsum("iajc,jcb->bjai", self.interface.asked(rows, nodes), self._force[nodes], optimize=True)
 
     @cached_property
-    def on_grid(self) -> FrameConvolution | None:
-        """The same as a convolution; None where the surfaces are on no common grid, or pass each other."""
-        own = self.interface
-        if self._n < GRIDDED or own.strip_moves or own.cost is None or own.pair.placement.turn != ZERO:
-            return None
-        return frame_convolution([own.punch, own.strip], own.axes, own.pair.weights, own.layer)
-
-    @cached_property
     def _columns(self) -> Array:
-        """C^T, so that what a component moves lies together in memory."""
-        size = self._n * self._force.shape[2]
+        """S^T, so that what a component moves lies together in memory."""
+        size = self._n * self.components
         return self._block(EVERY, EVERY).reshape(size, size)
 
-    @cached_property
-    def _diagonal(self) -> Array:
-        if self.on_grid is not None:
-            return self.on_grid.diagonal
-        if self._numbers:
-            return self._columns.diagonal().copy()
-        return np.einsum("iac,ica->ai", self.interface.diagonal(), self._force).ravel()
-
     def apply(self, traction: Array) -> Array:
-        """Return the displacements (d n,) of tractions (d n,)."""
+        """Return the displacements (a n,) of tractions (b n,)."""
         if self.on_grid is not None:
             return self.on_grid.apply(traction)
-        if self._numbers:
+        if self._keeps:
             loaded = np.flatnonzero(traction)
             return traction[loaded] @ self._columns[loaded]
         force = np.einsum("jcb,bj->jc", self._force, traction.reshape(-1, self._n))
-        return self.interface.apply(force).T.ravel()
+        return self.interface.apply(force)[:, : self.components].T.ravel()
 
-    def entries(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
-        """Return the numbers of some rows and columns."""
-        if self._numbers:
-            return self._columns[columns, rows[:, None]]
-        (to, at), (of, by) = (np.divmod(one, self._n) for one in (rows, columns))
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the numbers of some rows and columns; runs of them where there is one component alone."""
+        if self.components == 1:
+            if self.on_grid is not None:
+                return self.on_grid.entries(rows, columns)
+            return np.einsum("ijd,jd->ij", self.interface.entries(rows, columns)[:, 0], self._force[columns, :, 0])
+        i, j = (np.arange(self._n * self.components)[some] for some in (rows, columns))
+        if self._keeps:
+            return self._columns[j, i[:, None]]
+        (to, at), (of, by) = (np.divmod(one, self._n) for one in (i, j))
         (seen, i), (pushed, j) = (np.unique(one, return_inverse=True) for one in (at, by))
         return self._block(seen, pushed)[of, j, to[:, None], i[:, None]]
 
     def diagonal(self) -> Array:
-        """Return the diagonal (d n,)."""
+        """Return the diagonal (a n,)."""
         return self._diagonal
+
+    @cached_property
+    def _diagonal(self) -> Array:
+        if self.on_grid is not None:
+            return self.on_grid.diagonal()
+        if self._keeps:
+            return self._columns.diagonal().copy()
+        own = self.interface.diagonal()[:, : self.components]
+        return np.einsum("iac,ica->ai", own, self._force).ravel()
+
+    def matrix(self) -> Array:
+        """Return all of it."""
+        return self.entries(EVERY, EVERY)
 
 
 def _along(axes: Array, vectors: Array) -> Array:

@@ -1,137 +1,103 @@
-"""The compliance of two bodies on one grid: one convolution, and what finite bodies do besides.
+"""The compliance of two bodies on one grid: the convolutions of both, areas of nodes, and what lies between.
 
-Where both answer on the nodes of the same regular grid, and the traction that goes with a unit pressure is the same
-everywhere, S is a table of one number for each distance of two nodes, and a correction on a few points for each body:
+Where both answer on the nodes of the same regular grid, and the tractions that go with the unknowns are the same
+everywhere,
 
-    S_ij = w_j (T(x_i - x_j) + sum over the bodies of L(x_i) C L(x_j)^T) + c_i delta_ij,
+    S x = C w x + c x_0,
 
-with c what a layer between the bodies closes by a unit pressure.
+with C the sum of both bodies' convolutions, w the areas of the nodes, and c what a layer between the bodies closes
+along e_n by a unit pressure. In gross sliding x is the pressure with its friction, and the gap is asked for; where
+nodes stick x has a component along each axis of the contact frame.
 
 So it is in any place of a strip that passes under the punch: half-spaces do not know where they are. Only the
-correction moves.
+corrections move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Generic, TypeVar
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Nodes
-from fenwear.bodies.tensor import TensorWeights
+from fenwear.bodies.convolution import (
+    EVERY,
+    SAME,
+    Convolution,
+    GridOperator,
+    Kernel,
+    Smooth,
+    Waves,
+    by_components,
+    convolved,
+    kernel,
+    over_period,
+)
 
-TRANSFORM = 85.0  # numbers that memory could give while one is transformed, there and back over two (measured)
-EVERY = slice(None)
-CACHE = 2**18  # bytes of waves that are transformed at a time
-
-
-@runtime_checkable
-class Convolving(Protocol):
-    """An operator that is a convolution on a grid, and smooth besides."""
-
-    @property
-    def directions(self) -> Array:
-        """Unit vectors (q, d, a)."""
-
-    @property
-    def places(self) -> NDArray[np.int64]:
-        """Whole numbers of each node along the axes of the grid (q, d - 1)."""
-
-    def table(self, traction: Array) -> Array:
-        """Return the displacement by a force (d,) at all distances of two nodes (2 m - 1, ...)."""
-
-    def smooth(self, traction: Array) -> tuple[TensorWeights, Array] | None:
-        """Return values at points to the nodes, and what forces along it at points do (k, k); None for none."""
+T = TypeVar("T")
+WASTE = 1.5  # of a box: how much larger than needed it may be
+LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
+STIFF = 3.0, 20.0  # of tangents, over what a node's own traction moves it
+MARGIN = {1: 2.0, 2: 1.0}  # of a line, of a rectangle: the period of what is inverted, which does not end
 
 
-class Convolution:
-    """S (n, n) on a grid, mm/MPa.
+@dataclass(frozen=True, eq=False)
+class GridCompliance:
+    """S (a n, b n) on a grid, mm/MPa; vectors are of all components, one after the other.
 
-    Args:
-        places: Whole numbers of each node along the axes of the grid (n, d - 1).
-        table: Gap by a unit force at all distances of two nodes (2 m - 1, ...), mm/N, scaled.
-        smooth: L and C (k, k) of each body that has a correction.
+    Attributes:
+        of: C.
         weights: w (n,).
-        local: c (n,), scaled; None for none.
+        local: c (n,).
     """
 
-    def __init__(
-        self,
-        places: NDArray[np.int64],
-        table: Array,
-        smooth: Sequence[tuple[TensorWeights, Array]],
-        weights: Array,
-        local: Array | None = None,
-    ) -> None:
-        self.numbers, self.smooth, self.weights, self.local = table, list(smooth), weights, local
-        self.places = places - places.min(axis=0)
-        self.shape = tuple((count + 1) // 2 for count in table.shape)
+    of: Convolution
+    weights: Array
+    local: Array
 
     @property
     def cost(self) -> float:
         """Of a product, in numbers that memory could give meanwhile."""
-        over = TRANSFORM * 2.0 ** len(self.shape) / 4 * 2 * float(np.prod(self.shape))
-        return over + sum(2.0 * len(self.weights) * max(weights.factors[0].shape) for weights, _ in self.smooth)
+        return self.of.cost
 
     @cached_property
-    def whole(self) -> OnBox:
-        """Its products on all nodes."""
-        return OnBox([self], Box.around(self.places, self.shape))
+    def boxes(self) -> Boxes[FrameBox]:
+        """The same on boxes of the grid, along all axes of a frame."""
+        return Boxes(self.of.places, self.of.counts, lambda box: FrameBox(self, box))
 
     def apply(self, x: Array) -> Array:
-        """Return the gaps (n,) of pressures (n,)."""
-        box = self.whole.box
-        return box.values(self.whole.apply(box.spread(x[None])))[0]
-
-    def entries(self, rows: Nodes, columns: Nodes) -> Array:
-        """Return the numbers of some rows and columns."""
-        if isinstance(rows, slice) and isinstance(columns, slice) and columns == EVERY:
-            return self._rows(rows)
-        apart = self.places[rows][:, None] - self.places[columns] + np.array(self.shape) - 1
-        found = self.numbers[tuple(np.moveaxis(apart, -1, 0))]
-        for points, response in self.smooth:
-            found = found + (points.rows(rows) @ response) @ points.rows(columns).T
-        found = np.asarray(found * self.weights[columns])
-        if self.local is not None:
-            every = np.arange(len(self.weights))
-            i, j = np.equal.outer(every[rows], every[columns]).nonzero()
-            found[i, j] += self.local[rows][i]
-        return found
-
-    def _rows(self, rows: slice) -> Array:
-        """Return all numbers of some rows: the table about each of their nodes, turned round."""
-        nodes, at = np.arange(len(self.weights))[rows], tuple(self.places.T)
-        found = np.empty((len(nodes), len(self.weights)))
-        turned = self.numbers[(slice(None, None, -1),) * len(self.shape)]
-        for k, place in enumerate(self.places[rows]):
-            window = tuple(slice(m - 1 - here, 2 * m - 1 - here) for m, here in zip(self.shape, place, strict=True))
-            found[k] = turned[window][at]
-        for points, response in self.smooth:
-            found += points.to_nodes((points.rows(rows) @ response).T).T
-        found *= self.weights
-        if self.local is not None:
-            found[np.arange(len(nodes)), nodes] += self.local[nodes]
-        return found
+        """Return the displacements (a n,) of tractions (b n,)."""
+        parts = x.reshape(-1, len(self.weights))
+        found = self.of.apply((parts * self.weights).T).T
+        found[0] += self.local * parts[0]
+        return found.ravel()
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
-        """Return the columns of some nodes (n, k), or some rows of them."""
-        return self.entries(rows, nodes)
+        """Return the columns of some nodes (k, nodes), or some rows of them, of the first component."""
+        found = self.of.entries(rows, nodes)[:, 0, :, 0] * self.weights[nodes]
+        every = np.arange(len(self.weights))
+        i, j = np.equal.outer(every[rows], every[nodes]).nonzero()
+        found[i, j] += self.local[every[rows][i]]
+        return found
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the numbers of some rows and columns, of the first component."""
+        return self.columns(columns, rows)
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,)."""
-        found = np.full(len(self.weights), self.numbers[tuple(count - 1 for count in self.shape)])
-        for points, response in self.smooth:
-            found += points.diagonal(response)
-        return np.asarray(found * self.weights + (0.0 if self.local is None else self.local))
+        """Return the diagonal (a n,)."""
+        found = np.einsum("naa->an", self.of.diagonal()) * self.weights
+        found[0] += self.local
+        return np.asarray(found.ravel())
 
     def matrix(self) -> Array:
-        """Return all of it (n, n)."""
-        return self.entries(EVERY, EVERY)
+        """Return all of it (n, n), of the first component."""
+        return self.columns(EVERY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,54 +109,58 @@ class Box:
         counts: Places along each axis.
         nodes: Numbers of the nodes in it (k,).
         at: Where they stand in it, its last axis the fastest (k,).
-        within: Places of the whole grid, where all have a node, numbered with the last axis the fastest; else None.
+        within: Places of the whole grid, where all have a node, numbered with the last axis the fastest; else empty.
     """
 
     low: tuple[int, ...]
     counts: tuple[int, ...]
     nodes: NDArray[np.int64]
     at: NDArray[np.int64]
-    within: tuple[int, ...] | None = None
+    within: tuple[int, ...] = ()
 
     @classmethod
-    def around(cls, places: NDArray[np.int64], shape: Sequence[int], touched: NDArray[np.int64] | None = None) -> Box:
-        """Return the box of all places (n, axes) of a grid of that shape, or as wide as some of them ask for.
+    def around(cls, places: NDArray[np.int64], shape: Sequence[int], touched: Nodes = EVERY) -> Box:
+        """Return a box as wide as some of the places (n, axes) of a grid of that shape ask for, by default all.
 
         No narrower than products on it cost as much.
         """
         whole = np.array(shape, dtype=np.int64)
-        low, counts = np.zeros_like(whole), whole
-        if touched is not None and len(touched):
-            first, wide = places[touched].min(axis=0), np.ptp(places[touched], axis=0) + 1
-            counts = np.minimum([_padded(int(count)) for count in wide], whole)
-            low = np.clip(first - (counts - wide) // 2, 0, whole - counts)
-        inside = ((places >= low) & (places < low + counts)).all(axis=1)
-        nodes = np.flatnonzero(inside)
+        first, wide = places[touched].min(axis=0), np.ptp(places[touched], axis=0) + 1
+        counts = np.minimum([_padded(int(count)) for count in wide], whole)
+        low = np.clip(first - (counts - wide) // 2, 0, whole - counts)
+        nodes = np.flatnonzero(((places >= low) & (places < low + counts)).all(axis=1))
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
-        full = len(places) == np.prod(whole) and np.array_equal(
-            np.ravel_multi_index(tuple(places.T), tuple(whole)), np.arange(len(places))
-        )
-        within = tuple(int(k) for k in whole) if full else None
-        return cls(tuple(int(k) for k in low), tuple(int(k) for k in counts), nodes, at, within)
+        numbers = np.ravel_multi_index(tuple(places.T), tuple(whole))
+        full = len(places) == np.prod(whole) and np.array_equal(numbers, np.arange(len(places)))
+        within = tuple(whole.tolist()) if full else ()
+        return cls(tuple(low.tolist()), tuple(counts.tolist()), nodes, at, within)
+
+    @property
+    def size(self) -> int:
+        """How many places there are."""
+        return int(np.prod(self.counts))
 
     def holds(self, places: NDArray[np.int64]) -> bool:
         """Return whether all of some places (k, axes) are in it."""
-        low, high = places.min(axis=0, initial=self.low[0]), places.max(axis=0, initial=self.low[0])
-        return bool((low >= self.low).all() and (high < np.array(self.low) + self.counts).all())
+        return bool(((places >= self.low) & (places < np.array(self.low) + self.counts)).all())
+
+    def where(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return where places (k, axes) stand in it, its last axis the fastest (k,)."""
+        return np.asarray(np.ravel_multi_index(tuple((places - np.array(self.low)).T), self.counts))
 
     def spread(self, values: Array) -> Array:
         """Return values of all nodes (m, n) in the box, zero where no node is (m, ...)."""
-        if self.within is not None:
+        if self.within:
             cut = (slice(low, low + count) for low, count in zip(self.low, self.counts, strict=True))
             return values.reshape(-1, *self.within)[:, *cut].copy()
-        found = np.zeros((len(values), int(np.prod(self.counts))), dtype=values.dtype)
+        found = np.zeros((len(values), self.size), dtype=values.dtype)
         found[:, self.at] = values[:, self.nodes]
         return found.reshape(-1, *self.counts)
 
     def values(self, boxed: Array) -> Array:
         """Return what a box (m, ...) has at its nodes (m, k)."""
         flat = boxed.reshape(len(boxed), -1)
-        return np.asarray(flat if self.within is not None else flat[:, self.at])
+        return np.asarray(flat if self.within else flat[:, self.at])
 
 
 def _padded(count: int) -> int:
@@ -198,141 +168,171 @@ def _padded(count: int) -> int:
     return (int(scipy.fft.next_fast_len(2 * count - 1, real=True)) + 1) // 2
 
 
-class OnBox:
-    """Products of several convolutions at once, on a box of places.
+class Boxes(Generic[T]):
+    """What is made of boxes of a grid; the last one is kept as long as it is not much too large.
 
     Args:
-        of: The convolutions, on one grid.
-        box: Where pressures are, and gaps are asked for.
+        places: Of the nodes (n, axes).
+        shape: Of the grid.
+        make: Makes it of a box.
     """
 
-    def __init__(self, of: Sequence[Convolution], box: Box) -> None:
-        self.box, self.size = box, tuple(scipy.fft.next_fast_len(2 * k - 1, real=True) for k in box.counts)
-        self._weights = box.spread(of[0].weights[None])[0]
-        tables = {id(one.numbers): one for one in of}
-        self._kernels = [self._transformed(one) for one in tables.values()]
-        self._of = [np.array([k for k, one in enumerate(of) if id(one.numbers) == key]) for key in tables]
-        local = [one.local for one in of if one.local is not None]
-        self._local = box.spread(np.array(local)) if local else None
-        self._smooth = [_Smooth([one.smooth[k] for one in of], box) for k in range(min(len(one.smooth) for one in of))]
+    def __init__(self, places: NDArray[np.int64], shape: Sequence[int], make: Callable[[Box], T]) -> None:
+        self.places, self._shape, self._make = places, shape, make
+        self._last: list[tuple[Box, T]] = []
 
-    def numbers(self, of: Convolution) -> Array:
-        """Return the table of a convolution over the distances within the box (2 b - 1, ...)."""
-        cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, self.box.counts, strict=True))
-        return of.numbers[cut]
+    @cached_property
+    def whole(self) -> T:
+        """That of all nodes."""
+        return self._make(Box.around(self.places, self._shape))
 
-    def _transformed(self, of: Convolution) -> NDArray[np.complexfloating[Any, Any]]:
-        return np.asarray(scipy.fft.rfftn(over_period(self.numbers(of), self.size)))
+    def around(self, touched: NDArray[np.int64]) -> T:
+        """Return that of a box around some nodes."""
+        box = Box.around(self.places, self._shape, touched)
+        if not any(last.holds(self.places[touched]) and last.size <= WASTE * box.size for last, _ in self._last):
+            self._last = [(box, self._make(box))]
+        return self._last[0][1]
+
+
+class OnBox:
+    """Products of several compliances at once, on a box of places.
+
+    Args:
+        of: The compliances, on one grid.
+        box: Where tractions are, and displacements are asked for.
+    """
+
+    def __init__(self, of: Sequence[GridCompliance], box: Box) -> None:
+        parts = [one.of.on_box(box.low, box.counts, box.nodes) for one in of]
+        self.box, self.size, self.of = box, parts[0].size, parts
+        self.largest = float(of[0].weights.max())
+        self._weights, self.local = box.spread(of[0].weights[None])[0], box.spread(np.array([one.local for one in of]))
+        tables = {id(one.of.table): part for one, part in zip(of, parts, strict=True)}
+        self._kernels = [
+            (np.array([k for k, one in enumerate(of) if id(one.of.table) == key]), kernel(part.table, part.size))
+            for key, part in tables.items()
+        ]
+        self._smooth = [_Smooth([one.smooth[k] for one in parts]) for k in range(min(len(one.smooth) for one in parts))]
 
     def apply(self, x: Array) -> Array:
-        """Return the gaps (m, ...) of pressures (m, ...) of each convolution, in the box."""
+        """Return the displacements (m, a, ...) of tractions (m, b, ...) of each compliance, in the box."""
         force = x * self._weights
-        found = self._convolved(force)
+        found = np.empty((len(x), len(self.of[0].table), *self.box.counts))
+        for own, waves in self._kernels:
+            found[own] = convolved([(waves, force[own])], found.shape[1], self.size)
         for smooth in self._smooth:
             smooth.add(force, found)
-        if self._local is not None:
-            found += self._local * x
+        found[:, 0] += self.local * x[:, 0]
         return found
-
-    def _convolved(self, force: Array) -> Array:
-        """Return the products with the tables alone; as many at a time as stay in the cache."""
-        counts, size, found = self.box.counts, self.size, np.empty_like(force)
-        for kernel, of in zip(self._kernels, self._of, strict=True):
-            for some in in_cache(len(of), kernel.nbytes):
-                image = forward(force[of[some]], size)
-                image *= kernel
-                found[of[some]] = back(image, size, counts)
-        return found
-
-
-def in_cache(count: int, size: int) -> list[slice]:
-    """Return runs of so many arrays of a size (bytes) that stay in the cache together."""
-    step = max(CACHE // size, 1)
-    return [slice(start, start + step) for start in range(0, count, step)]
-
-
-def forward(fields: Array, size: Sequence[int]) -> NDArray[np.complexfloating[Any, Any]]:
-    """Return the waves of fields (k, ...) over a box of at most that size; rows of zeros are not transformed."""
-    image = scipy.fft.rfft(fields, size[-1], axis=-1)
-    return np.asarray(scipy.fft.fft(image, size[0], axis=1, overwrite_x=True) if len(size) == 2 else image)
-
-
-def back(image: NDArray[np.complexfloating[Any, Any]], size: Sequence[int], counts: Sequence[int]) -> Array:
-    """Return the fields (k, ...) over a box of waves, which are overwritten."""
-    if len(size) == 2:
-        image = scipy.fft.ifft(image, axis=1, overwrite_x=True)[:, : counts[0]]
-    return np.asarray(scipy.fft.irfft(image, size[-1], axis=-1, overwrite_x=True)[..., : counts[-1]])
-
-
-def over_period(numbers: Array, size: Sequence[int]) -> Array:
-    """Return numbers at all distances (..., 2 m - 1, ...) over a period, their zero distance first.
-
-    Farther ones than half a period are left out. Half a period away both ways are one place, with the mean of both:
-    without it the shortest waves would have next to nothing of what does not change along a line.
-    """
-    axes = len(size)
-    for k, period in enumerate(size):
-        axis = numbers.ndim - axes + k
-        middle = numbers.shape[axis] // 2
-        reach = min(middle, period // 2)
-        lines = np.moveaxis(numbers, axis, 0)[middle - reach : middle + reach + 1]
-        found: Array = np.zeros((period, *lines.shape[1:]))
-        if 2 * reach == period:
-            found[reach] = (lines[0] + lines[-1]) / 2
-            lines, reach = lines[1:-1], reach - 1
-        found[: reach + 1], found[period - reach :] = lines[reach:], lines[:reach]
-        numbers = np.moveaxis(found, 0, axis)
-    return numbers
 
 
 class _Smooth:
-    """The corrections of one body in several phases, on a box."""
+    """What one body does besides in several phases, on a box."""
 
-    def __init__(self, parts: Sequence[tuple[TensorWeights, Array]], box: Box) -> None:
-        factors = [weights.within(box.low, box.counts) for weights, _ in parts]
-        self._factors = [np.array(own) for own in zip(*factors, strict=True)]  # of each axis (m, k, c)
-        self._response = np.array([response for _, response in parts])
+    def __init__(self, parts: Sequence[Smooth]) -> None:
+        m = len(parts)
+        factors = [np.array(own) for own in zip(*(weights.factors for weights, _ in parts), strict=True)]
+        self._first, self._second = (*factors, np.ones((m, 1, 1)))[:2]  # of each axis (m, 1, k, c)
+        self._first, self._second = self._first[:, None], self._second[:, None]
+        between = np.array([response for _, response in parts]).transpose(0, 2, 1, 4, 3)
+        self._between = between.reshape(m, between.shape[1] * between.shape[2], -1)
 
     def add(self, force: Array, to: Array) -> None:
-        """Add the gaps of forces (m, ...) to others."""
-        m = len(force)
-        if len(self._factors) == 1:
-            (one,) = self._factors
-            points = np.einsum("mxa,mx->ma", one, force)
-            to += np.einsum("mxa,ma->mx", one, np.einsum("mab,mb->ma", self._response, points))
-            return
-        first, second = self._factors
-        points = first.transpose(0, 2, 1) @ (force @ second)
-        moved = (self._response @ points.reshape(m, -1, 1)).reshape(points.shape)
-        to += (first @ moved) @ second.transpose(0, 2, 1)
+        """Add the displacements (m, a, ...) by forces (m, b, ...) to others."""
+        m, b, first, *_ = force.shape
+        points = self._first.swapaxes(2, 3) @ force.reshape(m, b, first, -1) @ self._second
+        moved = (self._between @ points.reshape(m, -1, 1)).reshape(m, -1, *points.shape[2:])
+        to += (self._first @ moved @ self._second.swapaxes(2, 3)).reshape(to.shape)
 
 
-def convolution(
-    bodies: Sequence[object],
-    traction: Array,
-    weights: Array,
-    scale: float,
-    known: dict[bytes, Array],
-    local: Array | None = None,
-) -> Convolution | None:
-    """Return S of bodies on one grid; None where they are on none, or the traction differs from node to node.
+class FrameBox(OnBox):
+    """The compliance along all axes of one contact frame on a box, and its inverse.
+
+    Args:
+        of: The compliance.
+        box: The box.
+    """
+
+    def __init__(self, of: GridCompliance, box: Box) -> None:
+        super().__init__([of], box)
+        self.d, self.counts = len(of.of.table), box.counts
+        self._own = of.diagonal().reshape(self.d, -1)[1:].mean()
+
+    def products(self, fields: Array) -> Array:
+        """Return the displacements (d, ...) of tractions (d, ...)."""
+        return self.apply(fields[None])[0]
+
+    @cached_property
+    def _endless(self) -> tuple[tuple[int, ...], Waves]:
+        """The period and the symbol (..., d, d) of an endless grid."""
+        margin, table = MARGIN[len(self.counts)], self.of[0].table
+        period = tuple(scipy.fft.next_fast_len(int(margin * count) + 2, real=True) for count in self.counts)
+        waves = scipy.fft.rfftn(over_period(table, period), axes=range(2, table.ndim)) * self.largest
+        symbol = np.moveaxis(waves, (0, 1), (-2, -1))
+        symbol[..., 0, 0] += float(self.box.values(self.local).mean())
+        symbol = (symbol + symbol.conj().swapaxes(-2, -1)) / 2
+        size, axes = np.linalg.eigh(symbol)
+        size = np.maximum(size, LEAST * np.median(np.abs(size)))
+        return period, (axes * size[..., None, :]) @ axes.conj().swapaxes(-2, -1)
+
+    @cached_property
+    def _inverses(self) -> list[Kernel]:
+        """The waves of the inverse, and where tangents give way besides by each of `STIFF`."""
+        found = []
+        for stiff in (0.0, *STIFF):
+            symbol, tangents = self._endless[1].copy(), range(1, self.d)
+            symbol[..., tangents, tangents] += stiff * self._own
+            found.append(by_components(np.moveaxis(np.linalg.inv(symbol), (-2, -1), (0, 1))))
+        return found
+
+    def solve(self, fields: Array, stiff: Array) -> Array:
+        """Return the tractions (d, ...) of displacements on an endless grid.
+
+        Each wave by itself; restricted to nodes in contact, near what these have.
+
+        Args:
+            fields: Where nothing gives way besides (d, ...).
+            stiff: Where tangents do, by each of `STIFF` (k, d, ...).
+        """
+        parts = [(waves, part[None]) for waves, part in zip(self._inverses, (fields, *stiff), strict=True)]
+        return convolved(parts, self.d, self._endless[0])[0]
+
+
+def on_one_grid(
+    bodies: Sequence[object], axes: Array, traction: Array, weights: Array, local: Array, known: dict[bytes, Array]
+) -> GridCompliance | None:
+    """Return S of bodies on one grid; None where they are on none, or axes or tractions differ from node to node.
 
     Args:
         bodies: Their operators.
-        traction: On the punch by a unit pressure (n, d), and as much on the strip.
+        axes: That displacements are asked for along (n, a, d).
+        traction: On the punch by units of the unknowns (n, d, b), and as much on the strip.
         weights: Areas of the nodes (n,).
-        scale: A factor of S.
+        local: What a layer between them closes by unit pressures (n,), scaled as the tractions are.
         known: Tables that were made, by the traction: they are the same in every place.
-        local: What a layer between them closes by unit pressures (n,), mm/MPa; None for none.
     """
-    operators = [body for body in bodies if isinstance(body, Convolving) and body.directions.shape[2] == 1]
-    if len(operators) < len(bodies) or not len(traction) or np.ptp(traction, axis=0).any():
+    operators = [body.convolution for body in bodies if isinstance(body, GridOperator)]
+    if len(operators) < len(bodies) or not len(weights) or not (_even(axes) and _even(traction)):
         return None
-    force, places = scale * traction[0], operators[0].places
-    if any(not np.array_equal(places, one.places) for one in operators[1:]):
+    if any(not np.array_equal(operators[0].places, one.places) for one in operators[1:]):
+        return None
+    along, force = axes[0], traction[0]
+    bare = len(along) == 1 and all(len(one.table) == 1 for one in operators)  # e_n is all that they are asked for along
+    seen = np.ones((1, 1)) if bare else along
+    if any(len(one.table) != seen.shape[1] for one in operators):
         return None
     key = force.tobytes()
     if key not in known:
-        known[key] = np.sum([one.table(force) for one in operators], axis=0)
-    smooth = [part for one in operators if (part := one.smooth(force)) is not None]
-    return Convolution(places, known[key], smooth, weights, None if local is None else scale * local)
+        whole = np.sum([one.table for one in operators], axis=0)
+        known[key] = np.ascontiguousarray(np.tensordot(seen, np.tensordot(force.T, whole, (1, 1)), (1, 1)))
+    smooth = [
+        (points, np.einsum("ac,kcle,eb->kalb", seen, response, force, optimize=True))
+        for one in operators
+        for points, response in one.smooth
+    ]
+    return GridCompliance(Convolution(operators[0].places, known[key], smooth), weights, local)
+
+
+def _even(values: Array) -> bool:
+    """Return whether values (n, ...) are the same at all nodes."""
+    return bool(np.abs(values - values[0]).max() <= SAME)

@@ -130,8 +130,7 @@ class StickCreep:
                     scaled(body, factor, moved)
                     for body, factor, moved in zip((own.punch, own.strip), times[:2], self.moved, strict=True)
                 )
-                layer = None if own.layer is None else times[2] * own.layer
-                other = replace(own, punch=punch, strip=strip, layer=layer, like=None)
+                other = replace(own, punch=punch, strip=strip, layer=times[2] * own.layer, like=None)
                 kept[key] = position, replace(position, interface=other)
         return kept[key][1]
 

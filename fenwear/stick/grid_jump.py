@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 from fenwear.arrays import Array
 from fenwear.contact.krylov import flexible
 from fenwear.errors import ConvergenceError
+from fenwear.interface.convolution import STIFF
 from fenwear.layers.closure import Closure
 from fenwear.stick.position import Position
 
@@ -126,9 +127,11 @@ class _Part:
         on = position.compliance.on_grid
         assert on is not None
         self.group, self.k, self.r = group, len(closed), position.modes.shape[1]
-        self.on, self.at = on.around(closed)
-        self.size, own = self.k + self.r, on.diagonal[closed]
-        self.unit = 1 / float(np.median(on.diagonal[: len(on.weights)]))  # MPa for a gap of one
+        self.on = on.boxes.around(closed)
+        self.at = self.on.box.where(on.of.places[closed])
+        self.size, diagonal = self.k + self.r, on.diagonal()
+        own = diagonal[closed]
+        self.unit = 1 / float(np.median(diagonal[: len(on.weights)]))  # MPa for a gap of one
         self.gives = 0.0 if closure is None else closure.slope(group.pressure)[closed]
         worn = step * np.asarray(group.right.multiply(group.left.T).sum(axis=1)).ravel()
         self.shrunk = 1 / np.sqrt(1 + np.maximum(worn + self.gives, 0.0) / own)
@@ -146,13 +149,14 @@ class _Part:
         return whole.reshape(self.on.d, *self.on.counts)
 
     def _inverse(self, gaps: Array) -> Array:
-        found = self.on.endless.solve(self._grid(gaps * self.shrunk))[0].ravel()[self.at]
+        fields = self._grid(gaps * self.shrunk)
+        found = self.on.solve(fields, np.zeros((len(STIFF), *fields.shape)))[0].ravel()[self.at]
         return np.asarray(found * (self.shrunk / self.unit))
 
     def multiply(self, x: Array) -> Array:
         """Return gaps and forces of pressures and motions (k + r,)."""
         p, a = x[: self.k] * self.unit, x[self.k :]
-        gaps = self.on.on_grid(self._grid(p))[0].ravel()[self.at] + self.gives * p + a @ self.modes
+        gaps = self.on.products(self._grid(p))[0].ravel()[self.at] + self.gives * p + a @ self.modes
         return np.concatenate([gaps, self.held @ x[: self.k]])
 
     def precondition(self, r: Array) -> Array:

@@ -27,7 +27,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.response import identity
 from fenwear.bodies.subcells import linear_cells
-from fenwear.interface import ContactPair, FrameCompliance, Interface, RigidEquilibrium
+from fenwear.interface import NOTHING, Compliance, ContactPair, Interface, RigidEquilibrium
 from fenwear.interface.frame import contact_frame
 from fenwear.interface.placement import in_model, in_space
 from fenwear.sliding.field import SlidingField
@@ -109,9 +109,9 @@ class Position:
         return force, self.reaction(force)
 
     @cached_property
-    def compliance(self) -> FrameCompliance:
+    def compliance(self) -> Compliance:
         """C, mm/MPa."""
-        return FrameCompliance(self.interface)
+        return self.interface.along_axes
 
     @cached_property
     def modes(self) -> Array:
@@ -170,7 +170,7 @@ def position_of(
     field: SlidingField,
     *,
     strip_moves: bool = False,
-    layer: Array | None = None,
+    layer: Array = NOTHING,
 ) -> Position:
     """Return both bodies opposite each other.
 
@@ -179,7 +179,7 @@ def position_of(
         punch, strip: How the bodies answer, along all axes.
         field: The motion of the strip.
         strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
-        layer: Closure by unit pressures of what lies between (n,), mm/MPa; None where it does not give way so.
+        layer: Closure by unit pressures of what lies between (n,), or of all nodes (), mm/MPa.
     """
     frame = contact_frame(rigid.pair.normal)
     drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))

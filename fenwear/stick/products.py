@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import flexible
 from fenwear.errors import ConvergenceError
-from fenwear.interface.frame_convolution import STIFF
+from fenwear.interface.convolution import STIFF
 from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
@@ -106,7 +106,7 @@ class GridStep(Step):
         solver = _Solver(self, piece, moved, held)
         size = max(float(np.sqrt(np.mean(rest[:, closed] ** 2))), float(np.abs(forces).max(initial=0.0)))
         enough = SHARE * self.close * float(f[0].max())
-        least = max(FINEST[self.d], min(1.0, enough / max(size, 1e-300)))
+        least = max(FINEST[self.d], min(FAR, enough / max(size, 1e-300)))
         accuracy = max(min(ROUGH[self.d], AHEAD * self._wrong), least)
         dx, by = solver.solve(-rest[:, closed], -forces, accuracy)
         change = np.zeros_like(x)
@@ -149,8 +149,7 @@ class GridStep(Step):
         if jump is None or self.interface.moves:
             return super()._moved(f, jump)
         position, bodies = self.position, jump.copy()
-        if position.interface.layer is not None:
-            bodies[: self.n] -= position.interface.layer * f[: self.n]
+        bodies[: self.n] -= position.interface.layer * f[: self.n]
         on_punch = self.interface.punch.apply(position.in_space(f * position.weights))
         punch, strip, _ = self.creep.factors(self.imposed.duration)
         on_strip = (punch * on_punch - position.in_space(bodies)) / strip  # the jump is that of bodies that creep
@@ -264,8 +263,9 @@ class _Solver:
     def __init__(self, step: GridStep, piece: _Piece, moved: Array, held: Array) -> None:
         if not len(piece.closed):
             raise ConvergenceError(LOOSE)
-        self.on, self.at = step.on.around(piece.closed)
-        self.fields, self.length = (self.on.d, int(np.prod(self.on.counts))), float(step.length)
+        self.on = step.on.boxes.around(piece.closed)
+        self.at = self.on.box.where(step.on.of.places[piece.closed])
+        self.fields, self.length = (self.on.d, self.on.box.size), float(step.length)
         self.cut = int(np.prod(self.fields))
         self.piece = piece.on_box(self.at, self.fields[1])
         scale = step.scale[:, piece.closed].mean(axis=1)[:, None]
@@ -286,7 +286,7 @@ class _Solver:
         places = np.append(2 * sizes[0] - sizes[1], sizes)
         at = np.interp(np.log(np.maximum(over[1:].max(axis=0), 1e-9)), places, np.arange(len(places)))
         shares = np.clip(1 - np.abs(at - np.arange(len(places))[:, None]), 0.0, 1.0)
-        self.shares, self.rest = [one if one.any() else None for one in shares[1:]], shares[0]
+        self.shares, self.rest = shares[1:], shares[0]
         known = np.append(0.0, np.full(len(over) - 1, STIFF[-1]))[:, None]
         self.shrunk = np.sqrt((1 + known) / np.maximum(1 + over, 1 + known))
 
@@ -299,9 +299,10 @@ class _Solver:
     def _inverse(self, fields: Array) -> Array:
         """Return what the endless grid makes of residuals (d size,): unknowns."""
         shrunk, counts = fields.reshape(self.fields) * self.shrunk, (self.fields[0], *self.on.counts)
-        stiff = [None if share is None else (shrunk[1:] * share).reshape(-1, *counts[1:]) for share in self.shares]
+        stiff = shrunk * self.shares[:, None]
+        stiff[:, 0] = 0.0
         shrunk[1:] *= self.rest
-        found = self.on.endless.solve(shrunk.reshape(counts), *stiff).reshape(self.fields)
+        found = self.on.solve(shrunk.reshape(counts), stiff.reshape(-1, *counts)).reshape(self.fields)
         found *= self.shrunk
         found *= self.length
         return self.piece.unknown(found).ravel()
@@ -313,7 +314,7 @@ class _Solver:
 
     def _multiply(self, z: Array) -> Array:
         x, y = z[: self.cut].reshape(self.fields), z[self.cut :]
-        opened = self.on.on_grid(self.piece.tractions(x).reshape(-1, *self.on.counts)).reshape(self.fields)
+        opened = self.on.products(self.piece.tractions(x).reshape(-1, *self.on.counts)).reshape(self.fields)
         opened /= self.length
         found = self.piece.unknown(opened) + self.piece.stiff * x
         return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[: self.cut]])

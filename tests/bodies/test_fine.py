@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, elastic, make_sliding, place, relaid
 from fenwear.bodies import fine as fine_bodies
 from fenwear.bodies import operators
+from fenwear.bodies.convolution import Convolution
 from fenwear.bodies.correction import Ground
 from fenwear.bodies.fine import RESOLVED, FineBody, fine
 from fenwear.bodies.grid import RegularGrid
@@ -305,13 +306,16 @@ def test_each_body_for_itself() -> None:
 class ExactLayer(HalfSpace):
     """The layer by its kernel, of normal forces alone."""
 
-    def table(self, traction: Array) -> Array:
-        """Return displacements at all distances."""
-        counts = [np.arange(1 - count, count) for count in self._shape]
+    @cached_property
+    def convolution(self) -> Convolution:
+        """Displacements at all distances."""
+        found = super().convolution
+        counts = [np.arange(1 - count, count) for count in found.counts]
         far = np.hypot(*np.meshgrid(*(c * h for c, h in zip(counts, self.spacing, strict=True)), indexing="ij"))
         at = np.linspace(0, 2.6, 400)
-        more = CubicSpline(at, [otherwise(r) for r in at])(far)
-        return super().table(traction) + more * traction[2]
+        table = found.table.copy()
+        table[0, 2] += CubicSpline(at, [otherwise(r) for r in at])(far)
+        return replace(found, table=table)
 
 
 def as_exact_layer(request: Request) -> HalfSpace:

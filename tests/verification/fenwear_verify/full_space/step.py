@@ -74,15 +74,13 @@ class FullStep(Step):
             (trace @ u).reshape(self.d, -1).T / times for trace, times in zip(whole.trace, softer, strict=False)
         )
         apart = whole.seen @ u
-        if (layer := position.interface.layer) is not None:
-            apart[: self.n] += layer * f[: self.n]
+        apart[: self.n] += position.interface.layer * f[: self.n]
         moved = SurfaceDisplacement(apart, on_punch, on_strip)
         return StatusSolution(f, a * self.units, displacement, sign * (-1) ** r, moved)
 
     def _given_way(self, status: ContactStatus) -> tuple[Array, Array]:
         """Return how what lies between gives way at the pressures of a status: slope, closure at no pressure (n,)."""
-        layer = self.position.interface.layer
-        slope = np.zeros(self.n) if layer is None else layer
+        slope = np.zeros(self.n) + self.position.interface.layer
         if self.closure is None:
             return slope, np.zeros(self.n)
         own, pressure = self.closure.slope(status.pressure), status.pressure

@@ -8,6 +8,7 @@ is what forces at these points do. Products with T go by fast Fourier transforms
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -74,7 +75,8 @@ class Convolution:
         fields[at] = flat.transpose(2, 1, 0)
         found = convolved([(self._kernel, fields)], len(self.table), self.size)[at].transpose(2, 1, 0)
         for weights, response in self.smooth:
-            found = found + weights.to_nodes(np.tensordot(response, weights.to_points(flat), ((2, 3), (0, 1))))
+            moved = np.tensordot(response, weights.to_points(flat), ((2, 3), (0, 1)))
+            found = found + weights.to_nodes(np.asarray(moved, dtype=np.float64))
         return np.asarray(found).reshape(n, -1, *rest)
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
@@ -90,7 +92,7 @@ class Convolution:
 
     def diagonal(self) -> Array:
         """Return the displacements at each node from unit forces at itself (n, a, b)."""
-        middle = self.table[(EVERY, EVERY, *(count - 1 for count in self.counts))]
+        middle = self.table.reshape(*self.table.shape[:2], -1)[..., math.prod(self.table.shape[2:]) // 2]
         found = np.broadcast_to(middle, (len(self.places), *middle.shape))
         for weights, response in self.smooth:
             found = found + weights.diagonal(response.transpose(0, 2, 1, 3))
@@ -149,7 +151,7 @@ def kernel(table: Array, size: Sequence[int]) -> Kernel:
 def by_components(waves: Waves) -> Kernel:
     """Return waves (a, b, ...) by their components, but for those that are zero."""
     sizes = np.abs(waves).reshape(*waves.shape[:2], -1).max(axis=2)
-    return {(a, b): waves[a, b].copy() for a, b in np.argwhere(sizes > SAME * sizes.max()).tolist()}
+    return {(int(a), int(b)): waves[a, b].copy() for a, b in np.argwhere(sizes > SAME * sizes.max())}
 
 
 def convolved(parts: Sequence[tuple[Kernel, Array]], count: int, size: Sequence[int]) -> Array:

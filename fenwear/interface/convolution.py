@@ -132,8 +132,8 @@ class Box:
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
         numbers = np.ravel_multi_index(tuple(places.T), tuple(whole))
         full = len(places) == np.prod(whole) and np.array_equal(numbers, np.arange(len(places)))
-        within = tuple(whole.tolist()) if full else ()
-        return cls(tuple(low.tolist()), tuple(counts.tolist()), nodes, at, within)
+        corner, sides, within = (tuple(int(one) for one in each) for each in (low, counts, whole if full else []))
+        return cls(corner, sides, nodes, at, within)
 
     @property
     def size(self) -> int:

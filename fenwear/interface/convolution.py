@@ -132,8 +132,8 @@ class Box:
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
         numbers = np.ravel_multi_index(tuple(places.T), tuple(whole))
         full = len(places) == np.prod(whole) and np.array_equal(numbers, np.arange(len(places)))
-        corner, sides, within = (tuple(int(one) for one in each) for each in (low, counts, whole if full else []))
-        return cls(corner, sides, nodes, at, within)
+        corner, sides = (tuple(int(one) for one in each) for each in (low, counts))
+        return cls(corner, sides, nodes, at, tuple(int(one) for one in shape) if full else ())
 
     @property
     def size(self) -> int:

@@ -154,8 +154,7 @@ class Creep:
     def _scaled(self, own: Interface, times: Sequence[float], by_supports: tuple[Array, Array]) -> Interface:
         bodies = zip(both(own), times[:2], by_supports, strict=True)
         punch, strip = (scaled(body, factor, moved) for body, factor, moved in bodies)
-        layer = None if own.layer is None else times[2] * own.layer
-        return replace(own, punch=punch, strip=strip, layer=layer, like=None)
+        return replace(own, punch=punch, strip=strip, layer=times[2] * own.layer, like=None)
 
     def offset(self, phase: int, crept: Array) -> Array:
         """Return the gap (n,) that a state opens at the end of the phase that it is the beginning of, mm."""
@@ -373,8 +372,8 @@ def creep_of(
         for which, law in enumerate(laws)
         if law.creeps
     ]
-    if given is not None and placed.layers.linear is not None:
-        members.append(CreepingLayer(Retardation.of(given), placed.layers.linear))
+    if given is not None and np.any(placed.layers.winkler):
+        members.append(CreepingLayer(Retardation.of(given), np.asarray(placed.layers.winkler)))
     durations = np.array([phase.duration for phase in placed.motion.phases])
     found = [  # on a grid the strip answers opposite the punch in each of its places
         moved if face is own else (moved[0], by_supports(1, own.strip))

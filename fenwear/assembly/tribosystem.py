@@ -60,7 +60,7 @@ class Condensed:
     strip_moves: bool
     passed: Array | None = None
 
-    def join(self, rigid: RigidEquilibrium, layer: Array) -> Interface:
+    def join(self, rigid: RigidEquilibrium, layer: Array | float) -> Interface:
         """Return both joined at the place of a pair, with a linear layer."""
         strip, moves = self.facing(rigid)
         return Interface(rigid, self.punch, strip, moves, layer=layer)
@@ -281,7 +281,7 @@ def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> 
 
 def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
-    interface = condensed.join(placed.rigid, placed.layers.linear)
+    interface = condensed.join(placed.rigid, placed.layers.winkler)
     under = _under_all(condensed, placed)
     found: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
@@ -293,7 +293,7 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
         else:
             own = under[id(bodies)]
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
-            layer = placed.layers.linear
+            layer = placed.layers.winkler
             found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
     parts = {name: getattr(placed, name) for name in ContactSetup.__dataclass_fields__}
     interfaces = tuple(found)

@@ -4,13 +4,12 @@ Which nodes are opposite is found by `patches` and `overlap`, gaps and weights a
 `compliance.Interface`, and which rigid motions the contact balances `equilibrium`.
 """
 
-from fenwear.interface.compliance import NOTHING, Compliance, Interface
+from fenwear.interface.compliance import Compliance, Interface
 from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium
 from fenwear.interface.pair import ContactPair, check_distance, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
 __all__ = [
-    "NOTHING",
     "Compliance",
     "ContactPair",
     "Interface",

@@ -12,7 +12,7 @@ tractions that go with the unknowns: a pressure with its friction, or one along 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,6 @@ from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
 
-NOTHING: Array = np.zeros(())
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
 GRIDDED = 400  # nodes of a grid from where products along all axes are faster
@@ -48,7 +47,7 @@ class Interface:
         strip_moves: Which of the two.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
         like: One that differs by its loads or by where the strip's material is: what bodies answer is known of it.
-        layer: Closure along e_n by unit pressures of what lies between (n,), or of all nodes (), mm/MPa.
+        layer: Closure along e_n by unit pressures of what lies between (n,), mm/MPa; 0 of nothing.
     """
 
     rigid: RigidEquilibrium
@@ -57,7 +56,7 @@ class Interface:
     strip_moves: bool
     frame: Array | None = None
     like: Interface | None = None
-    layer: Array = field(default_factory=lambda: NOTHING)
+    layer: Array | float = 0.0
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
         """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
@@ -177,7 +176,7 @@ class Interface:
             d = on_strip.shape[-1]
             on_strip = self.pair.placement.vectors(on_strip.reshape(-1, d)).reshape(on_strip.shape)
         found = on_punch + on_strip
-        if self.layer.any():
+        if np.any(self.layer):
             to, by = np.equal.outer(own, np.arange(len(self.pair.weights))[columns]).nonzero()
             found[to, 0, by] += self._closing[own[to]]
         return found

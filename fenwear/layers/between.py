@@ -181,11 +181,6 @@ class Layers:
         """Return the thickness of the debris that the strip carries (n_strip,), mm; None without."""
         return np.asarray(worn.carried[0]) if self.strip_carries and len(worn.carried) else None
 
-    @cached_property
-    def linear(self) -> Array | None:
-        """Closure over pressure of a linear layer (n,), mm/MPa, as compliances have it; None without."""
-        return np.broadcast_to(self.winkler, (self.nodes,)) if np.any(self.winkler) else None
-
     def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array:
         """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
 

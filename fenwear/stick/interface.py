@@ -224,7 +224,9 @@ class StickInterface(OppositeBodies):
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        found = position_of(rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.linear)
+        found = position_of(
+            rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.winkler
+        )
         return along_tangents(found) if self.far else found
 
 

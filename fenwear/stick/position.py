@@ -27,7 +27,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.response import identity
 from fenwear.bodies.subcells import linear_cells
-from fenwear.interface import NOTHING, Compliance, ContactPair, Interface, RigidEquilibrium
+from fenwear.interface import Compliance, ContactPair, Interface, RigidEquilibrium
 from fenwear.interface.frame import contact_frame
 from fenwear.interface.placement import in_model, in_space
 from fenwear.sliding.field import SlidingField
@@ -170,7 +170,7 @@ def position_of(
     field: SlidingField,
     *,
     strip_moves: bool = False,
-    layer: Array = NOTHING,
+    layer: Array | float = 0.0,
 ) -> Position:
     """Return both bodies opposite each other.
 
@@ -179,7 +179,7 @@ def position_of(
         punch, strip: How the bodies answer, along all axes.
         field: The motion of the strip.
         strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
-        layer: Closure by unit pressures of what lies between (n,), or of all nodes (), mm/MPa.
+        layer: Closure by unit pressures of what lies between (n,), mm/MPa; 0 of nothing.
     """
     frame = contact_frame(rigid.pair.normal)
     drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))

@@ -115,7 +115,7 @@ class FullContact:
         rigid, pair = interface.rigid, interface.pair
         traction = (pair.normal + friction_ratio) * pair.weights[:, None]
         on_punch, on_strip, back = pair.punch.spread, csr_array(pair.transfer.T), pair.placement.back
-        layer = self._on_rank0(csr_array(np.diag(interface.layer))) if interface.layer.any() else None
+        layer = self._on_rank0(csr_array(np.diag(interface.layer))) if np.any(interface.layer) else None
         stiffness = [
             _softened(body.stiffness, times) for body, times in zip((punch, strip), self._softer[k], strict=True)
         ]

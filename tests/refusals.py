@@ -292,10 +292,9 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "life/scatter.py": ("gives impossible values", "KEY=KIND"),
     "stick/cycle.py": ("did not come together",),
     "stick/final.py": ("did not come together",),
-    "stick/fineness.py": ("too coarse",),
     "stick/heat.py": ("did not come together",),
     "stick/interface.py": ("bodies with meshes",),
-    "stick/setup.py": ("expected 'coulomb'",),
+    "stick/setup.py": ("expected 'coulomb'", "too coarse"),
 }
 
 

@@ -177,7 +177,7 @@ def test_bad_profiles(points: list[list[Any]], message: str) -> None:
 def test_bad_files(tmp_path: Path) -> None:
     """A column without a unit, and one that nobody knows."""
     for text, message in (("x (mm),depth\n0,0\n1,0\n", "column 'depth': has no unit"),
-                          ("x (mm),heigth (um)\n0,0\n1,0\n", "column 'heigth': not known.*Did you mean 'height'"),
+                          ("x (mm),heigth (um)\n0,0\n1,0\n", "column 'heigth': not known.*did you mean 'height'"),
                           ("x (mm),y (mm)\n0,0\n1,0\n", "expected the columns x and depth")):  # fmt: skip
         (tmp_path / "profile.csv").write_text(text)
         (tmp_path / "case.toml").write_text('base = "example1"\nstrip.profile = {file = "profile.csv"}\n')

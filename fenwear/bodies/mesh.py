@@ -9,7 +9,6 @@ axisymmetric model has r along x.
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -30,7 +29,7 @@ from fenwear.bodies.ready import constants, meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.case.units import convert
-from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.errors import CaseError, InputError, OutputError, did_you_mean
 from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
 from fenwear.files.formats import CAD, MESHES, is_foreign, read_mesh
@@ -501,9 +500,8 @@ def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
 
 
 def _no_parameter(path: Path, name: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {close[0]!r}? It" if close else "it"
-    return f"{path.name} has no such parameter; {hint} has {', '.join(known) or 'none'}"
+    hint = did_you_mean(name, known)
+    return f"{path.name} has no such parameter, but {', '.join(known) or 'none'}{hint}"
 
 
 def _groups(gmsh: Any, dim: int) -> dict[str, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
@@ -23,7 +22,7 @@ from fenwear.case.removed import replacement
 from fenwear.case.schema import MADE, Case, Given, Written, part_models
 from fenwear.case.thermal import Heat
 from fenwear.case.units import shown
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, InputError, did_you_mean
 
 PLACEHOLDER = 2  # half-cycles, until the program is read
 UNSET = "unset"  # the key that takes keys of the base away
@@ -79,8 +78,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if path.suffix != ".toml" and not path.exists():
         if source not in builtin_cases():
             known = ", ".join(builtin_cases())
-            close = difflib.get_close_matches(source, builtin_cases(), n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
+            hint = did_you_mean(source, builtin_cases())
             raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known}){hint}"))
         text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
     else:
@@ -384,8 +382,7 @@ def _entries(how: str, count: int, error: Any) -> str:
 
 def _nearest(value: object, expected: str) -> str:
     """Return a suggestion for a misspelt word out of those expected, quoted each."""
-    close = difflib.get_close_matches(str(value), expected.split("'")[1::2], n=1) if isinstance(value, str) else []
-    return f"; did you mean {close[0]!r}?" if close else ""
+    return did_you_mean(str(value), expected.split("'")[1::2]) if isinstance(value, str) else ""
 
 
 def _key(location: Sequence[str | int], data: object, *, missing: bool) -> str:
@@ -406,9 +403,8 @@ def _key(location: Sequence[str | int], data: object, *, missing: bool) -> str:
 def _suggestion(location: tuple[str | int, ...]) -> str:
     """Return "; did you mean ...?" for a misspelt key, or the keys that are known there."""
     names = list(dict.fromkeys(name for table in _tables(location[:-1]) for name in getattr(table, "model_fields", {})))
-    close = difflib.get_close_matches(str(location[-1]), names, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
+    if hint := did_you_mean(str(location[-1]), names):
+        return hint
     elsewhere = [key.path for key in all_keys() if key.path.endswith(f".{location[-1]}")] if len(location) == 1 else []
     if elsewhere:
         return f"; did you mean {' or '.join(dict.fromkeys(elsewhere[:3]))}?"

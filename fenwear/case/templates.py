@@ -6,7 +6,6 @@ the second, below a line +++, is the case file, in which jinja2 fills them in.
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import tomllib
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from fenwear.case.reading import builtin_cases, make_case
 from fenwear.case.units import convert
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, InputError, did_you_mean
 
 if TYPE_CHECKING:
     import jinja2
@@ -82,9 +81,8 @@ def find_template(name: str) -> Template:
         start = f"{name!r} is a built-in case: a file with base = {name!r} and what is other than there starts from it"
         raise CaseError(InputError("new", f"{start}. There are templates of {', '.join(names)}"))
     if name not in names:
-        close = difflib.get_close_matches(name, names, 1, 0.5) or [n for n in names if name and name in n][:1]
-        hint = f"did you mean {close[0]!r}? " if close else ""
-        raise CaseError(InputError("new", f"no template {name!r}; {hint}There are {', '.join(names)}"))
+        hint = did_you_mean(name, names, 0.5) or did_you_mean(name, [n for n in names if name and name in n], 0.0)
+        raise CaseError(InputError("new", f"no template {name!r}. There are {', '.join(names)}{hint}"))
     head, _, text = (_folder() / f"{name}.toml").read_text("utf-8").partition(BETWEEN)
     told = tomllib.loads(head)
     found = {
@@ -164,9 +162,8 @@ def _unknown(template: Template, setting: str) -> str:
     if not equals:
         return f"expected dimension=value, got {setting!r}"
     names = list(template.dimensions)
-    close = difflib.get_close_matches(name.strip(), names, 1, 0.5)
-    hint = f"did you mean {close[0]!r}? It has" if close else "it has"
-    return f"{template.name} has no dimension {name.strip()!r}; {hint} {', '.join(names)}"
+    hint = did_you_mean(name.strip(), names, 0.5)
+    return f"{template.name} has no dimension {name.strip()!r}, only {', '.join(names)}{hint}"
 
 
 def all_text() -> str:

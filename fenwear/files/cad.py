@@ -6,7 +6,6 @@ gmsh: "volume 1", "surface 3", "curve 7". Lengths are in mm: OpenCASCADE takes t
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, InputError, did_you_mean
 from fenwear.files.by_gmsh import in_process
 from fenwear.files.groups import BODIES, ENTITIES, MEASURES, PLANE, POWERS, normal
 from fenwear.files.mesh import listed
@@ -149,10 +148,9 @@ def name_parts(
             elif text and PLANE.fullmatch(text):
                 planes.append((group, text))
             elif text:
-                close = difflib.get_close_matches(normal(text), known, n=1)
-                hint = f"Did you mean {close[0]!r}? " if close else ""
                 count = ", ".join(f"{len(gmsh.model.getEntities(d))} {ENTITIES[d]}s" for d in range(3, 0, -1))
-                message = f"{name} has no part {text!r}. {hint}It has {count}: `fenwear info {name}` lists them."
+                hint = did_you_mean(normal(text), known) or "."
+                message = f"{name} has no part {text!r}{hint} It has {count}: `fenwear info {name}` lists them."
                 problems.append(InputError(f"geometry.groups.{group}", message))
     for group, text in planes:
         own = [

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.errors import did_you_mean
 
 MISSING = ("", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a", "inf", "-inf")
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
@@ -253,8 +254,7 @@ def _directive(number: int, text: str, known: Collection[str]) -> tuple[str, str
     is_set = match["set"] is not None
     key = is_set or "." in name
     if not key and name.casefold() not in known:
-        if any(difflib.get_close_matches(name.casefold(), known, 1, 0.8)):
-            close = difflib.get_close_matches(name.casefold(), known, 1, 0.8)[0]
+        for close in difflib.get_close_matches(name.casefold(), known, 1, 0.8):
             raise TableError(where, f"the directive {name!r} is not known. Write '# {close} = {value}'.")
         return None
     if key and "set" not in known:
@@ -363,9 +363,8 @@ def check_names(heads: Sequence[Head], known: Collection[str], where: str) -> No
         TableError: names the column.
     """
     for name in (head.name for head in heads if known and head.name not in known):
-        close = difflib.get_close_matches(name, known, 1)
-        hint = f"Did you mean {close[0]!r}? " if close else ""
-        message = f"not known{where}. {hint}Expected some of {', '.join(known)}, each with its unit"
+        hint = did_you_mean(name, known) or "."
+        message = f"not known{where}{hint} Expected some of {', '.join(known)}, each with its unit"
         raise TableError(f"column {name!r}", message)
 
 

@@ -51,7 +51,7 @@ def test_order_of_angles() -> None:
     ("changes", "told"),
     [
         ({"rows": [[0, 0, -1], [0.5, 30, -2], [0.4, 0, -1]]}, "row 3 of rows: time goes back or stands still"),
-        ({"columns": ["time (s)", "angel_y (deg)", "force_z (kN)"]}, "Did you mean 'angle_y'"),
+        ({"columns": ["time (s)", "angel_y (deg)", "force_z (kN)"]}, "did you mean 'angle_y'"),
         ({"columns": ["time (s)", "angle_y (mm)", "force_z (kN)"]}, "column 'angle_y': unit: "),
         ({"columns": ["time (s)", "angle_y", "force_z (kN)"]}, "column 'angle_y': has no unit"),
         ({"columns": ["angle_y (deg)", "time (s)", "force_z (kN)"]}, "expected one of time and percent"),

@@ -94,7 +94,7 @@ def test_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(CaseError) as error:
         fill_in(template, ["lod=3", "load=-2 N", "load=3 mm", "radius", "cycles=many"])
     said = str(error.value)
-    assert "did you mean 'load'? It has radius, length" in said
+    assert "did you mean 'load'?" in said
     assert "--set load: expected more than zero, got '-2 N'" in said
     assert "got '3 mm', which is of another kind" in said
     assert "expected dimension=value, got 'radius'" in said

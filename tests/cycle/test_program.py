@@ -301,7 +301,7 @@ def test_table(tmp_path: Path) -> None:
         ("distance (m), load (N)\n0, 1\n0, 2\n", "distance ends at 0"),
         ("distance (m), load\n0, 1\n5, 2\n", "column 'load': has no unit; expected one in brackets"),
         ("distance (kg), load (N)\n0, 1\n5, 2\n", "column 'distance': unit: "),
-        ("distance (m), lode (N)\n0, 1\n5, 2\n", "Did you mean 'load'"),
+        ("distance (m), lode (N)\n0, 1\n5, 2\n", "did you mean 'load'"),
         ("load (N), distance (m)\n0, 1\n5, 2\n", "as the first column"),
         ("distance (m), load (N)\n0, 1\n5\n", "row 3: expected 2 columns, got 1"),
         ("distance (m), load (N)\n0, 1\n5, much\n", "row 3, column 'load': expected a finite number, got 'much'"),

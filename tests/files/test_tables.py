@@ -48,7 +48,7 @@ WRONG = {
     BASE.replace("200, 0.49", "200,"): r"row 4, column 'volume'.*missing = skip",
     BASE.replace("0.49", "n/a"): r"row 4, column 'volume'.*'n/a'",
     BASE.replace("0.49", "0.49, 7"): r"row 4: expected 2 columns, got 3",
-    BASE.replace("volume", "volum"): r"'volum'.*Did you mean 'volume'",
+    BASE.replace("volume", "volum"): r"'volum'.*did you mean 'volume'",
     BASE.replace("volume (mm^3)", "volume"): r"'volume': has no unit",
     BASE.replace("100", '"1,000"').replace("0.", "0"): r"row 3: '1,000' may be 1000 or 1.000",
     BASE.replace("cycles)", "revolutions)"): r"does not turn",

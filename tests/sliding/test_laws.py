@@ -299,7 +299,7 @@ def test_laws_are_asked_at_pressures_alone() -> None:
         ("wear.punch.coefficient={expression='1e-8*depht'}", "'depht' is not known"),
         ("wear.punch.coefficient={table=[['5 mm', 1], [6, 2]], of='depth'}", "another kind|expected a number"),
         ("wear.punch.coefficient={table=[[5, 1], [4, 2]], of='depth'}", "rising arguments"),
-        ("wear.punch.coefficient={expression='1', law='a'}", "give one of expression, table, regions and law"),
+        ("wear.punch.coefficient={expression='1', regions={a=1}}", "give one of expression, table, regions and law"),
         ("wear.punch={coefficient=1e-8, pressure_threshold=5, pressure_cap=4}", "more than pressure_threshold"),
         ("wear.punch.coefficient={table=[[0, 1], [1, 2]], of='dept'}", "did you mean 'depth'"),
     ],

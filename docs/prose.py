@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = tomllib.loads((ROOT / "docs" / "prose.toml").read_text("utf-8"))
 
 # A dot behind a single capital letter ends no sentence where it is an initial, but does behind a unit, as in "3 K.".
-END = re.compile(r"(?:(?<=\d [A-Z]\.)|(?<!\b[A-Z]\.)(?<=[.!?]))[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
+END = re.compile(r"(?:(?<=\d [A-Z]\.)|(?<=°C\.)|(?<!\b[A-Z]\.)(?<=[.!?]))[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
 ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
 # Code, formulas that stand by themselves, comments, lists of sources, the head of a file.
 NO_PROSE = re.compile(

@@ -342,7 +342,7 @@ class Topography(Part):
         default=None,
         description="height map: .npz with height, x (and y) and the unit of all, .nc with them and a unit of each; "
         ".csv with columns x, (y,) height and their units; .sur, .plu, .al3d, .opd, .xyz, ... by "
-        "SurfaceTopography or surfalize, where one of them is installed",
+        "SurfaceTopography, where it is installed",
     )
     holes: Literal["reject", "fill", "keep"] = Field(
         default="reject",

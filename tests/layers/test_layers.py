@@ -233,7 +233,7 @@ def test_what_sticks_flows_beyond_the_hardness() -> None:
         ("contact.third_body={share=1.2, life=1}", "contact.third_body.share"),
         ("contact.third_body={share=0.5, life=-1}", "contact.third_body.life"),
         ("contact.third_body={share=0.5, life=1, initial=-1}", "contact.third_body.initial"),
-        ("contact.third_body={share=0.5, life={expression='p', unit='MPa'}}", r"contact\.third_body\.life: unit"),
+        ("contact.third_body={share=0.5, life={expression='p', unit='MPa'}}", r"contact\.third_body\.life\.unit: "),
         ("contact.third_body={share=0.5, life={regions={punch=1}}}", r"contact\.third_body\.life: expected an expr"),
         ("contact.third_body={share=0.5, life=1, edge_life=1}", r"contact\.third_body\.edge_length: expected together"),
         ("contact.third_body={share=0.5, life=1, edge_length=1}", r"contact\.third_body\.edge_life: expected together"),

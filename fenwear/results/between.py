@@ -183,6 +183,8 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
     """
     system, found = block.system, dict[str, float]()
     for row, (body, thickness) in enumerate(zip(BODIES, system.coatings, strict=True)):
+        if not thickness.any():
+            continue
         begun, own = ((before.worn.punch, block.wear), (before.worn.strip, block.wear_strip))[row]
         cycles = np.concatenate([[before.half_cycle], block.half_cycle])
         ended, at = _ends(_coated(system, body, thickness), np.vstack([begun, own]), cycles)

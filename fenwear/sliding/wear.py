@@ -88,12 +88,12 @@ def _added(one: Array, other: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _BodyWear:
+class BodyWear:
     """What a body loses in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears."""
 
     rate: Array
     law: PressureLaw
-    coating: _CoatingWear | None = None
+    coating: CoatingWear | None = None
 
     def depth(self, pressure: Array, worn: Shares | None = None) -> Array:
         """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes.
@@ -121,8 +121,8 @@ class _BodyWear:
 
 
 @dataclass(frozen=True)
-class _CoatingWear:
-    """What a coating would lose in each phase: beta~ S (m, n), mm/MPa^b, as of `_BodyWear`.
+class CoatingWear:
+    """What a coating would lose in each phase: beta~ S (m, n), mm/MPa^b, as of `BodyWear`.
 
     Attributes:
         rate: Of the coating.
@@ -148,8 +148,8 @@ class PhasesWear:
         pairs: The surfaces opposite each other in each phase.
     """
 
-    punch: _BodyWear | None
-    strip: _BodyWear | None
+    punch: BodyWear | None
+    strip: BodyWear | None
     pairs: Sequence[ContactPair]
 
     @property
@@ -195,7 +195,7 @@ class PhasesWear:
             parts.append(replace(body, coating=coating))
         return replace(self, punch=parts[0], strip=parts[1])
 
-    def _shares(self, body: _BodyWear | None, pressure: Array) -> Shares | None:
+    def _shares(self, body: BodyWear | None, pressure: Array) -> Shares | None:
         """Return what is worn of coating and base of a body, at its own nodes; None where all is of the base."""
         if body is None or body.coating is None or body.coating.left is None:
             return None
@@ -321,7 +321,7 @@ class PhasesWear:
         return np.concatenate(parts, axis=2)
 
 
-def _some(body: _BodyWear, phases: list[int]) -> _BodyWear:
+def _some(body: BodyWear, phases: list[int]) -> BodyWear:
     """Return the wear of a body in some of the phases."""
     coating = None if body.coating is None else replace(body.coating, rate=body.coating.rate[phases])
     return replace(body, rate=body.rate[phases], coating=coating)
@@ -411,7 +411,7 @@ class Wear:
             CaseError: a coefficient is negative or not finite there.
         """
         chosen = range(len(self.pairs)) if which is None else which
-        bodies: list[_BodyWear | None] = []
+        bodies: list[BodyWear | None] = []
         given = zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), self.coatings, strict=True)
         for law, sliding, key, thickness in given:
             if not law.wears:
@@ -427,9 +427,9 @@ class Wear:
             coating = (
                 None
                 if above is None
-                else _CoatingWear(rates(above), PressureLaw.of(above, self.friction.contact.uniform_share), thickness)
+                else CoatingWear(rates(above), PressureLaw.of(above, self.friction.contact.uniform_share), thickness)
             )
-            bodies.append(_BodyWear(rates(law), self._of_pressure[key], coating))
+            bodies.append(BodyWear(rates(law), self._of_pressure[key], coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 

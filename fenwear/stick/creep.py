@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.bodies.creep import Retardation
@@ -22,7 +22,6 @@ from fenwear.stick.position import Position
 from fenwear.stick.state import StickState
 
 PARTS, BODIES = ("punch", "strip", "layer"), 2
-ACCURATE, ROBUST = 1 - np.sqrt(0.5), 1 + np.sqrt(0.5)  # g of the two methods that are stable to infinity
 Displaced = tuple[Array, Array, Array]  # the punch (n, d), the strip at its operator's nodes (q, d), the layer (n,), mm
 
 
@@ -171,51 +170,65 @@ def opened_by_creep(position: Position, creep: StickCreep, state: Array) -> Arra
     return np.asarray(np.einsum("nd,nd->n", position.frame[:, 0], apart) + layer)
 
 
-class CreepStep:
-    """(1 - T) y = r of what creeps in a jump over N cycles, T near N times the derivative of its rate.
+class CreepNear:
+    """What creeps over many cycles like one, by what its mean pressure changes: the implicit part of a jump.
 
-    y goes by X = period / tau in a cycle to v, and what has crept along the normal, q = sum of c y, takes pressure
-    away, and so v. With M the pressures' answer to a depth that stays, U what pressures displace and S what that opens,
-
-        y = (r - h X U M q) / (1 + h X),    (1 + a S M) q = sum of c r / (1 + h X),    a = sum of c h X / (1 + h X),
-
-    h = (1 - 1/sqrt(2)) N. Along the tangents all of v may be taken away: there y = r / (1 + h X (1 + sum of c)) with
-    h = (1 + 1/sqrt(2)) N.
+    Along the normals y goes by X = period / tau in a cycle to v, which follows the pressure. Along the tangents all of
+    v may be taken away where nodes stick: there y goes by X (1 + sum of c) to where it rests in such cycles.
 
     Args:
         creep: What creeps.
         position: The bodies in the middle position of the strip.
         period: Of a cycle, s.
-        cycles: N.
+        begin, rate: The state of the cycle, and how much it changes it.
     """
 
-    def __init__(self, creep: StickCreep, position: Position, period: float, cycles: float) -> None:
-        self._creep, self._position = creep, position
-        self._paces = [cycles * period / law.times for law in creep.laws]
-        self._normals = self._position.frame[:, 0], _normals_of_strip(self._position)
-        self._answer: Array | None = None
+    def __init__(self, creep: StickCreep, position: Position, period: float, begin: Array, rate: Array) -> None:
+        self._creep, self._position, self._begin, self._rate = creep, position, begin, creep.parted(rate)
+        self._paces = [period / law.times for law in creep.laws]
+        self._normals = position.frame[:, 0], _normals_of_strip(position)
 
-    def answering(self, answer: Array) -> None:
-        """Take M (n, n), MPa/mm."""
-        n = len(answer)
-        closed = np.zeros_like(answer)
-        for part, shares in enumerate(self._shares):
-            if shares:
-                opened = [self._opened(part, self._displaced(part, unit)) for unit in np.eye(n)]
-                closed += shares * np.array(opened).T
-        self._answer = answer
-        self._factor = scipy.linalg.lu_factor(np.eye(n) + closed @ answer)
-
-    @property
-    def _shares(self) -> list[float]:
-        """Return a of each part."""
+    @cached_property
+    def _opened_by_units(self) -> list[Array]:
+        """Gap (n, n) that v of each part by unit pressures opens, mm/MPa."""
+        units, none = np.eye(len(self._normals[0])), np.zeros((len(self._normals[0]),) * 2)
         return [
-            float(law.compliances @ (ACCURATE * pace / (1 + ACCURATE * pace)))
-            for law, pace in zip(self._creep.laws, self._paces, strict=True)
+            np.array([self._opened(part, self._displaced(part, unit)) for unit in units]).T if law.creeps else none
+            for part, law in enumerate(self._creep.laws)
         ]
 
+    def coupling(self, cycles: float) -> Array:
+        """Return the gap (n, n) that unit mean pressures open by creep in a step, mm/MPa."""
+        parts = zip(self._creep.laws, self._paces, self._opened_by_units, strict=True)
+        shares = [(law.compliances @ (cycles * pace / (1 + cycles * pace)), opened) for law, pace, opened in parts]
+        return np.asarray(sum(share * opened for share, opened in shares))
+
+    def after(self, before: Array, cycles: float, pressure: Array) -> Array:
+        """Return the state z = before + cycles M(z) at a change of the mean pressure (n,), MPa."""
+        found = []
+        for part, away in enumerate(self._creep.parted(before - self._begin)):
+            x = cycles * self._paces[part][:, None]
+            along, across = self._split(part, away + cycles * self._rate[part])
+            along = along + x * self._displaced(part, pressure)
+            found.append(along / (1 + x) + across / (1 + self._growth(part) * x))
+        return self._begin + np.concatenate([own.ravel() for own in found])
+
+    def rate(self, now: Array, pressure: Array) -> Array:
+        """Return M(now) at a change of the mean pressure (n,), MPa."""
+        found = []
+        for part, away in enumerate(self._creep.parted(now - self._begin)):
+            along, across = self._split(part, away)
+            moved = self._displaced(part, pressure) - along - self._growth(part) * across
+            found.append(self._rate[part] + self._paces[part][:, None] * moved)
+        return np.concatenate([own.ravel() for own in found])
+
+    def _growth(self, part: int) -> float:
+        return 1 + float(self._creep.laws[part].compliances.sum())
+
     def _displaced(self, part: int, pressure: Array) -> Array:
-        """Return v (size,) of a part by pressures (n,)."""
+        """Return v (size,) of a part by pressures (n,); zero of one that does not creep."""
+        if not self._creep.laws[part].creeps:
+            return np.zeros(1)
         if part == BODIES:
             return self._creep.closure * pressure
         position, interface = self._position, self._position.interface
@@ -234,29 +247,14 @@ class CreepStep:
             displacement = -self._position.pair.placement.vectors(self._position.reading @ displacement)
         return np.einsum("nd,nd->n", self._normals[0], displacement)
 
-    def solve(self, right: Array) -> Array:
-        """Return y."""
-        creep, first, q = self._creep, [], np.zeros(len(self._normals[0]))
-        for part, (law, r, pace) in enumerate(zip(creep.laws, creep.parted(right), self._paces, strict=True)):
-            along = r if part == BODIES else self._along(part, r)
-            grown = 1 + law.compliances.sum()
-            y = along / (1 + ACCURATE * pace)[:, None] + (r - along) / (1 + ROBUST * grown * pace)[:, None]
-            first.append(y)
-            q += self._opened(part, law.compliances @ y)
-        if self._answer is None:
-            return np.concatenate([y.ravel() for y in first])
-        taken = self._answer @ scipy.linalg.lu_solve(self._factor, q)
-        for part, (law, pace) in enumerate(zip(creep.laws, self._paces, strict=True)):
-            if law.creeps:
-                share = ACCURATE * pace / (1 + ACCURATE * pace)
-                first[part] = first[part] - share[:, None] * self._displaced(part, taken)
-        return np.concatenate([y.ravel() for y in first])
-
-    def _along(self, part: int, values: Array) -> Array:
-        """Return what of states (terms, size) of a body is along the normals."""
+    def _split(self, part: int, values: Array) -> tuple[Array, Array]:
+        """Return states (terms, size) of a part along the normals, and across them."""
+        if part == BODIES:
+            return values, np.zeros_like(values)
         shape, normals = self._creep.shapes[part], self._normals[part]
         vectors = values.reshape(-1, *shape)
-        return np.einsum("knd,nd,ne->kne", vectors, normals, normals).reshape(values.shape)
+        along = np.einsum("knd,nd,ne->kne", vectors, normals, normals).reshape(values.shape)
+        return along, values - along
 
 
 def _normals_of_strip(position: Position) -> Array:

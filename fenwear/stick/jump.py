@@ -1,22 +1,24 @@
-"""Cycle jumps in partial slip: many cycles in one linearly implicit step.
+"""Cycle jumps in partial slip: many cycles in one implicit-explicit step.
 
 A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
-bodies, so that dy/dn = F(y) over the number n of cycles. One jump of N cycles is a step of the two-stage
-Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20, 1999)
+bodies, so that dy/dn = F(y) over the number n of cycles. With M(y) the wear of a cycle whose nodes slip as in the last
+one (`frozen`), and R = F - M what cycles do beside it, one jump of N cycles is a step of the two-stage Runge-Kutta
+method ARS(2,2,2) of second order (U. M. Ascher et al., Applied Numerical Mathematics 25, 1997): that of gross sliding
+(`fenwear.cycle.jump_step`), where nothing is beside M, with R as it was seen last, linear in n. With g = 1 - 1/sqrt(2)
 
-    (1 - g N A) k1 = F(y),    (1 - g N A) k2 = F(y + N k1) - 2 k1,    y + N (3 k1 + k2) / 2,
+    y_1 = y + g N (M(y_1) + R(g N)),
+    y_2 = y + (1 - g) N (M(y_1) + R(g N)) + g N (M(y_2) + R(N)).
 
-which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
-near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
+R is known from the cycle at the begin and one halfway, to which a first step with R as it is at the begin leads. A
+second step starts there; the cycle at its end begins the next jump. A jump in which nodes come into contact ends by a
+step of the implicit Euler method over a part of it, as in gross sliding. Its error has two parts: of M a third of the
+difference to one step over the whole jump, and of R Simpson's rule against the line, each as the last stage damps it.
+
 What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
 lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
 through their end (`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere.
-The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
-A cycle whose error is too large goes in parts, of which each is such a jump: N is below 1.
-Loads that change are those of each rate's own time: alone they would leave that rule nothing to see, so that the wear
-halfway is looked at, too.
-Both look at begin and end alone: where coefficients change with the depth, as where a coating's friction ends,
-Simpson's rule with the wear of one more cycle, at the shape halfway, gives it, too.
+No depth decreases. A cycle whose error is too large goes in parts, of which each is such a jump: N is below 1.
+Loads that change are those of each cycle's own time.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
 is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
@@ -25,27 +27,26 @@ is computed again until both belong together; the trapezoidal rule gives its err
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
-from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.contact import ContactState
 from fenwear.errors import ConvergenceError
 from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
+from fenwear.stick.creep import opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.derivative import Remembered, derivative, rows_of_debris, stiffness
-from fenwear.stick.grid_jump import TOO_LARGE, Answering, GridJump
+from fenwear.stick.frozen import Frozen
 from fenwear.stick.heat import HeatHistory
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
 from fenwear.stick.state import PartialSlipState
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
-GAMMA = 1 + np.sqrt(0.5)
+SHARE = 1 - np.sqrt(0.5)  # of a step, that a stage is long
+LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
+TOO_LARGE = "what many cycles wear is too large for numbers: expected a smaller wear coefficient"
 CREPT = 1e-2  # of all that has crept: near its end errors are no longer measured by what a jump adds
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
@@ -172,6 +173,103 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
     return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
+class _Packing:
+    """Depths and what goes with them as one array: of coated bodies what their coatings would have lost."""
+
+    def __init__(self, problem: PartialSlipProblem, like: WornDepths) -> None:
+        self.problem, self._like = problem, like
+        self.depths = len(like.punch) + len(like.strip)
+        self._cuts = np.cumsum([part.size for part in _parts(like)])[:-1]
+
+    def of(self, worn: WornDepths) -> Array:
+        """Return depths as an array (size,)."""
+        return np.concatenate(_parts(self.problem.coatings.measured(worn)))
+
+    def parted(self, y: Array) -> WornDepths:
+        """Return the depths of an array (size,)."""
+        return self.problem.interface.layers.settled(self.problem.coatings.depths(self.split(y)))
+
+    def split(self, y: Array) -> WornDepths:
+        """Return the parts of an array (size,) as they are."""
+        punch, strip, between, carried, crept = np.split(y, self._cuts)
+        shapes = self._like.between.shape, self._like.carried.shape
+        return WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
+
+    def rate(self, cycle: FrettingCycle) -> Array:
+        """Return the rate of a cycle (size,).
+
+        Raises:
+            ConvergenceError: it is beyond all numbers.
+        """
+        found = np.concatenate(_parts(self.problem.coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn)))
+        if not np.isfinite(found).all():
+            raise ConvergenceError(TOO_LARGE)
+        return found
+
+    def measured(self, rate: WornDepths, worn: WornDepths) -> Array:
+        """Return the rate of depths (size,) at depths."""
+        found, slopes = np.concatenate(_parts(rate)), np.concatenate(self.problem.coatings.slopes(worn))
+        own = found[: self.depths]
+        own[:] = np.divide(own, slopes, out=np.zeros_like(own), where=slopes > 0)
+        return found
+
+
+def _parts(worn: WornDepths) -> list[Array]:
+    return [worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept]
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """The end of a stage (size,), the contact there, and where the stage began and how many cycles it was long."""
+
+    y: Array
+    contact: ContactState
+    begin: Array
+    length: float = 0.0
+
+
+class _Steps:
+    """Steps of a jump from a cycle."""
+
+    def __init__(self, packing: _Packing, cycle: FrettingCycle) -> None:
+        self.packing, self._frozen, y = packing, Frozen(packing.problem, cycle), packing.of(cycle.worn)
+        self.begin = _Moment(y, self._frozen.contact, y)
+
+    def beside(self, cycle: FrettingCycle, at: _Moment) -> Array:
+        """Return R (size,) of a cycle at the end of a stage."""
+        rate = self._frozen.rate(at.contact, cycle.worn)
+        return self.packing.rate(cycle) - self.packing.measured(rate, cycle.worn)
+
+    def stage(self, begin: Array, cycles: float, near: ContactState) -> _Moment:
+        """Return y = begin + cycles M(y)."""
+        worn, contact = self._frozen.stage(self.packing.parted(begin), cycles, near)
+        return _Moment(self.packing.of(worn), contact, begin, cycles)
+
+    def step(self, before: _Moment, cycles: float, beside: Callable[[float], Array], last: float = 0.0) -> _Moment:
+        """Return what y' = M(y) + beside(n) leads to.
+
+        Args:
+            before: Where it begins.
+            cycles: How many later.
+            beside: R after so many of them.
+            last: Cycles of the last step, of the implicit Euler method; 0 for none.
+        """
+        own = cycles - last
+        h = SHARE * own
+        first = self.stage(before.y + h * beside(h), h, before.contact)
+        rate = (first.y - first.begin) / h + beside(h)
+        found = self.stage(before.y + (own - h) * rate + h * beside(own), h, first.contact)
+        if last:
+            found = self.stage(found.y + last * beside(cycles), last, found.contact)
+        return self.risen(found)
+
+    def risen(self, end: _Moment, more: Array | float = 0.0) -> _Moment:
+        """Return the end with so much more (size,), without depths below those at the begin of the jump."""
+        y, depths = end.y + more, self.packing.depths
+        y[:depths] = np.maximum(y[:depths], self.begin.y[:depths])
+        return replace(end, y=y)
+
+
 def _attempt(
     problem: PartialSlipProblem,
     now: FrettingCycle,
@@ -181,63 +279,72 @@ def _attempt(
 ) -> FrettingCycle:
     """Return the cycle after a jump; its temperatures go on from those of the last whole cycle."""
     problem = problem.worn_like(now.records, now.first_step)
-    n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
-    between, layers = depths + now.worn.between.size, problem.interface.layers
-    size = between + now.worn.carried.size
+    packing = _Packing(problem, now.worn)
+    steps = _Steps(packing, now)
+    begin = steps.beside(now, steps.begin)
 
-    def parted(y: Array) -> WornDepths:
-        shapes = now.worn.between.shape, now.worn.carried.shape
-        state, carried = y[depths:between].reshape(shapes[0]), y[between:size].reshape(shapes[1])
-        found = problem.coatings.depths(WornDepths(y[:n], y[n:depths], state, y[size:], carried))
-        return layers.settled(found)
+    def cycle_at(end: _Moment, done: float, after: PartialSlipState) -> FrettingCycle:
+        start = _slid_on(now, done, load)
+        worn = _balanced(problem, now.worn, packing.parted(end.y))
+        at = replace(after, slid=start.slid, load=start.load)
+        return _rate(problem, at, worn, now.number + done, begin_of_heat)
 
-    def whole(worn: WornDepths) -> Array:
-        return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
+    half = steps.step(steps.begin, cycles / 2, lambda _: begin)
+    middle = cycle_at(half, cycles / 2, now.end)
+    bend = (steps.beside(middle, half) - begin) / (cycles / 2)
+    whole = steps.step(steps.begin, cycles, lambda n: begin + n * bend)
+    half = steps.risen(half, cycles**2 / 8 * bend)
+    last = LAST * cycles if _comes(steps.begin, half, whole) else 0.0
+    end = steps.step(half, cycles / 2, lambda n: begin + (cycles / 2 + n) * bend, last)
+    then = cycle_at(end, cycles, middle.end)
+    curved = steps.beside(then, end) - begin - cycles * bend
+    by_halves = (whole.y - end.y) / 3
+    by_simpson = end.y - steps.stage(end.begin + cycles / 6 * curved, end.length, end.contact).y
+    error = _error(packing, np.abs(by_halves) + np.abs(by_simpson), steps.begin.y, end.y)
+    finer = None
+    if now.finer is not None:
+        off = replace(steps.begin, y=packing.of(now.finer))
+        moved = steps.step(off, cycles, lambda n: begin + n * bend).y - whole.y
+        finer = packing.parted(end.y - by_halves - by_simpson + moved)
+    return replace(then, error=max(error, middle.error, then.error), finer=finer)
 
-    def rate_of(cycle: FrettingCycle) -> Array:
-        return whole(problem.coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn))
 
-    begin, rate = whole(problem.coatings.measured(now.worn)), rate_of(now)
+def _comes(begin: _Moment, half: _Moment, whole: _Moment) -> bool:
+    """Return whether a node comes into contact from the begin of a jump or its middle to its end."""
+    before = np.minimum(begin.contact.pressure, half.contact.pressure)
+    return bool(((whole.contact.pressure > 0) & (before <= 0)).any())
 
-    def risen(y: Array) -> Array:
-        return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
 
-    if not np.isfinite(rate).all():
-        raise ConvergenceError(TOO_LARGE)
-    solve = _Implicit(problem, now, cycles).solve
-    off = None if now.finer is None else begin - whole(problem.coatings.measured(now.finer))
-    first = solve(rate)
-    start = _slid_on(now, cycles, load)
-    middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, begin_of_heat)
-    second = solve(rate_of(middle) - 2 * first)
-    worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
-    end = whole(problem.coatings.measured(worn))
-    then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, begin_of_heat)
-    missing = solve(end - begin - cycles / 2 * (rate + rate_of(then)))
-    if cycles > 1 and (start.load != now.end.load or problem.losses.changes_between(now.worn, worn)):
-        halfway = (begin + end) / 2 + cycles / 8 * (rate - rate_of(then))  # cubic by Hermite
-        shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
-        between_them = _rate(problem, _slid_on(now, cycles / 2, load), shape, now.number + cycles / 2, begin_of_heat)
-        simpson = cycles / 6 * (rate + 4 * rate_of(between_them) + rate_of(then))
-        seen = solve(end - begin - simpson)
-        missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
+def _error(packing: _Packing, missing: Array, begin: Array, end: Array) -> float:
+    """Return the largest estimated error of a jump from its depths and states (size,), of which so much is missing."""
+    problem, depths = packing.problem, packing.depths
     felt = _felt(problem)
     area = np.concatenate([felt, np.zeros(len(begin) - len(felt))])  # states of laws and creep have errors of their own
-    scale = area @ np.abs(whole(worn) - whole(now.worn)) + REST * (area @ whole(worn))
+    worn, before, wrong = packing.parted(end), packing.parted(begin), packing.split(missing)
+    size = np.concatenate(_parts(worn))
+    scale = area @ np.abs(size - np.concatenate(_parts(before))) + REST * (area @ size)
     opened = np.concatenate([*problem.coatings.slopes(worn), np.ones(len(begin) - depths)])
-    error = float(area @ (opened * np.abs(missing))) / max(float(scale), 1e-300)
-    remembered = Remembered.of(problem, now, depths)
-    of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
-    of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
-    of_debris = _debris_error(problem, missing, begin, end)
-    finer = None if off is None else parted(end - missing - _went_on(solve, off))
-    return replace(then, error=max(error, then.error, of_states, of_creep, of_debris), finer=finer)
+    return max(
+        float(area @ (opened * missing)) / max(float(scale), 1e-300),
+        _states_error(problem, wrong, before, worn),
+        _creep_error(problem, wrong.crept, worn.crept - before.crept, worn.crept),
+        _debris_error(problem, wrong, before, worn),
+    )
 
 
-def _went_on(solve: Callable[[Array], Array], off: Array) -> Array:
-    """Return what a jump makes of a difference of its begin: (1 + (1 - 2 g) z) / (1 - g z)^2 of it, z = N A."""
-    once = solve(off)
-    return np.asarray((1 - GAMMA) / GAMMA * solve(once) + (2 * GAMMA - 1) / GAMMA * once)
+def _states_error(problem: PartialSlipProblem, missing: WornDepths, begin: WornDepths, end: WornDepths) -> float:
+    """Return the largest error of a state that laws remember over its size, both integrated; 0 without."""
+    layers, pair = problem.interface.layers, problem.interface.middle.pair
+    if layers.memory is None:
+        return 0.0
+    wrong, first, last = (layers.held(one) for one in (missing, begin, end))
+    return max(
+        float((abs(off) @ weights / np.maximum(np.maximum(abs(a), abs(b)) @ weights, 1e-300)).max(initial=0.0))
+        for weights, off, a, b in (
+            (pair.weights, wrong.contact, first.contact, last.contact),
+            (pair.strip.weights, wrong.strip, first.strip, last.strip),
+        )
+    )
 
 
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
@@ -268,17 +375,15 @@ def _felt(problem: PartialSlipProblem) -> Array:
     return np.concatenate([pair.weights, pair.strip.weights, *here, *on_strip])
 
 
-def _debris_error(problem: PartialSlipProblem, missing: Array, begin: Array, end: Array) -> float:
+def _debris_error(problem: PartialSlipProblem, missing: WornDepths, begin: WornDepths, end: WornDepths) -> float:
     """Return the error of the debris' thickness over its size; 0 without.
 
     Beside what a jump wears, in many of its lives, it is next to nothing: an error of that says nothing of it.
     """
     layers, pair = problem.interface.layers, problem.interface.middle.pair
-    if layers.debris is None:
-        return 0.0
+    lies = [layers.where_it_lies(one) for one in (missing, begin, end)]
     weights = pair.strip.weights if layers.strip_carries else pair.weights
-    stored, _ = rows_of_debris(layers, len(pair.weights), len(pair.strip.weights))
-    wrong, first, last = (float(weights @ np.abs(y[stored : stored + len(weights)])) for y in (missing, begin, end))
+    wrong, first, last = (0.0 if one is None else float(weights @ np.abs(one)) for one in lies)
     return wrong / max(first, last, 1e-300)
 
 
@@ -289,83 +394,6 @@ def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end
         float(problem.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
     )
     return wrong / max(done, CREPT * there, 1e-300)
-
-
-class _Implicit:
-    """(1 - T) z = r with T near N dF/dy: depths and what lies between by g N A, and what creeps.
-
-    Along the normal what creeps follows the pressures' answer to it, as depths do. Its steps are of the more accurate
-    of the two methods that are stable to infinity, g = 1 - 1/sqrt(2), which takes T as it is: along the tangents, where
-    sticking nodes relax as fast as their bodies let them, the other one serves, with the fastest pace there may be.
-    How depths change what creeps is left out: of second order the method is with any T.
-
-    Args:
-        problem: The bodies and what is done to them.
-        now: The cycle that the jump begins with.
-        cycles: N.
-
-    Raises:
-        ConvergenceError: T is beyond all numbers.
-    """
-
-    def __init__(self, problem: PartialSlipProblem, now: FrettingCycle, cycles: float) -> None:
-        self.problem, self.now, self.cycles = problem, now, cycles
-        self._size = len(now.worn.punch) + len(now.worn.strip) + now.worn.between.size + now.worn.carried.size
-        self.groups, itself = derivative(problem, now)
-        creep = problem.interface.creep
-        self._solve: Callable[[Array], Array]
-        if not creep.creeps and all(group.position.compliance.on_grid is not None for group in self.groups):
-            self._solve = GridJump(self.groups, itself, GAMMA * cycles).solve
-        else:
-            self._solve = self._factored(itself)
-        self._creep = CreepStep(creep, problem.interface.middle, problem.program.period, cycles)
-        if creep.creeps:
-            self._creep.answering(self._answer())
-
-    def _factored(self, itself: csr_array) -> Callable[[Array], Array]:
-        """Return the solution operator by a factor of all unknowns."""
-        derivative = itself.toarray()
-        for group in self.groups:
-            derivative -= group.left @ (self._answer_of(group) @ group.right.toarray())
-        matrix = np.eye(self._size) - GAMMA * self.cycles * derivative
-        if not np.isfinite(matrix).all():
-            raise ConvergenceError(TOO_LARGE)
-        factor = scipy.linalg.lu_factor(matrix)
-        return lambda right: np.asarray(scipy.linalg.lu_solve(factor, right))
-
-    def _answer_of(self, group: Answering) -> Array:
-        """Return how pressures of a group fall by a depth at each (k, k), MPa/mm, which is kept."""
-        if id(group) not in self._answers:
-            self._answers[id(group)] = stiffness(group)
-        return self._answers[id(group)]
-
-    @cached_property
-    def _answers(self) -> dict[int, Array]:
-        return {}
-
-    def _answer(self) -> Array:
-        """Return how pressures fall by a depth that stays all through the cycle (n, n), on the mean of its steps."""
-        found = np.zeros((len(self.problem.weights),) * 2)
-        for group in self.groups:
-            found[np.ix_(group.closed, group.closed)] += group.share * self._answer_of(group)
-        return found
-
-    def solve(self, right: Array) -> Array:
-        """Return z."""
-        rest = right[: self._size]
-        if not self.problem.interface.creep.creeps:
-            return self._solve(rest)
-        crept = self._creep.solve(right[self._size :])
-        rest = rest + ACCURATE * self.cycles * self._by_creep(crept)
-        return np.concatenate([self._solve(rest), crept])
-
-    def _by_creep(self, crept: Array) -> Array:
-        """Return how a cycle's wear, and what lies between, change by what creeps (n + n_s + rows n)."""
-        creep, found = self.problem.interface.creep, np.zeros(self._size)
-        for group in self.groups:
-            opened = opened_by_creep(group.position, creep, crept)[group.closed]
-            found -= group.left @ (self._answer_of(group) @ opened)
-        return found
 
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:

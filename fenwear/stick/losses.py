@@ -18,7 +18,7 @@ from fenwear.interface import ContactPair
 from fenwear.layers import Evolution, Layers
 from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
-from fenwear.sliding.coating import CoatedBody, Shares, covering, left_of, shares
+from fenwear.sliding.coating import CoatedBody, Shares, left_of, shares
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import WornDepths
@@ -125,7 +125,6 @@ class StepConditions:
 
 
 BothShares = tuple[Shares, Shares]  # of punch and strip
-PerLayer = tuple[tuple[Array, Array], tuple[Array, Array]]  # of punch and strip, of coating and base each
 
 
 @dataclass(frozen=True)
@@ -182,25 +181,6 @@ class CoatedBodies:
     def slopes(self, worn: WornDepths) -> tuple[Array, Array]:
         """Return the derivative of depths to what coatings would have lost, at the nodes of punch and strip."""
         return self.punch.slope(worn.punch), self.strip.slope(worn.strip)
-
-    def layers_of_wear(self, worn: WornDepths) -> tuple[PerLayer, PerLayer]:
-        """Return for punch and strip what of coating and base wears at their nodes, and over what `measured` counts it.
-
-        Args:
-            worn: Depths.
-        """
-        there: list[tuple[Array, Array]] = []
-        counted: list[tuple[Array, Array]] = []
-        for coated, depth in ((self.punch, worn.punch), (self.strip, worn.strip)):
-            lies = np.where(depth < coated.thickness, 1.0, 0.0)
-            there.append((lies, 1 - lies))
-            counted.append((lies, coated.measured_rate(depth, np.zeros_like(lies), 1 - lies)))
-        return (there[0], there[1]), (counted[0], counted[1])
-
-    def ends_between(self, before: WornDepths, after: WornDepths) -> bool:
-        """Return whether a coating ends somewhere between these depths."""
-        bodies = (self.punch, before.punch, after.punch), (self.strip, before.strip, after.strip)
-        return any(((first < own.thickness) & (then >= own.thickness)).any() for own, first, then in bodies)
 
 
 _Both = tuple[Array, Array]  # of punch and strip
@@ -264,23 +244,6 @@ class StepLosses:
                 depth = below[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.conditions.interface.position(place).pair.wear_projection @ depth
         return WornDepths(punch.sum(axis=0), strip)
-
-    def changes_between(self, before: WornDepths, after: WornDepths) -> bool:
-        """Return whether coefficients change with depths from some to others, or with what is slid meanwhile."""
-        laws, pair = self.conditions.laws, self.conditions.interface.middle.pair
-        if not self.one_ratio and self.coatings.ends_between(before, after):
-            return True
-        if laws is None:
-            return False
-        return laws.passes or any(
-            of_coating is not None and bool(np.any(first != then))
-            for of_coating, first, then in zip(
-                laws.friction.of_coatings,
-                covering(laws.coatings, pair, (before.punch, before.strip)),
-                covering(laws.coatings, pair, (after.punch, after.strip)),
-                strict=True,
-            )
-        )
 
     @cached_property
     def one_ratio(self) -> bool:

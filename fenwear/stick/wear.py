@@ -15,7 +15,6 @@ from scipy.sparse import eye_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.case import WearLaw
-from fenwear.case.laws import depends_on
 from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
@@ -38,13 +37,10 @@ class BodyRate:
 
     def depth(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
-        return self.rate * self.law.value(np.maximum(pressure, 0.0)) * self._slide(slid, duration)
+        return self.rate * self.law.value(np.maximum(pressure, 0.0)) * self.slide(slid, duration)
 
-    def slope(self, pressure: Array, slid: Array, duration: float) -> Array:
-        """Return the derivative of the depth to the pressure (n,), mm/MPa."""
-        return self.rate * self.law.slope(np.maximum(pressure, 0.0)) * self._slide(slid, duration) * (pressure >= 0)
-
-    def _slide(self, slid: Array, duration: float) -> Array:
+    def slide(self, slid: Array, duration: float) -> Array:
+        """Return how far a node slides in a time, to the power a (n,), mm^a s^(1-a)."""
         a = self.speed_exponent
         return slid if a == 1 else slid**a * duration ** (1 - a)
 
@@ -113,12 +109,6 @@ class LocalLaws:
         if not of_wear:
             return not self.friction.constant
         return not stays(self.wear, self.friction) or any_split(self.regions, self.wear)
-
-    @property
-    def passes(self) -> bool:
-        """Whether a coefficient changes as long as a run goes on: with the worn depth, or with what is slid."""
-        given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear)]
-        return any(depends_on(one, "depth", "s") for one in given)
 
     def asks(self, name: str) -> bool:
         """Return whether friction, wear or the loss of debris depends on a variable of coefficients."""

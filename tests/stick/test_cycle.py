@@ -85,7 +85,7 @@ def test_jumps_tend_to_the_march() -> None:
     marched = list(march(system, 2 * cycles))
     exact, pressed = depths(marched), marched[-1].totals.pressure[-1]
     differences, others, counts = [], [], []
-    for tolerance in (0.1, 1e-2):
+    for tolerance in (0.1, 1e-3):
         found = list(jump(system, 2 * cycles, tolerance=tolerance, block=1))  # a block for each jump
         assert found[-1].half_cycle[-1] == 2 * cycles
         counts.append(len(found))
@@ -112,9 +112,8 @@ def test_a_cycle_that_wears_too_much_goes_in_parts() -> None:
         [*sizes, *wear[:2]],
     )
     cycle = begin_cycle(own, own.beginning(), own.unworn(), 0)
-    for number in range(1, 4):
+    while cycle.number < 3:
         cycle = jumped(own, cycle, 3, 3e-2)
-        assert cycle.number == number
         assert cycle.error <= 3e-2
     system = assemble(load_case("fretting", [*sliding, "contact.law='gross-sliding'"]))
     *_, block = jump(system, 6, tolerance=1e-2)

@@ -17,8 +17,9 @@ from mpi4py import MPI
 from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.assembly import with_reduced_heat
 from fenwear.contact.inequality import Inequality
-from fenwear.cycle import Block, critical_speed, cycles_to_reach, growth_rate, jump_step, stability_number
+from fenwear.cycle import Block, critical_speed, cycles_to_reach, growth_rate, stability_number
 from fenwear.cycle import state as cycle_state
+from fenwear.cycle.jump_error import Sizes
 from fenwear.errors import InputError, RanksError
 from fenwear.heat.fluxes import FluxMap
 from fenwear.parallel import Team, on_root, total
@@ -94,7 +95,7 @@ def noisy(monkeypatch: pytest.MonkeyPatch) -> None:
             (Friction, "values"),
             (PhasesWear, "opening"),
             (cycle_state, "pressure_scales"),
-            (jump_step, "area"),
+            (Sizes, "area"),
         ):
             disturb(owner, name)
         monkeypatch.setattr(Inequality, "solve", fail)

@@ -42,7 +42,7 @@ from fenwear.assembly.variants import same_conduction
 from fenwear.case import Case
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat
 from fenwear.cycle.driver import Loading, Watch
-from fenwear.cycle.jump_error import Estimate
+from fenwear.cycle.jump_error import Estimate, Lengths
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
@@ -54,7 +54,6 @@ from fenwear.layers.between import PLASTIC
 from fenwear.sliding.motion import DEFAULT_POSITIONS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
-SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
 
 
 class HalfCycles:
@@ -139,6 +138,7 @@ class Jumps:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
         stepper, tolerance = self.stepper, self.tolerance
         strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
+        lengths = Lengths(tolerance)
         length, left = int(state.jump_length), (until - state.half_cycle) // strokes
         # What flows in a first cycle, or as a load rises, depends on the order of the phases and on what they heat.
         if self.system.layers.hardness < np.inf and (left == 1 or not given):
@@ -160,17 +160,11 @@ class Jumps:
             if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
                 length = max(1, tried // 2)
                 continue
-            largest = estimate.largest
-            factor = SAFETY * estimate.longer(tolerance)
             warmed = tried > 1 and not given and stepper.system.team.each(self, "change", end.temperature) > WARMED
-            if (largest <= tolerance and not warmed) or tried == 1:
+            if (estimate.largest <= tolerance and not warmed) or tried == 1:
                 break
-            # A half is half made already.
-            length = max(1, int(tried * min(0.5, max(LEAST, factor))))
-        if tried == length or factor < 1:  # a step cut short by an end says little of the next length
-            length = max(1, int(tried * min(MOST, max(LEAST, factor))))
-            if factor > 1 and tried < 4:
-                length = max(length, tried + 1)
+            length = int(lengths.shorter(tried, estimate))
+        length = int(lengths.following(tried, length, estimate))
         number = state.half_cycle + tried * strokes
         after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
         if state.finer is not None:

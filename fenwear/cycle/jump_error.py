@@ -1,7 +1,8 @@
-"""The error of a cycle jump, estimated from the jump made whole and in two halves."""
+"""The error of a cycle jump, from the jump made whole and in two halves, and how long the next one is."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +10,15 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.state import RunState, present
+from fenwear.interface import ContactPair
+from fenwear.layers import Layers
 from fenwear.sliding.wear import WornDepths
 
 ORDER = 2  # of the steps of a jump
+HALVES = 1 / (2**ORDER - 1)  # of the difference of a whole step to two halves, that these are off
 REST = 1e-2  # of all that has crept: where creep comes to its end it is no longer measured by what a jump adds
+SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
+FEW = 4  # cycles: shorter jumps grow by one at least
 
 
 @dataclass(frozen=True)
@@ -49,41 +55,113 @@ class Estimate:
         return float(min(by_wear ** (1 / ORDER), whole ** (1 / (ORDER + 1))))
 
 
+@dataclass(frozen=True)
+class Lengths:
+    """Lengths of jumps in cycles: whole ones, or a part of one.
+
+    Attributes:
+        tolerance: Largest estimated error of a jump.
+        shortest: Length.
+    """
+
+    tolerance: float
+    shortest: float = 1.0
+
+    def cut(self, cycles: float) -> float:
+        """Return a length of at most so many cycles."""
+        return int(cycles) if cycles >= 1 else max(float(cycles), self.shortest)
+
+    def shorter(self, tried: float, estimate: Estimate) -> float:
+        """Return the length to try after one whose error was too large. A half is half made already."""
+        return self.cut(tried * min(0.5, max(LEAST, self._factor(estimate))))
+
+    def following(self, tried: float, asked: float, estimate: Estimate) -> float:
+        """Return the length after a jump; one cut short by an end says little of it."""
+        factor = self._factor(estimate)
+        if tried != asked and factor >= 1:
+            return asked
+        length = self.cut(tried * min(MOST, max(LEAST, factor)))
+        return max(length, tried + 1) if factor > 1 and 1 <= tried < FEW else length
+
+    def _factor(self, estimate: Estimate) -> float:
+        return SAFETY * estimate.longer(self.tolerance)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How large depths and states of two surfaces are, and errors of them.
+
+    Attributes:
+        layers: What lies between.
+        pair: The surfaces.
+        crept: The gap (n,) that a state of what creeps opens, mm.
+    """
+
+    layers: Layers
+    pair: ContactPair
+    crept: Callable[[Array], Array]
+
+    def area(self, worn: WornDepths) -> float:
+        """Return the integral of the size of depths over both surfaces, and of what lies between."""
+        weights, on_strip = self.pair.weights, self.pair.strip.weights
+        between = float(weights @ np.broadcast_to(np.abs(self.layers.opening(worn.between)), weights.shape))
+        return float(weights @ np.abs(worn.punch) + on_strip @ np.abs(worn.strip)) + between + self._carried(worn)
+
+    def of_depth(self, wrong: WornDepths, step: WornDepths, end: WornDepths, rest: float = 0.0) -> float:
+        """Return an error of depths over what a jump wears, or of what creeps and of debris that the strip carries.
+
+        Args:
+            wrong: The error.
+            step: What the jump wears.
+            end: All that is worn then.
+            rest: Share of it that counts as worn in the jump.
+        """
+        found = self.area(wrong) / max(self.area(step) + rest * self.area(end), 1e-300)
+        for size in (self._crept, self._carried):  # along a track it is thin, and nothing beside what is worn
+            found = max(found, size(wrong) / max(size(step), REST * size(end), 1e-300))
+        return found
+
+    def of_states(self, wrong: WornDepths, begin: WornDepths, end: WornDepths) -> float:
+        """Return the largest error of a state that laws remember, or of the thickness of debris, over its size.
+
+        Beside what a jump wears, in many of its lives, debris is next to nothing: an error of that says nothing of it.
+        """
+        off, first, last = map(self._states, (wrong, begin, end))
+        return float((off / np.maximum(np.maximum(first, last), 1e-300)).max(initial=0.0))
+
+    def _crept(self, worn: WornDepths) -> float:
+        return float(self.pair.weights @ np.abs(self.crept(worn.crept)))
+
+    def _carried(self, worn: WornDepths) -> float:
+        lies = self.layers.on_strip(worn)
+        return 0.0 if lies is None else float(self.pair.strip.weights @ np.abs(lies))
+
+    def _states(self, worn: WornDepths) -> Array:
+        """Return the integrals of the size of all states."""
+        held, lies = self.layers.held(worn), self.layers.thickness(worn)
+        on_contact, on_strip = self.pair.weights, self.pair.strip.weights
+        return np.concatenate([np.abs([*held.contact, lies]) @ on_contact, np.abs(held.strip) @ on_strip])
+
+
 def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
     """Return the error of two half steps from their difference to the whole one, by Richardson."""
-    apart, step = whole.worn - halves.worn, halves.worn - before.worn
-    wrong, worn = area(system, apart), area(system, step)
+    sizes, step = sizes_of(system), halves.worn - before.worn
+    wrong = (whole.worn - halves.worn).times(HALVES)
     pressure = max(
-        force_difference(system, present(one).pressure[0], present(other).pressure[0])
+        force_difference(system.pair, present(one).pressure[0], present(other).pressure[0])
         for one, other in zip(whole.contacts, halves.contacts, strict=True)
     )
-    share, depth = 1 / (2**ORDER - 1), wrong / max(worn, 1e-300)
-    depth = max(
-        depth,
-        _creep_difference(system, apart, step, halves.worn),
-        _carried_difference(system, apart, step, halves.worn),
-    )
-    remembered, lies = (of(system, before, whole, halves) for of in (_state_difference, _debris_difference))
     return Estimate(
-        max(share * depth, _through_difference(system, before, whole, halves)),
-        share * pressure,
-        share * _heat_difference(system, whole, halves),
-        share * max(remembered, lies),
+        max(sizes.of_depth(wrong, step, halves.worn), _through_difference(system, before, whole, halves)),
+        HALVES * pressure,
+        HALVES * _heat_difference(system, whole, halves),
+        sizes.of_states(wrong, before.worn, halves.worn),
     )
 
 
-def _creep_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, end: WornDepths) -> float:
-    """Return the difference of what has crept over what the jump creeps; near the end of creep over a part of all."""
-    creep, weights = system.creep, system.pair.weights
-    wrong, moved, there = (float(weights @ np.abs(creep.depth(one.crept))) for one in (apart, step, end))
-    return wrong / max(moved, REST * there, 1e-300)
-
-
-def _carried_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, end: WornDepths) -> float:
-    """Return the same of debris that the strip carries: along a track it is thin, and nothing beside what is worn."""
-    lies, weights = [system.layers.on_strip(one) for one in (apart, step, end)], system.pair.strip.weights
-    wrong, moved, there = (0.0 if one is None else float(weights @ np.abs(one)) for one in lies)
-    return wrong / max(moved, REST * there, 1e-300)
+def sizes_of(system: Tribosystem) -> Sizes:
+    """Return how large depths and states of a system are."""
+    return Sizes(system.layers, system.pair, system.creep.depth)
 
 
 def _through_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
@@ -100,23 +178,14 @@ def _through_difference(system: Tribosystem, before: RunState, whole: RunState, 
     return found
 
 
-def area(system: Tribosystem, worn: WornDepths) -> float:
-    """Return the integral of the size of depths over both surfaces, and of what lies between."""
-    pair = system.pair
-    between = pair.weights @ np.broadcast_to(np.abs(system.layers.opening(worn.between)), pair.weights.shape)
-    if (lies := system.layers.on_strip(worn)) is not None:
-        between += pair.strip.weights @ np.abs(lies)  # as of its wear
-    return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip) + between)
-
-
-def force_difference(system: Tribosystem, first: Array, second: Array) -> float:
+def force_difference(pair: ContactPair, first: Array, second: Array) -> float:
     """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
 
     The Wasserstein distance of the two distributions, and the difference of their forces. Not a norm of the pressures'
     difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
     that of this node alone.
     """
-    x, weights = system.pair.punch.x, system.pair.weights
+    x, weights = pair.punch.x, pair.weights
     forces = [weights * first, weights * second]
     one, other = (float(force.sum()) for force in forces)
     if min(one, other) <= 0:
@@ -140,28 +209,3 @@ def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> flo
     weights = system.pair.weights
     apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
     return apart / max(rise, 1e-300)
-
-
-def _state_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
-    """Return the largest difference of a state that laws remember over its size; 0 without."""
-    first, one, other = (system.layers.held(state.worn) for state in (before, whole, halves))
-    return max(
-        float((weights @ np.abs(a - b).T / np.maximum(size, 1e-300)).max(initial=0.0))
-        for weights, a, b, size in (
-            (own, x, y, np.maximum(own @ np.abs(y).T, own @ np.abs(z).T))
-            for own, x, y, z in (
-                (system.pair.weights, one.contact, other.contact, first.contact),
-                (system.pair.strip.weights, one.strip, other.strip, first.strip),
-            )
-        )
-    )
-
-
-def _debris_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
-    """Return the difference of the debris' thickness over its size; 0 without.
-
-    Beside what a jump wears, in many of its lives, it is next to nothing: an error of that says nothing of it.
-    """
-    first, one, other = (system.layers.thickness(state.worn) for state in (before, whole, halves))
-    weights = system.pair.weights
-    return float(weights @ np.abs(one - other)) / max(float(weights @ first), float(weights @ other), 1e-300)

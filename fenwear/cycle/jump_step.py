@@ -43,7 +43,7 @@ from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
-from fenwear.cycle.jump_error import ORDER, Estimate, area, estimated
+from fenwear.cycle.jump_error import ORDER, Estimate, estimated, sizes_of
 from fenwear.cycle.state import RunState, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
@@ -151,6 +151,7 @@ class Stepper:
         self.system = system = with_reduced_heat(system)
         check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
+        self._sizes = sizes_of(system)
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
@@ -201,7 +202,7 @@ class Stepper:
             first, second = half.worn - state.worn, whole.worn - half.worn
             # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
             bent = (second - first).times(2 * LAST**2)
-            share = area(self.system, bent) / max(area(self.system, first + second), 1e-300)
+            share = self._sizes.area(bent) / max(self._sizes.area(first + second), 1e-300)
             estimate = replace(estimate, depth=max(estimate.depth, share))
         self._whole = whole, trend, bent
         if self._wear_follows:
@@ -264,8 +265,7 @@ class Stepper:
         )
         simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
         worn = replace(halves.worn - state.worn, between=NOTHING, carried=NOTHING)
-        wrong, all_worn = (area(self.system, one) for one in (simpson - worn, worn))
-        return wrong / max(all_worn, 1e-300)
+        return self._sizes.area(simpson - worn) / max(self._sizes.area(worn), 1e-300)
 
     def _rate(self, state: RunState, half_cycles: float) -> WornDepths:
         """Return what a cycle wears at the depths, temperatures and pressures of a state."""

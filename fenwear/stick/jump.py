@@ -28,11 +28,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
+from fenwear.cycle.jump_error import HALVES, Estimate, Lengths, Sizes, force_difference
 from fenwear.errors import ConvergenceError
 from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import WornDepths
@@ -47,9 +49,7 @@ MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; t
 SHARE = 1 - np.sqrt(0.5)  # of a step, that a stage is long
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 TOO_LARGE = "what many cycles wear is too large for numbers: expected a smaller wear coefficient"
-CREPT = 1e-2  # of all that has crept: near its end errors are no longer measured by what a jump adds
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
-SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
 SHORTEST = 1 / 256  # of a cycle: the shortest part of one
 
 
@@ -74,36 +74,27 @@ def jumped(
     Raises:
         ConvergenceError: the shortest part of a cycle did not converge.
     """
-    begin, length, error = now, now.length, 0.0
+    begin, length, error, lengths = now, now.length, 0.0, Lengths(tolerance, SHORTEST)
     while True:
         left = cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
         tried = left if left < min(length, 1) + SHORTEST else min(length, left)
         try:
-            then = _attempt(problem, now, tried, load, begin)
+            then, estimate = _attempt(problem, now, tried, load, begin)
         except ConvergenceError:
             if tried <= SHORTEST:
                 raise
-            length = _length(tried / 4)
+            length = lengths.cut(tried / 4)
             continue
         if tried > 1 and not fits(then):
-            length = _length(tried / 2)
+            length = lengths.cut(tried / 2)
             continue
-        factor = float(SAFETY * np.sqrt(tolerance / max(then.error, 1e-300)))
-        if then.error > tolerance and tried > SHORTEST:
-            length = _length(tried * min(0.5, max(LEAST, factor)))
+        if estimate.largest > tolerance and tried > SHORTEST:
+            length = lengths.shorter(tried, estimate)
             continue
-        error = max(error, then.error)
-        if tried == length or factor < 1:
-            longer = tried * min(MOST, max(LEAST, factor))
-            length = _length(longer if longer < 1 else np.ceil(longer))
+        error, length = max(error, estimate.largest), lengths.following(tried, length, estimate)
         if tried == left or tried >= 1:
             return replace(then, number=round(then.number), length=length, error=error)
         now = then
-
-
-def _length(cycles: float) -> float:
-    """Return a length of jumps: whole cycles, or a part of one."""
-    return int(cycles) if cycles >= 1 else max(float(cycles), SHORTEST)
 
 
 def first_cycle(
@@ -276,8 +267,8 @@ def _attempt(
     cycles: float,
     load: Callable[[float], float],
     begin_of_heat: FrettingCycle,
-) -> FrettingCycle:
-    """Return the cycle after a jump; its temperatures go on from those of the last whole cycle."""
+) -> tuple[FrettingCycle, Estimate]:
+    """Return the cycle after a jump, and its error; temperatures go on from those of the last whole cycle."""
     problem = problem.worn_like(now.records, now.first_step)
     packing = _Packing(problem, now.worn)
     steps = _Steps(packing, now)
@@ -298,53 +289,44 @@ def _attempt(
     end = steps.step(half, cycles / 2, lambda n: begin + (cycles / 2 + n) * bend, last)
     then = cycle_at(end, cycles, middle.end)
     curved = steps.beside(then, end) - begin - cycles * bend
-    by_halves = (whole.y - end.y) / 3
     by_simpson = end.y - steps.stage(end.begin + cycles / 6 * curved, end.length, end.contact).y
-    error = _error(packing, np.abs(by_halves) + np.abs(by_simpson), steps.begin.y, end.y)
+    estimate = _estimate(packing, (steps.begin, whole, end), by_simpson, max(middle.error, then.error))
     finer = None
     if now.finer is not None:
         off = replace(steps.begin, y=packing.of(now.finer))
         moved = steps.step(off, cycles, lambda n: begin + n * bend).y - whole.y
-        finer = packing.parted(end.y - by_halves - by_simpson + moved)
-    return replace(then, error=max(error, middle.error, then.error), finer=finer)
+        finer = packing.parted(end.y - HALVES * (whole.y - end.y) - by_simpson + moved)
+    return replace(then, finer=finer), estimate
+
+
+def _estimate(
+    packing: _Packing, found: tuple[_Moment, _Moment, _Moment], by_simpson: Array, of_heat: float
+) -> Estimate:
+    """Return the error of a jump.
+
+    Args:
+        packing: Of its arrays.
+        found: Its begin, and its end as a whole and in halves.
+        by_simpson: What R leaves of it (size,).
+        of_heat: That of temperatures.
+    """
+    interface, (begin, whole, end) = packing.problem.interface, (packing.parted(one.y) for one in found)
+    pair, contacts = interface.middle.pair, [one.contact.pressure for one in found]
+    sizes = Sizes(interface.layers, pair, partial(opened_by_creep, interface.middle, interface.creep))
+    parts = (whole - end).times(HALVES), end - packing.parted(found[2].y - by_simpson)
+    pressure = max(force_difference(pair, one, other) for one, other in zip(*contacts[1:], strict=True))
+    return Estimate(
+        sum(sizes.of_depth(part, end - begin, end, REST) for part in parts),
+        HALVES * pressure,
+        of_heat,
+        sum(sizes.of_states(part, begin, end) for part in parts),
+    )
 
 
 def _comes(begin: _Moment, half: _Moment, whole: _Moment) -> bool:
     """Return whether a node comes into contact from the begin of a jump or its middle to its end."""
     before = np.minimum(begin.contact.pressure, half.contact.pressure)
     return bool(((whole.contact.pressure > 0) & (before <= 0)).any())
-
-
-def _error(packing: _Packing, missing: Array, begin: Array, end: Array) -> float:
-    """Return the largest estimated error of a jump from its depths and states (size,), of which so much is missing."""
-    problem, depths = packing.problem, packing.depths
-    felt = _felt(problem)
-    area = np.concatenate([felt, np.zeros(len(begin) - len(felt))])  # states of laws and creep have errors of their own
-    worn, before, wrong = packing.parted(end), packing.parted(begin), packing.split(missing)
-    size = np.concatenate(_parts(worn))
-    scale = area @ np.abs(size - np.concatenate(_parts(before))) + REST * (area @ size)
-    opened = np.concatenate([*problem.coatings.slopes(worn), np.ones(len(begin) - depths)])
-    return max(
-        float(area @ (opened * missing)) / max(float(scale), 1e-300),
-        _states_error(problem, wrong, before, worn),
-        _creep_error(problem, wrong.crept, worn.crept - before.crept, worn.crept),
-        _debris_error(problem, wrong, before, worn),
-    )
-
-
-def _states_error(problem: PartialSlipProblem, missing: WornDepths, begin: WornDepths, end: WornDepths) -> float:
-    """Return the largest error of a state that laws remember over its size, both integrated; 0 without."""
-    layers, pair = problem.interface.layers, problem.interface.middle.pair
-    if layers.memory is None:
-        return 0.0
-    wrong, first, last = (layers.held(one) for one in (missing, begin, end))
-    return max(
-        float((abs(off) @ weights / np.maximum(np.maximum(abs(a), abs(b)) @ weights, 1e-300)).max(initial=0.0))
-        for weights, off, a, b in (
-            (pair.weights, wrong.contact, first.contact, last.contact),
-            (pair.strip.weights, wrong.strip, first.strip, last.strip),
-        )
-    )
 
 
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
@@ -365,35 +347,6 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
         changed, state = change.between, after.between.copy()
     state[rows[1]] += (worn - float(weights @ changed[rows].sum(axis=0))) / weights.sum()
     return replace(after, carried=state) if layers.strip_carries else replace(after, between=state)
-
-
-def _felt(problem: PartialSlipProblem) -> Array:
-    """Return the areas by which depths and what lies between are felt as gaps: what is ejected opens nothing."""
-    layers, pair = problem.interface.layers, problem.interface.middle.pair
-    here = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]
-    on_strip = [pair.strip.weights * (row == DEBRIS[0]) for row in layers.carried_rows]
-    return np.concatenate([pair.weights, pair.strip.weights, *here, *on_strip])
-
-
-def _debris_error(problem: PartialSlipProblem, missing: WornDepths, begin: WornDepths, end: WornDepths) -> float:
-    """Return the error of the debris' thickness over its size; 0 without.
-
-    Beside what a jump wears, in many of its lives, it is next to nothing: an error of that says nothing of it.
-    """
-    layers, pair = problem.interface.layers, problem.interface.middle.pair
-    lies = [layers.where_it_lies(one) for one in (missing, begin, end)]
-    weights = pair.strip.weights if layers.strip_carries else pair.weights
-    wrong, first, last = (0.0 if one is None else float(weights @ np.abs(one)) for one in lies)
-    return wrong / max(first, last, 1e-300)
-
-
-def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end: Array) -> float:
-    """Return the error of what has crept over what a jump creeps; near the end of creep over a part of all."""
-    creep, middle = problem.interface.creep, problem.interface.middle
-    wrong, done, there = (
-        float(problem.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
-    )
-    return wrong / max(done, CREPT * there, 1e-300)
 
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:

@@ -179,4 +179,4 @@ def test_distance_of_forces(assembled: Callable[..., Tribosystem]) -> None:
     forces = weights @ one, weights @ other
     expected = wasserstein_distance(x, x, weights * one, weights * other) / np.ptp(x[(one > 0) | (other > 0)])
     expected += abs(forces[0] - forces[1]) / max(forces)
-    assert force_difference(system, one, other) == pytest.approx(expected, rel=1e-12)
+    assert force_difference(system.pair, one, other) == pytest.approx(expected, rel=1e-12)

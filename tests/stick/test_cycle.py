@@ -95,9 +95,7 @@ def test_jumps_tend_to_the_march() -> None:
         differences.append(np.abs(depths(found) - exact).sum() / exact.sum())
         others.append(np.abs(found[-1].totals.pressure[-1] - pressed).sum() / pressed.sum())
     assert counts[0] < counts[1] < cycles
-    assert differences[0] < 0.1
-    assert differences[1] < 0.02
-    assert differences[1] < differences[0]
+    assert max(differences) < 5e-3  # a march of cycles this long is off by 1e-3 itself
     assert others[0] < 0.1
     assert others[1] < min(0.02, others[0])
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pint
 import xarray
-
 from fenwear.bodies.constants import constants
+
 from fenwear.bodies.ready import meshes_folder
 
 Tables = dict[str, Any]

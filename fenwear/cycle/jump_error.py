@@ -72,7 +72,7 @@ class Lengths:
         return int(cycles) if cycles >= 1 else max(float(cycles), self.shortest)
 
     def shorter(self, tried: float, estimate: Estimate) -> float:
-        """Return the length to try after one whose error was too large. A half is half made already."""
+        """Return the length to try after one whose error was too large."""
         return self.cut(tried * min(0.5, max(LEAST, self._factor(estimate))))
 
     def following(self, tried: float, asked: float, estimate: Estimate) -> float:

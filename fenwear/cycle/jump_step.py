@@ -31,7 +31,7 @@ y_3 = y_2 + h f(y_3). In it such a node loses what its neighbours lose.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 
@@ -50,23 +50,20 @@ from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import Evolution
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import NOTHING, WornDepths
+from fenwear.sliding.wear import NOTHING, PhasesWear, WornDepths
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which the stages of a jump are solved, and its end
 LOOSEST = 5e-3  # tolerance that these are of: contact of a rough run, too, is told to fulfil its conditions
 
-# What is worn from depths on in so many cycles, and what they add to the totals, from what they add without coatings.
-ThroughCoatings = Callable[[WornDepths, float, Totals], tuple[WornDepths, Totals]]
-
 
 @dataclass(frozen=True)
 class _Stage:
     """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals.
 
-    Its conductances (m, n) are those by which it is heated. What is worn through
-    coatings depends on where a step begins and how long it is: `coated` has that; None without.
+    Its conductances (m, n) are those by which it is heated. What is worn through coatings depends on where a step
+    begins and how long it is: `wear` is that of its phases.
     """
 
     contact: ContactState
@@ -74,7 +71,7 @@ class _Stage:
     worn: WornDepths
     adds: Totals
     conductances: Array
-    coated: ThroughCoatings | None = None
+    wear: PhasesWear
 
 
 @dataclass(frozen=True)
@@ -84,15 +81,6 @@ class _Moment:
     worn: WornDepths
     temperature: Array
     totals: Totals
-
-    def after(self, stage: _Stage, cycles: float) -> _Moment:
-        """Return the moment so many cycles as that of a stage later."""
-        temperature = self.temperature + cycles * stage.heated
-        lost, adds = stage.worn.times(cycles), stage.adds.times(cycles)
-        if stage.coated is not None:
-            own, adds = stage.coated(self.worn, cycles, adds)
-            lost = replace(lost, punch=own.punch, strip=own.strip)
-        return _Moment(self.worn + lost, temperature, self.totals + adds)
 
 
 class _Trend:
@@ -163,7 +151,6 @@ class Stepper:
         self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
         self._conductances: Array | None = None  # in it
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
-        self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
         self._whole: tuple[RunState, _Trend, WornDepths | None] | None = (
             None  # the last attempt as one step: see `finer`
         )
@@ -179,23 +166,17 @@ class Stepper:
         Raises:
             ConvergenceError: it did not converge.
         """
-        known, self._half, self._whole = self._half, None, None
-        if known is None or known[0] is not state:
-            known = None
-        trend = _Trend() if known is None else known[3].copy()
+        self._whole, trend = None, _Trend()
         half = self.step(state, cycles / 2, near=trend)
-        self._half = (state, cycles / 2, half, trend.copy())
-        whole = None if known is None or known[1] != cycles else known[2]
-        comes = _comes(state, half, half)
-        if whole is None and not comes:  # else begun near the halves, whose steps are not as long
-            whole = self.step(state, cycles, near=trend.copy())
-        comes = comes or (whole is not None and _comes(state, half, whole))
+        early = _comes(state, half, half)  # then begun near the halves, whose steps are not as long
+        whole = half if early else self.step(state, cycles, near=trend.copy())
+        comes = _comes(state, half, whole)
         last = LAST * cycles if comes else 0.0
         halves = self.step(half, cycles / 2 - last, cycles / 2, trend, ROUGH if comes else FINE)
         if comes:
             halves = self._last_step(halves, last, cycles - last, trend)
         recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
-        if whole is None:
+        if early:
             whole = self.step(state, cycles, near=trend.copy())
         estimate, bent = estimated(self.system, state, whole, halves), None
         if comes:
@@ -305,7 +286,7 @@ class Stepper:
         self._press(state.half_cycle, since + share)
         first = self._stage(begin, near.from_one(contact, since, since + share), share, cycles - share)
         near.add(since + share, first.contact)
-        between = begin.after(first, cycles - share)
+        between = self._after(begin, first, cycles - share)
         self._press(state.half_cycle, since + cycles)
         start = near.from_one(first.contact, since + share, since + cycles)
         self._solve_to(digits)
@@ -329,9 +310,17 @@ class Stepper:
         """Return the temperatures of coordinates (dim,); None of none."""
         return self.coupled.heat.exchange.at(values) if len(values) else None
 
+    def _after(self, before: _Moment, stage: _Stage, cycles: float) -> _Moment:
+        """Return the moment so many cycles as that of a stage later."""
+        lost, adds = stage.worn.times(cycles), stage.adds.times(cycles)
+        if stage.wear.coated:
+            own = stage.wear.begun(before.worn, cycles).worn(stage.contact.pressure).times(cycles)
+            lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
+        return _Moment(before.worn + lost, before.temperature + cycles * stage.heated, before.totals + adds)
+
     def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
         """Return the end of a step whose last stage is solved."""
-        now = before.after(last, cycles)
+        now = self._after(before, last, cycles)
         worn = self.system.layers.settled(now.worn)
         self._heated, self._conductances = last.heated, last.conductances
         return RunState(state.half_cycle, worn, parted(last.contact), self._temperature(now.temperature), now.totals)
@@ -379,7 +368,7 @@ class Stepper:
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
-        return _Stage(contact, heated, worn, adds, solved.conductances, self._through_coatings(contact.pressure))
+        return _Stage(contact, heated, worn, adds, solved.conductances, self.wear)
 
     def _of_first_phase(self, gap: Array) -> ContactState | None:
         """Return the contact of the first phase alone, in every phase; None where all are found by factors at once.
@@ -393,18 +382,6 @@ class Stepper:
         first = alone.solve(gap[0])
         pressure, open_, rigid = (np.repeat(own, len(gap), axis=0) for own in (first.pressure, first.gap, first.rigid))
         return ContactState(pressure, open_, rigid, first.iterations)
-
-    def _through_coatings(self, pressure: Array) -> ThroughCoatings | None:
-        """Return what is worn through coatings at pressures (m, n); None without coatings."""
-        wear = self.wear
-        if not wear.coated:
-            return None
-
-        def worn(before: WornDepths, cycles: float, adds: Totals) -> tuple[WornDepths, Totals]:
-            found = wear.begun(before, cycles).worn(pressure).times(cycles)
-            return found, with_coated(self.system, adds, found)
-
-        return worn
 
     def _solve(
         self, gap: Array, start: ContactState | None, begin: tuple[WornDepths, float], coupling: Array | None = None

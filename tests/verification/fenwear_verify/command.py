@@ -59,7 +59,7 @@ def verify(
         CaseError: the folder is not empty or cannot be written.
     """
     comm = MPI.COMM_WORLD
-    directory = on_root(comm, lambda: _make(output))
+    directory = on_root(comm, lambda: new_folder(output, DEFAULT))
     outcomes = []
     for outcome in run_cases(cases):
         outcomes.append(outcome)
@@ -73,7 +73,8 @@ def verify(
         beside = section.write_section(paper)
         found["paper"] = {**section.as_json(paper), "seconds": round(time.perf_counter() - begin, 3)}
         say(section.summary(rows))
-    on_root(comm, lambda: _write(directory, found, page(outcomes, beside, comm.size, versions())))
+    on_root(comm, lambda: write_results(directory / NUMBERS, json.dumps(found, indent=2) + "\n"))
+    on_root(comm, lambda: write_results(directory / PAGE, page(outcomes, beside, comm.size, versions())))
     return found, directory
 
 
@@ -90,19 +91,24 @@ def as_json(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def _make(output: Path | None) -> Path:
-    directory = free_directory(DEFAULT) if output is None else output
-    make_directory(directory)
-    (directory / CASE).unlink()  # its probe
-    return directory
+def new_folder(output: Path | None, default: Path) -> Path:
+    """Make the new folder of results, by default the next free one beside the default; return it."""
+    folder = free_directory(default) if output is None else output
+    make_directory(folder)
+    (folder / CASE).unlink()  # its probe
+    return folder
 
 
-def _write(directory: Path, found: dict[str, Any], text: str) -> None:
+def write_results(path: Path, content: str | bytes) -> None:
+    """Write a file of results.
+
+    Raises:
+        CaseError: it cannot be written.
+    """
     try:
-        (directory / NUMBERS).write_text(json.dumps(found, indent=2) + "\n", "utf-8")
-        (directory / PAGE).write_text(text, "utf-8")
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
     except OSError as error:
-        raise CaseError(InputError("-o", f"{directory} cannot be written: {error.strerror}")) from None
+        raise CaseError(InputError("-o", f"cannot write {path}: {error.strerror}")) from None
 
 
 def _lines(outcome: Outcome) -> list[str]:

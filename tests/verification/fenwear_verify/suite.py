@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import difflib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, SupportsFloat
+from typing import Any, Literal, SupportsFloat, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fenwear.errors import CaseError, FenwearError, InputError
 
 Verdict = Literal["agrees", "differs", "not run"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -212,17 +213,31 @@ def registered(names: Sequence[str] = (), besides: Sequence[str] = ()) -> list[V
     Raises:
         CaseError: a name that no case has.
     """
-    known = [*_CASES, *besides]
-    problems = [InputError("--only", _unknown(name, known)) for name in names if name not in known]
+    return chosen("verification case", _CASES, names, besides)
+
+
+def chosen(kind: str, known: Mapping[str, T], names: Sequence[str], besides: Sequence[str] = ()) -> list[T]:
+    """Return what is known by these names, by default all.
+
+    Args:
+        kind: What a name stands for, in the words of an error.
+        known: By name.
+        names: Asked for, with --only.
+        besides: Names among them that are not known here, but to the caller.
+
+    Raises:
+        CaseError: a name that nothing has.
+    """
+    every = [*known, *besides]
+    problems = []
+    for name in names:
+        if name not in every:
+            close = difflib.get_close_matches(name, every, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(every)}"
+            problems.append(InputError("--only", f"no {kind} {name!r}; {hint}"))
     if problems:
         raise CaseError(problems)
-    return [_CASES[name] for name in names if name in _CASES] if names else list(_CASES.values())
-
-
-def _unknown(name: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(known)}"
-    return f"no verification case {name!r}; {hint}"
+    return [known[name] for name in names if name in known] if names else list(known.values())
 
 
 def run_cases(cases: Sequence[VerificationCase]) -> Iterator[Outcome]:

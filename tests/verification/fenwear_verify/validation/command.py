@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 from fenwear.report.style import COLOURS, Style, panels
-from fenwear.results.history import CASE, free_directory, make_directory
 from fenwear.stack import versions
+from fenwear_verify.command import new_folder, write_results
 from fenwear_verify.validation.experiment import Comparison, Experiment, Finding, Scope, experiments
 
 DEFAULT, NUMBERS = Path("results") / "validation", "validation.json"
@@ -47,18 +46,18 @@ def validate(
     Raises:
         CaseError: no experiment has such a name, or the folder is not empty or cannot be written.
     """
-    chosen = experiments(names)
-    folder = on_root(MPI.COMM_WORLD, lambda: _make(output))
+    asked = experiments(names)
+    folder = on_root(MPI.COMM_WORLD, lambda: new_folder(output, DEFAULT))
     results = []
-    for one in chosen:
+    for one in asked:
         begin = time.perf_counter()
         finding = one.compute(scope)
         seconds = time.perf_counter() - begin
         say("\n".join(lines(one, finding)))
         results.append({**as_json(one, finding), "seconds": round(seconds, 1)})
-        on_root(MPI.COMM_WORLD, partial(_draw, finding, folder / f"{one.name}.png"))
+        on_root(MPI.COMM_WORLD, partial(_write_figure, finding, folder / f"{one.name}.png"))
     found = {"scope": scope, "versions": versions(), "experiments": results}
-    on_root(MPI.COMM_WORLD, lambda: _write(folder / NUMBERS, (json.dumps(found, indent=2) + "\n").encode()))
+    on_root(MPI.COMM_WORLD, lambda: write_results(folder / NUMBERS, json.dumps(found, indent=2) + "\n"))
     return found, folder
 
 
@@ -139,19 +138,5 @@ def draw(finding: Finding) -> bytes:
     return buffer.getvalue()
 
 
-def _make(output: Path | None) -> Path:
-    folder = free_directory(DEFAULT) if output is None else output
-    make_directory(folder)
-    (folder / CASE).unlink()  # its probe
-    return folder
-
-
-def _draw(finding: Finding, path: Path) -> None:
-    _write(path, draw(finding))
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        path.write_bytes(content)
-    except OSError as error:
-        raise CaseError(InputError("-o", f"cannot write {path}: {error.strerror}")) from None
+def _write_figure(finding: Finding, path: Path) -> None:
+    write_results(path, draw(finding))

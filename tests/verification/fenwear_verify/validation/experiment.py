@@ -8,7 +8,6 @@ data. The error of the model lies within E ± 2 u_val.
 from __future__ import annotations
 
 import csv
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -18,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.errors import CaseError, InputError
+from fenwear_verify.suite import chosen
 
 Scope = Literal["short", "full"]  # of a computation: short ones have coarser meshes, for the tests
 
@@ -162,17 +161,7 @@ def experiments(names: Sequence[str] = ()) -> list[Experiment]:
     Raises:
         CaseError: a name that no experiment has.
     """
-    problems = [
-        InputError("--only", f"no experiment {name!r}; {_nearest(name)}") for name in names if name not in _EXPERIMENTS
-    ]
-    if problems:
-        raise CaseError(problems)
-    return [_EXPERIMENTS[name] for name in names] if names else list(_EXPERIMENTS.values())
-
-
-def _nearest(name: str) -> str:
-    close = difflib.get_close_matches(name, _EXPERIMENTS, n=1)
-    return f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(_EXPERIMENTS)}"
+    return chosen("experiment", _EXPERIMENTS, names)
 
 
 def table(name: str) -> dict[str, Array]:

@@ -87,7 +87,7 @@ def test_of_both_bodies() -> None:
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    ({"by": [0.1, 0.2]}, r"punch\.supports\.0.*by: expected a displacement for each of fix, 1, got 2"),
+    ({"by": [0.1, 0.2]}, r"punch\.supports\.0\.by: expected a displacement for each of fix"),
     ({"by": ["1 N"]}, r"punch\.supports\.0\.by\.0.*mm"),
 ])  # fmt: skip
 def test_bad_input(change: dict[str, Any], message: str) -> None:

@@ -139,8 +139,8 @@ class Sizes:
     def _states(self, worn: WornDepths) -> Array:
         """Return the integrals of the size of all states."""
         held, lies = self.layers.held(worn), self.layers.thickness(worn)
-        on_contact, on_strip = self.pair.weights, self.pair.strip.weights
-        return np.concatenate([np.abs([*held.contact, lies]) @ on_contact, np.abs(held.strip) @ on_strip])
+        on_contact = [float(self.pair.weights @ np.abs(one)) for one in (*held.contact, lies)]
+        return np.array([*on_contact, *(float(self.pair.strip.weights @ np.abs(one)) for one in held.strip)])
 
 
 def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:

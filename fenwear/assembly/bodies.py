@@ -75,7 +75,7 @@ class Bodies:
 
     Attributes:
         punch, strip: Elasticity.
-        heat: Conduction in both; None without heat.
+        heat: Conduction in both; none without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
@@ -86,7 +86,7 @@ class Bodies:
 
     punch: ElasticBody
     strip: ElasticBody
-    heat: tuple[HeatBody, HeatBody] | None = None
+    heat: tuple[HeatBody, ...] = ()
     followed: WornDepths | None = None
     moved: WornDepths | None = None
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
@@ -240,8 +240,8 @@ def _owners(case: Case, comm: MPI.Comm) -> tuple[int, int] | None:
 
 def build_conduction(
     case: Case, punch: ElasticBody, strip: ElasticBody, warmed: tuple[Array, Array] | None = None
-) -> tuple[HeatBody, HeatBody] | None:
-    """Prepare conduction in both bodies; None for a case without heat; collective.
+) -> tuple[HeatBody, ...]:
+    """Prepare conduction in both bodies, in none for a case without heat; collective.
 
     Args:
         case: The problem.
@@ -249,14 +249,12 @@ def build_conduction(
         warmed: Temperatures that the properties are taken at; by default the initial one.
     """
     if case.heat is None:
-        return None
-    of_punch, of_strip = (
+        return ()
+    both = zip((punch, strip), (case.punch, case.strip), warmed or (None, None), strict=True)
+    return tuple(
         HeatBody(elastic, description, _conduction(case, elastic, description, theta), case.heat)
-        for elastic, description, theta in zip(
-            (punch, strip), (case.punch, case.strip), warmed or (None, None), strict=True
-        )
+        for elastic, description, theta in both
     )
-    return of_punch, of_strip
 
 
 def _conduction(case: Case, elastic: ElasticBody, description: Body, theta: Array | None) -> ConductionLaw:

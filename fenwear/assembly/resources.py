@@ -69,7 +69,7 @@ def setup_resources(bodies: Bodies, nodes: int, asked: tuple[Asked, Asked], matr
         asked: Patterns of force and their columns, of punch and strip.
         matrices: Of all contact nodes that the contact keeps on each rank.
     """
-    heat = bodies.heat is not None
+    heat = bool(bodies.heat)
     both = zip((bodies.punch, bodies.strip), asked, strict=True)
     numbers = sum(_numbers(body, patterns, columns, heat=heat) for body, (patterns, columns) in both)
     if CONDENSED in (bodies.punch.operator, bodies.strip.operator):

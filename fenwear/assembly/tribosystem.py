@@ -240,12 +240,11 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False) -> Condensed:
     """
     resources_of(placed).check()
     bodies, middle = placed.bodies, placed.pair
-    couplings: list[PETSc.Mat | None] = [None, None]
-    if bodies.heat is not None:
-        couplings = [
-            body.thermal_coupling(conduction.space)
-            for body, conduction in zip((bodies.punch, bodies.strip), bodies.heat, strict=True)
-        ]
+    made = [
+        body.thermal_coupling(conduction.space)
+        for body, conduction in zip((bodies.punch, bodies.strip), bodies.heat, strict=False)
+    ]
+    couplings: Sequence[PETSc.Mat | None] = made or (None, None)
     # In one frame, forces and displacements along its normals are all that is ever asked for.
     moves, fixed, flat = _frame(placed)
     onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
@@ -260,9 +259,8 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False) -> Condensed:
         onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
     punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     check_felt(middle, bodies.punch, bodies.strip)
-    for coupling in couplings:
-        if coupling is not None:
-            coupling.destroy()
+    for coupling in made:
+        coupling.destroy()
     if placed.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
         return Condensed(punch, strip, moves)
     n = len(middle.weights)
@@ -401,7 +399,7 @@ def with_exchange(
         keep: Whether what is reduced is kept on disk, and taken from there where it is.
         fresh: Reduce whatever is kept.
     """
-    if system.heat is None or system.bodies.heat is None:
+    if system.heat is None:
         return system
     all_together(system.comm)
     reduced = system.heat.operator == "reduced" if reduced is None else reduced
@@ -445,7 +443,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     Raises:
         CaseError: there is no heat, or a body has no heat sink.
     """
-    if system.heat is None or system.bodies.heat is None:
+    if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
     exchange = prepare_steady(
         system.heat,

@@ -199,7 +199,7 @@ def property_change(system: Tribosystem, state: HeatState | None) -> float:
         CaseError: a property is not positive at a temperature.
     """
     case, conduction = system.case, system.bodies.heat
-    if case.heat is None or conduction is None or state is None or not case.warming:
+    if case.heat is None or state is None or not case.warming:
         return 0.0
     before = taken_at(system)
     changed, problem = 0.0, None
@@ -216,13 +216,10 @@ def property_change(system: Tribosystem, state: HeatState | None) -> float:
     return float(system.comm.allreduce(changed, op=MPI.MAX)) / case.heat.property_tolerance
 
 
-def taken_at(system: Tribosystem) -> tuple[Array, Array]:
+def taken_at(system: Tribosystem) -> tuple[Array, ...]:
     """Return the temperatures of this rank's own nodes of both bodies that the properties are taken at, K."""
-    if system.bodies.warmed is not None or system.bodies.heat is None or system.case.heat is None:
-        return system.bodies.warmed or (np.zeros(0), np.zeros(0))
-    start = system.case.heat.initial
-    punch, strip = (np.full(body.owned, start) for body in system.bodies.heat)
-    return punch, strip
+    start = tuple(np.full(body.owned, system.initial_temperature) for body in system.bodies.heat)
+    return system.bodies.warmed or start
 
 
 def warming_key(system: Tribosystem) -> str:

@@ -197,7 +197,7 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     from fenwear.plausibility import fineness_warnings, speed_warnings
     from fenwear.signals import TimeUpError, time_limit
 
-    if system.heat is None or system.bodies.heat is None:
+    if system.heat is None:
         return system, []
     nodes = sum(body.space.dofmap.index_map.size_global for body in system.bodies.heat)
     log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does, for at most {seconds:g} s")

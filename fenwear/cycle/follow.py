@@ -169,7 +169,7 @@ def _moved_along(state: RunState, moved: Tribosystem) -> RunState:
 def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:
     """Return the state of the same temperatures on the moved meshes; collective."""
     bodies = moved.bodies.heat
-    if state is None or bodies is None:
+    if state is None:
         return None
     pairs = zip(state.functions(), bodies, strict=True)
     moved_along = [_in_place(old, body.function(body.initial())) for old, body in pairs]

@@ -54,10 +54,10 @@ def with_own_properties(
         if change <= share:
             return state, done
         followed, before = followed / 2 if change > FALLING * before else followed, change
-        heat = system.bodies.heat
-        if followed < 1 and heat is not None:
+        if followed < 1:
             pairs = zip(end.temperatures(), taken_at(system), strict=True)
-            end = HeatState.nodal(heat, [followed * new + (1 - followed) * old for new, old in pairs], end.track)
+            between = [followed * new + (1 - followed) * old for new, old in pairs]
+            end = HeatState.nodal(system.bodies.heat, between, end.track)
         system = warmed_system(system, end)
         state = found(system)
     raise ConvergenceError(

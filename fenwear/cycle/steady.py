@@ -210,7 +210,7 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
 
 def _check_sinks(system: Tribosystem) -> None:
     """Raise where a body loses heat nowhere; collective."""
-    if not system.exchange.conducts or system.bodies.heat is None or system.heat is None:
+    if not system.exchange.conducts or system.heat is None:
         return
     heat = system.heat
     shares = (heat.partition, 1 - heat.partition) if heat.conductance == 0 else (1.0, 1.0)

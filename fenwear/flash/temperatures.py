@@ -283,7 +283,6 @@ def _bulks(
     """
     placed, grid, window = heating.placed, heating.grid, heating.window
     bodies = build_conduction(case.model_copy(update={"heat": heat}), placed.bodies.punch, placed.bodies.strip)
-    assert bodies is not None
     elastics: tuple[ElasticBody, ElasticBody] = placed.bodies.punch, placed.bodies.strip
     x, powers = grid.flat[window.nodes.ravel()], window.cell * heating.heat.reshape(len(heating.heat), -1)
     places = np.broadcast_to(x, (len(powers), *x.shape)), x - heating.shifts[:, None]

@@ -105,7 +105,7 @@ class HeatExchange:
         """Call what is the same on all ranks: on rank 0 for all, unless every rank could go on alone."""
         return function() if self.reduced else self.team.lead(function)
 
-    def _unheated(self) -> tuple[tuple[HeatBody, HeatBody], list[Array]]:
+    def _unheated(self) -> tuple[tuple[HeatBody, ...], list[Array]]:
         bodies = (self.bases[0].body, self.bases[1].body)
         return bodies, [body.initial() for body in bodies]
 

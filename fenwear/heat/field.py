@@ -151,7 +151,7 @@ class HeatState:
 
     @classmethod
     def nodal(
-        cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array], track: Array | None = None
+        cls, bodies: tuple[HeatBody, ...], temperatures: Sequence[Array], track: Array | None = None
     ) -> HeatState:
         """Return the state of these temperatures of this rank's own nodes of both bodies, and of a closed track."""
         return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)), track)

@@ -42,7 +42,7 @@ Opened = Callable[[Array], Array]  # gap at the contact nodes (n, k), mm, by tem
 
 def prepare_exchange(
     heat: Heat,
-    bodies: tuple[HeatBody, HeatBody],
+    bodies: tuple[HeatBody, ...],
     pair: ContactPair,
     expansions: tuple[Array, Array],
     sliding: SlidingField,
@@ -168,7 +168,7 @@ def _in_place(
 
 def _passed_fineness(
     heat: Heat,
-    bodies: tuple[HeatBody, HeatBody],
+    bodies: tuple[HeatBody, ...],
     pair: ContactPair,
     sliding: SlidingField,
     motion: Motion,
@@ -243,7 +243,7 @@ def opened_gap(
 
 def prepare_steady(
     heat: Heat,
-    bodies: tuple[HeatBody, HeatBody],
+    bodies: tuple[HeatBody, ...],
     pair: ContactPair,
     expansions: tuple[Array, Array],
     sliding: SlidingField,
@@ -388,7 +388,7 @@ def contact_rows(body: HeatBody, pair: ContactPair) -> csr_array:
     return csr_array(onto_nodes @ body.trace.rows)
 
 
-def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[csc_array, csc_array]:
+def inflows(bodies: tuple[HeatBody, ...], pair: ContactPair) -> tuple[csc_array, csc_array]:
     """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
     weights = diags_array(pair.weights)
     punch, strip = (

@@ -76,7 +76,7 @@ def _save(directory: Path, system: Tribosystem, state: RunState, extremes: Mappi
         folder = new / f"{REMEMBERED}_{number}"
         on_root(comm, partial(folder.mkdir))
         write_temperatures(folder, comm, warm)
-    if system.bodies.warmed is not None and system.bodies.heat is not None:
+    if system.bodies.warmed is not None:
         for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
             _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
     comm.Barrier()
@@ -179,7 +179,7 @@ def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
         return None
     memory, bodies = _unpacked(system.contact_law.memory, MEMORY, folder, arrays), system.bodies.heat
     warm: list[HeatState] = []
-    while bodies is not None and on_root(system.comm, (folder / f"{REMEMBERED}_{len(warm)}").is_dir):
+    while bodies and on_root(system.comm, (folder / f"{REMEMBERED}_{len(warm)}").is_dir):
         own = folder / f"{REMEMBERED}_{len(warm)}"
         warm.append(HeatState.nodal(bodies, [read_temperature(own, body) for body in bodies]))
     return replace(memory, warm=tuple(warm))
@@ -230,7 +230,7 @@ def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
     """
     comm, bodies = system.comm, system.bodies.heat
     folder = on_root(comm, lambda: find(directory))
-    if bodies is None or not on_root(comm, _file(folder, f"{WARMED}_punch").exists):
+    if not bodies or not on_root(comm, _file(folder, f"{WARMED}_punch").exists):
         return None
     punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
     return punch, strip
@@ -261,7 +261,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     folder = on_root(comm, lambda: find(directory))
     found, arrays = on_root(comm, lambda: _read(folder, system))
     temperature = None
-    if system.bodies.heat is not None:
+    if system.bodies.heat:
         read = [read_temperature(folder, body) for body in system.bodies.heat]
         temperature = HeatState.nodal(system.bodies.heat, read, found.track)
     return replace(found.state, temperature=temperature, memory=_memory(folder, system, arrays))

@@ -133,7 +133,7 @@ def _traction(
 ) -> Array:
     """Return the traction of friction on the punch over this pressure, in space (n, 3); collective."""
     friction, surfaces = system.friction, None
-    if not friction.constant and temperatures is not None and system.bodies.heat is not None:
+    if not friction.constant and temperatures is not None and system.bodies.heat:
         punch, strip = (
             body.trace.pick(values[:, None])[:, 0, 0]
             for body, values in zip(system.bodies.heat, temperatures, strict=True)

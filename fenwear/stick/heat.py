@@ -220,7 +220,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         HeatError: no basis gives temperatures that die out.
     """
     bodies = interface.bodies
-    if case.heat is None or bodies.heat is None:
+    if case.heat is None:
         return None
     middle = interface.middle.pair
     motion = timed_motion(case, steps)

@@ -144,7 +144,6 @@ def test_steady_heat_by_kirchhoff() -> None:
     for within in (0.1, 1e-5):
         state = steady(system, properties_within=within)
         assert state.heat is not None
-        assert state.system.bodies.heat is not None
         worst = 0.0
         for body, found, k0, far, h in zip(
             state.system.bodies.heat, state.heat.end.temperatures(), K0, FAR, HEIGHTS, strict=True
@@ -215,7 +214,6 @@ def test_uniform_warmth_is_other_constants(edited: Edited) -> None:
 
     cold = assemble(edited("example1-heat", warm, *SMALL))
     other = assemble(edited("example1-heat", constant, *SMALL))
-    assert cold.bodies.heat is not None
     at = HeatState.nodal(cold.bodies.heat, [np.full(body.owned, 60.0) for body in cold.bodies.heat])
     assert properties_outdated(cold, at)
     hot = warmed_system(cold, at)

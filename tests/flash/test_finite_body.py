@@ -46,7 +46,6 @@ def test_block_by_images() -> None:
     placed = place_case(case)
     warm = case.model_copy(update={"heat": Heat(ambient=2.0)})
     bodies = build_conduction(warm, placed.bodies.punch, placed.bodies.strip)
-    assert bodies is not None
     found = bulk_of(bodies[1], placed.bodies.strip, CONDUCTIVITY, Spots(np.zeros((1, 2)), np.ones(1), 0.05))
     assert found is not None
     assert found.base == pytest.approx(10.0, rel=1e-6)
@@ -60,7 +59,6 @@ def test_all_heat_leaves_by_convection() -> None:
     placed = place_case(case)
     warm = case.model_copy(update={"heat": Heat(convection=1e-7)})
     bodies = build_conduction(warm, placed.bodies.punch, placed.bodies.strip)
-    assert bodies is not None
     found = bulk_of(bodies[0], placed.bodies.punch, CONDUCTIVITY, Spots(np.zeros((1, 2)), np.ones(1), 0.05))
     assert found is not None
     area = 1 / (100 * bodies[0].enough_convection(1.0))

@@ -92,7 +92,6 @@ def test_the_convection_that_is_proposed_does(assembled: Callable[..., Tribosyst
     assert found is not None
     system = assembled("example1-heat", *case, f"heat.convection={found[1]}")
     state = steady(system)
-    assert system.bodies.heat is not None
     assert state.heat is not None
     punch, loss = system.bodies.heat[0], system.bodies.heat[0].convected
     comm, theta = punch.body.mesh.comm, state.heat.end.temperatures()[0]

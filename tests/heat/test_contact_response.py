@@ -20,7 +20,6 @@ COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "
 def test_the_surface_alone_answers_as_the_whole_field(assembled: Callable[..., Tribosystem]) -> None:
     """By a Schur complement, and by a solution for each flux: at rest, moving either way, and in the long run."""
     system = assembled("example1-heat", *COARSE)
-    assert system.bodies.heat is not None
     for body, inflow in zip(system.bodies.heat, inflows(system.bodies.heat, system.pair), strict=True):
         rows = contact_rows(body, system.pair)
         steps = [body.step(*one, at_once=True) for one in ((0.0, 0.05), (9.0, 0.05), (-9.0, 0.05), (0.0, np.inf))]
@@ -34,7 +33,6 @@ def test_the_surface_alone_answers_as_the_whole_field(assembled: Callable[..., T
 def test_a_step_at_rest_is_one_of_hardly_moving_material(assembled: Callable[..., Tribosystem]) -> None:
     """Matrices that are added up, and those that are assembled: the same step, at one time scale and at another."""
     system = assembled("example1-heat", *COARSE)
-    assert system.bodies.heat is not None
     body = system.bodies.heat[1]
     comm, load = body.body.mesh.comm, body.load(np.ones(len(body.surface.weights)))[:, None]
     theta = body.initial() + np.sin(np.arange(body.owned))

@@ -73,7 +73,6 @@ def test_fields_close_the_gap_with_heat(assembled: Callable[..., Tribosystem], t
     np.testing.assert_allclose(found, block.gap[-1], rtol=0, atol=1e-12)
     assert block.heat is not None
     heat = system.bodies.heat
-    assert heat is not None
     surface_temperature = system.pair.punch.spread.T @ heat[0].trace.pick(temperatures[0][:, None])[:, 0, 0]
     np.testing.assert_allclose(surface_temperature, block.heat.temperature_punch[-1], atol=1e-9)
 

@@ -43,7 +43,6 @@ def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatB
         model={"thickness": THICKNESS},
         heat=heat,
     )
-    assert bodies.heat is not None
     return bodies.heat[1]
 
 
@@ -181,7 +180,6 @@ def periodic_flux() -> Result:
     depth = 10 * math.sqrt(2 * K / (RHO_C * omega))
     sizes = {"width": 0.5, "strip_height": depth, "across": 2, "strip_layers": 20, "punch_layers": 1}
     bodies = bodies_of_blocks(MATERIAL, MATERIAL, sizes, degree=4, heat={})
-    assert bodies.heat is not None
     body = bodies.heat[1]
     rows: list[Row] = []
     lines: list[Line] = []
@@ -245,7 +243,6 @@ def open_strip() -> Result:
     entering, flux, height = 20.0, 5.0, 1e-3
     sizes = {"strip_height": height, "across": 32, "strip_layers": 1, "punch_layers": 1}
     bodies = bodies_of_blocks(MATERIAL, MATERIAL, sizes, degree=3, heat={"ambient": AMBIENT, "inflow": entering})
-    assert bodies.heat is not None
     body, new = bodies.heat[1], Surroundings(renewed=True)
     along = contact_abscissae(body) + 0.5
     load = body.load(np.full(len(body.surface.weights), flux))[:, None]

@@ -47,7 +47,6 @@ def thermal_strain() -> Result:
                 bodies = bodies_of_blocks(
                     MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane, strip=clamped("strip"), heat={}
                 )
-                assert bodies.heat is not None
                 heat = bodies.heat[1]
                 x, z = owned_nodes(heat)
                 s, t = np.sin(pi * (x + 0.5)) ** 2, np.sin(pi * z) ** 2
@@ -79,7 +78,6 @@ def free_expansion() -> Result:
     rows: list[Row] = []
     for plane in ("stress", "strain"):
         system = two_blocks(bar, bar, sizes, plane=plane, punch=pins, heat={})
-        assert system.bodies.heat is not None
         x, z = owned_nodes(system.bodies.heat[0])
         theta = t0 + tx * x + tz * z
         strip = np.zeros(system.bodies.heat[1].owned)
@@ -141,7 +139,6 @@ def bimetal() -> Result:
             "heat={operator='full', steps=1}",
             "strip.temperatures=[]",
         )
-        assert system.bodies.heat is not None
         warm = [np.full(body.owned, value) for body, value in zip(system.bodies.heat, (warming, 0.0), strict=True)]
         x, deflection = system.pair.x, system.exchange.gap(HeatState.nodal(system.bodies.heat, warm))
         middle = np.abs(x) < 1

@@ -167,7 +167,6 @@ def _apart(x: Array, values: Array) -> tuple[float, float]:
 def _warmed(case: Case) -> Array:
     """Return the steady temperature at the contact nodes from a unit flux at each of them, K; collective."""
     placed = place_case(case)
-    assert placed.bodies.heat is not None
     body, pair = placed.bodies.heat[1], placed.pair
     theta = body.step(0.0, np.inf).respond(body.place(pair.transfer.T @ pair.weights)[:, None])
     return np.asarray(pair.transfer @ body.trace.pick(theta)[:, 0, 0])

@@ -91,7 +91,6 @@ def band(peclet: float, direction: int = 1, *settings: str) -> ContactSetup:
 
 def steady_rise(placed: ContactSetup) -> tuple[Array, Array]:
     """Return k theta / q of the steady state at the contact nodes, found and exact (n,), mm; collective."""
-    assert placed.bodies.heat is not None
     body, pair, phase = placed.bodies.heat[1], placed.pair, placed.motion.phases[0]
     step = body.step(phase.direction * phase.speed, math.inf, Surroundings(sliding=placed.sliding.field))
     theta = step.respond(body.place(pair.transfer.T @ pair.weights)[:, None])

@@ -96,7 +96,6 @@ def moving_rise(placed: ContactSetup, speed: float, direction: tuple[float, floa
         speed: mm/s.
         direction: Unit vector along x or y.
     """
-    assert placed.bodies.heat is not None
     body, pair = placed.bodies.heat[1], placed.pair
     along = np.array([direction, [-direction[1], direction[0], 0], [0, 0, 1]])
     x = body.space.tabulate_dof_coordinates()[: body.owned]

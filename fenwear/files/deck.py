@@ -299,12 +299,12 @@ class _Deck:
         self.scope.labels.append(labels)
         self.scope.points.append(points)
         self.scope.lines.append(lines)
-        self.enter(self.scope.nsets, given.get("NSET"), _Entry(line, labels=labels))
+        self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(line, labels=labels))
 
-    def enter(self, sets: dict[str, _Set], name: str | None, entry: _Entry) -> None:
-        """Add to the set of a name, if one is given."""
+    def enter(self, sets: dict[str, _Set], name: str | None, line: int, entry: _Entry) -> None:
+        """Add to the set of a name, if the keyword in this line gives one."""
         if name:
-            self.set_of(sets, name, entry.line).entries.append(entry)
+            self.set_of(sets, name, line).entries.append(entry)
 
     def input(self, line: int, given: Mapping[str, str], data: list[tuple[int, str]]) -> list[tuple[int, str]]:
         """Return the data of the file that a keyword names by INPUT, or its own."""
@@ -349,7 +349,7 @@ class _Deck:
             points = ends[0] * (1 - share) + ends[1] * share
             inner = slice(1, -1)
             self.add_nodes(labels[inner], points[inner], np.full(len(labels), number)[inner], {}, line)
-            self.enter(self.scope.nsets, given.get("NSET"), _Entry(number, labels=labels))
+            self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(number, labels=labels))
 
     def range(self, line: int, first: int, last: int, step: int) -> Ints:
         """Return the numbers from the first to the last."""
@@ -378,7 +378,7 @@ class _Deck:
                 points = ends[0] * (1 - share) + ends[1] * share
                 self.add_nodes(labels, points, np.full(len(labels), number), {}, line)
                 every.append(labels)
-            self.enter(self.scope.nsets, given.get("NSET"), _Entry(number, labels=np.concatenate(every)))
+            self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(number, labels=np.concatenate(every)))
 
     def nodes_now(self, line: int, name: str) -> Ints:
         """Return the numbers of a node set that is complete, in their order."""
@@ -435,7 +435,7 @@ class _Deck:
                 6 if kind == -15 else kind, name, nodes[:, :6] if kind == -15 else nodes, rows[:, 0], lines
             )
         self.scope.elements.append(block)
-        self.enter(self.scope.elsets, given.get("ELSET"), _Entry(line, labels=block.labels))
+        self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(line, labels=block.labels))
 
     def kind_of(self, line: int, name: str) -> int:
         """Return gmsh's number of a type of element; 0 of one without a shape."""
@@ -511,7 +511,7 @@ class _Deck:
             nodes = block.nodes[row] + shifts[1:, None]
             made = _Elements(block.kind, block.type, nodes, labels[1:], np.full(len(labels) - 1, number))
             self.scope.elements.append(made)
-            self.enter(self.scope.elsets, given.get("ELSET"), _Entry(number, labels=labels))
+            self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(number, labels=labels))
 
     def one_element(self, line: int, label: int) -> tuple[_Elements, int]:
         for block in self.scope.elements:

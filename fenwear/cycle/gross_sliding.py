@@ -152,13 +152,13 @@ class Jumps:
             except ConvergenceError:
                 if tried > 1:
                     stepper.system.remedies.note(SHORTER_JUMPS)
-                    length = max(1, tried // 4)
+                    length = int(lengths.cut(tried / 4))
                     continue
                 end, recorded = self._marched(state)
                 estimate = Estimate(np.inf, np.inf, np.inf)  # it says nothing of the error
                 stepper.system.remedies.note(MARCHED)
             if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
-                length = max(1, tried // 2)
+                length = int(lengths.cut(tried / 2))
                 continue
             warmed = tried > 1 and not given and stepper.system.team.each(self, "change", end.temperature) > WARMED
             if (estimate.largest <= tolerance and not warmed) or tried == 1:

@@ -120,6 +120,21 @@ def test_a_cycle_that_wears_too_much_goes_in_parts() -> None:
     assert np.abs(np.diff(depth, 2)).max() < 1.3 * np.abs(np.diff(smooth, 2)).max()
 
 
+@pytest.mark.parametrize("elements", [20, 40])
+def test_jumps_over_growing_contacts_are_as_many_on_any_mesh(elements: int) -> None:
+    """What slides as a whole wears as in gross sliding, in about as many jumps: nodes come into contact within them."""
+    sizes = (f"geometry.parameters.elements_along_contact={elements}", "motion.positions=1", "motion.amplitude='25 um'")
+    wear = ("wear={punch={coefficient='4.8e-8 1/MPa'}}", "contact.friction=0.3")
+    laws = ("contact.law='coulomb'", "stick={steps=4, step_tolerance=1}"), ("contact.law='gross-sliding'",)
+    sticking, sliding = (
+        list(jump(assemble(load_case("fretting", [*sizes, *wear, *law])), 3000, tolerance=3e-3, block=1))
+        for law in laws
+    )
+    assert len(sticking) <= len(sliding)
+    depth, expected = sticking[-1].wear[-1], sliding[-1].wear[-1]
+    np.testing.assert_allclose(depth, expected, rtol=0, atol=0.015 * expected.max())
+
+
 HARDLY_WORN = ("wear.punch.coefficient='1e-14 1/MPa'", "wear.strip.coefficient='1e-14 1/MPa'", "stick.step_tolerance=1")
 
 

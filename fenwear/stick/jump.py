@@ -100,43 +100,47 @@ def jumped(
 def first_cycle(
     problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array | None = None
 ) -> FrettingCycle:
-    """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,)."""
-    return _rate(problem, at, worn, number, warm=warm)
+    """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,).
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    at, heat = _led_to(problem, at, worn), problem.heat
+    if heat is not None:
+        at = replace(at, temperature=heat.initial() if warm is None else warm)
+    return _recorded(problem, at, worn, number)
 
 
-def _rate(
-    problem: PartialSlipProblem,
-    at: PartialSlipState,
-    worn: WornDepths,
-    number: float,
-    before: FrettingCycle | None = None,
-    warm: Array | None = None,
+def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
+    """Return the state after a cycle at a shape, or half a one where nothing else changes within a cycle."""
+    program, own = problem.program, problem.interface
+    at = problem.shaped(at, own.layers.flown_as(worn, at.worn))
+    # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
+    constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
+    half = program.half_cycles == 2 and constant and problem.heat is None
+    for _ in range(1 if half else program.half_cycles):
+        at, _ = problem.half_cycle(at)
+    return at
+
+
+def _cycle_after(
+    problem: PartialSlipProblem, before: FrettingCycle, at: PartialSlipState, worn: WornDepths, number: float
 ) -> FrettingCycle:
-    """Return the cycle at a shape, after one that leads to it, half a one where nothing else changes within a cycle.
+    """Return the cycle at a shape, with the temperatures that the cycles since one before lead to.
 
     Raises:
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
-    program, heat, own = problem.program, problem.heat, problem.interface
-    worn = problem.interface.layers.flown_as(worn, at.worn)
-    at = problem.shaped(at, worn)
-    # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
-    settled = heat is None and constant
-    for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
-        at, _ = problem.half_cycle(at)
-    if heat is not None and before is None:
-        at = replace(at, temperature=heat.initial() if warm is None else warm)
-    if heat is None or before is None or before.warm is None or before.end.temperature is None:
+    at, heat = _led_to(problem, at, worn), problem.heat
+    if heat is None or before.warm is None or before.end.temperature is None:
         return _recorded(problem, at, worn, number)
-    cycles, rate = number - before.number, before.end.temperature - before.warm
+    cycles, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
     if cycles <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
         return _recorded(problem, replace(at, temperature=before.warm + cycles * rate), worn, number)
-    over = heat.through(_course(before, len(program.steps)))
-    warm = over.after(before.warm, cycles)
+    warm = heat.through(_course(before, steps)).after(before.warm, cycles)
     for _ in range(MOST_HEATINGS):
         found = _recorded(problem, replace(at, temperature=warm), worn, number)
-        over = heat.through(_course(found, len(program.steps)))
+        over = heat.through(_course(found, steps))
         again = over.after(before.warm, cycles)
         warmest = float(np.abs(heat.surfaces(again)).max())
         if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
@@ -178,13 +182,10 @@ class _Packing:
 
     def parted(self, y: Array) -> WornDepths:
         """Return the depths of an array (size,)."""
-        return self.problem.interface.layers.settled(self.problem.coatings.depths(self.split(y)))
-
-    def split(self, y: Array) -> WornDepths:
-        """Return the parts of an array (size,) as they are."""
         punch, strip, between, carried, crept = np.split(y, self._cuts)
         shapes = self._like.between.shape, self._like.carried.shape
-        return WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
+        found = WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
+        return self.problem.interface.layers.settled(self.problem.coatings.depths(found))
 
     def rate(self, cycle: FrettingCycle) -> Array:
         """Return the rate of a cycle (size,).
@@ -278,7 +279,7 @@ def _attempt(
         start = _slid_on(now, done, load)
         worn = _balanced(problem, now.worn, packing.parted(end.y))
         at = replace(after, slid=start.slid, load=start.load)
-        return _rate(problem, at, worn, now.number + done, begin_of_heat)
+        return _cycle_after(problem, begin_of_heat, at, worn, now.number + done)
 
     half = steps.step(steps.begin, cycles / 2, lambda _: begin)
     middle = cycle_at(half, cycles / 2, now.end)

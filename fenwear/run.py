@@ -536,7 +536,7 @@ def position_warnings(system: Tribosystem) -> list[str]:
 def _standing_profile(system: Tribosystem) -> list[str]:
     """Return what is to be said of an uneven strip that slides by: in each position it stands still."""
     slid = system.position_spacing or float(system.path.max()) / system.pair.punch.spacing()
-    rough = system.pair.strip.heights is not None
+    rough = bool(system.pair.strip.heights.any())
     if not system.case.passes or slid <= 1 or not (rough or _uneven(system)):
         return []
     key = "strip.topography" if rough else "strip.profile"

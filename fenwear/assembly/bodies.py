@@ -129,7 +129,7 @@ class Bodies:
         texts = []
         for body in (self.punch, self.strip):
             heights, grid = body.surface.heights, body.surface.grid
-            if heights is None or grid is None:
+            if grid is None or not heights.any():
                 continue
             plane = np.column_stack([np.ones(len(heights)), grid.flat - grid.flat.mean(axis=0)])
             fitted = np.linalg.lstsq(plane, heights, rcond=None)[0]

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 
 from fenwear.arrays import Array
 from fenwear.assembly.strokes import Sliding, make_sliding
-from fenwear.bodies.contact_surface import ContactSurface, contact_surface, profile_at
+from fenwear.bodies.contact_surface import FLAT, ContactSurface, contact_surface, profile_at
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
@@ -148,14 +148,13 @@ def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurf
     reading = _reading(body, body.meshed, grid)
     shape = reading if meshed is body.meshed else _reading(body, meshed, grid)
     depth = sag = outward * (grid.level - shape @ meshed.trace[:, axis])
-    description, heights = case.bodies[body.body.name], None
+    description, heights = case.bodies[body.body.name], FLAT
     if description.profile is not None:
         depth = depth + profile_at(body.body.name, np.array(description.profile.points), grid.flat)
-    topography = description.topography
-    if topography is not None:
-        heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
-        depth = depth + heights.max() - heights
-    surface = replace(surface_on(body.body.name, grid, outward, depth), heights=heights, sag=sag)
+    if description.topography is not None:
+        heights = heights_on(grid, description.topography, f"{body.body.name}.topography", case.folder)
+    deeper = depth + heights.max() - heights
+    surface = replace(surface_on(body.body.name, grid, outward, deeper), heights=heights, sag=sag)
     return surface, _mortar(body, grid) if body.operator == CONDENSED else reading
 
 

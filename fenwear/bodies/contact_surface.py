@@ -11,7 +11,7 @@ is zero there: no pressure lives on it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -42,6 +42,9 @@ CLOSING = 1.5  # of the longest distance of two points: the one over the seam of
 NEAREST = 12  # points of a profile in space between which it is read on a surface that wraps around
 
 
+FLAT: Array = np.zeros(1)  # a profile of a surface that has none
+
+
 @dataclass(frozen=True)
 class ContactSurface:
     """The contact surface of a body in d dimensions, with N trace nodes and n pressure nodes.
@@ -58,15 +61,15 @@ class ContactSurface:
             the plane, mm² in a solid and in an axisymmetric body.
         outward: Unit normals out of the body at the pressure nodes (n, d).
         spread: Forces at the trace nodes from a unit force at each pressure node (N, n).
-        profile: By how much the surface lies deeper in the body than its mesh at the pressure nodes (n,), mm; None
+        profile: By how much the surface lies deeper in the body than its mesh at the pressure nodes (n,), mm; one zero
             where they are the same.
         names: Of the contacts that the surface is of; none where it is one.
         contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
         grid: Of a surface that is a regular grid and no trace of a mesh; else None.
-        sag: How deep the mesh lies below a grid at its nodes (n,), mm, a part of the profile; None without a grid.
+        sag: How deep the mesh lies below a grid at its nodes (n,), mm, a part of the profile; one zero without a grid.
         made: The same as its mesh was made, where that has followed the wear since; else None.
-        heights: Of a topography on it (n,), mm; None without.
+        heights: Of a topography on it (n,), mm; one zero without.
     """
 
     body: str
@@ -78,14 +81,14 @@ class ContactSurface:
     weights: Array
     outward: Array
     spread: csr_array
-    profile: Array | None = None
+    profile: Array = field(default_factory=lambda: FLAT)
     arc: Array | None = None
     names: tuple[str, ...] = ()
     contact: NDArray[np.int64] | None = None
     grid: RegularGrid | None = None
-    sag: Array | None = None
+    sag: Array = field(default_factory=lambda: FLAT)
     made: ContactSurface | None = None
-    heights: Array | None = None
+    heights: Array = field(default_factory=lambda: FLAT)
 
     @cached_property
     def part(self) -> NDArray[np.int64]:
@@ -146,13 +149,17 @@ class ContactSurface:
     @property
     def unworn(self) -> Array:
         """Where the unworn surface is at the pressure nodes (n, d), mm: that of the mesh, and its profile."""
-        return self.x if self.profile is None else self.x - self.profile[:, None] * self.outward
+        return np.asarray(self.x - self.profile[:, None] * self.outward)
+
+    @property
+    def deeper(self) -> Array:
+        """The profile at each pressure node (n,), mm."""
+        return np.broadcast_to(self.profile, self.weights.shape)
 
     @property
     def below_mesh(self) -> Array:
         """By how much the unworn surface lies deeper in the body than its mesh at the pressure nodes (n,), mm."""
-        whole = np.zeros(len(self.weights)) if self.profile is None else self.profile
-        return whole if self.sag is None else whole - self.sag
+        return np.asarray(self.deeper - self.sag)
 
     @cached_property
     def extension(self) -> csr_array:

@@ -181,8 +181,7 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
 
 def _profiles(punch: ContactSurface, strip: ContactSurface, material: csr_array) -> Array:
     """Return the gap opened by the profiles of both surfaces (n,), mm."""
-    gap: Array = np.zeros(len(punch.weights)) if punch.profile is None else punch.profile
-    return gap if strip.profile is None else gap + material @ strip.profile
+    return np.asarray(punch.deeper + material @ strip.deeper)
 
 
 def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:

@@ -29,7 +29,7 @@ ENDS = {"punch": "", "strip": "_strip"}
 def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
     """Return the surfaces with a topography, by their bodies."""
     both = {"punch": system.pair.punch, "strip": system.pair.strip}
-    return {body: one for body, one in both.items() if one.heights is not None and one.grid is not None}
+    return {body: one for body, one in both.items() if one.grid is not None and one.heights.any()}
 
 
 def columns(system: Tribosystem) -> dict[str, Column]:
@@ -74,7 +74,6 @@ def worn_heights(block: Block, body: str, row: int) -> Array:
     """Return heights of a rough surface at the end of a half-cycle, without its form, mm, as `levelled`."""
     surface, depth = _rough(block.system)[body], {"punch": block.wear, "strip": block.wear_strip}[body][row]
     assert surface.grid is not None
-    assert surface.heights is not None
     return levelled(surface.grid.places, surface.heights - depth, depth > 0)
 
 

@@ -179,8 +179,8 @@ def preparation_of(case: Case) -> Preparation:
 def _way_on(reached: int | None) -> str:
     """Say how to go on after a fault of the disk, from a checkpoint of this half-cycle."""
     if reached is None:
-        return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
-    return f"mend the cause, then go on from the checkpoint of half-cycle {reached}: --resume"
+        return "there is no checkpoint to resume from: mend the cause, then start again in a new folder"
+    return f"mend the cause, then resume from the checkpoint of half-cycle {reached}: --resume"
 
 
 class NoLevel:
@@ -448,9 +448,9 @@ class _Run:
             return f"no half-cycle was done; {self.directory} can be removed"
         reached = f"the results up to half-cycle {self.state.half_cycle} are in {self.directory}"
         if isinstance(failure, MeshQualityError):
-            return f"{reached}; to get further: start anew with coarser elements at the contact, or a thicker body"
+            return f"{reached}; to get further: start again with coarser elements at the contact, or a thicker body"
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
-        return f"{reached}, to go on: --resume{how}"
+        return f"{reached}, to resume: --resume{how}"
 
     def finish(self, how: dict[str, Any]) -> dict[str, Any]:
         """Write what a run ends with, from where it can go on first, and return the summary; collective."""
@@ -490,7 +490,7 @@ class _Run:
         try:
             found = uncertainty(self.case, last)
         except (FenwearError, ArithmeticError, RuntimeError, ValueError) as error:
-            self.log(f"warning: the numerical uncertainty of the run could not be told: {error}")
+            self.log(f"warning: the numerical uncertainty of the run could not be estimated: {error}")
             return {}
         self.log(uncertainty_text(last.system, found))
         return {"uncertainty": uncertainty_table(last.system, found)}

@@ -165,9 +165,9 @@ WAYS = ("march", "jump", "steady", "program", "resume", "ranks", "sweep", "sensi
 
 SLIDES = "what slides one way slips at every node after the first of it: gross sliding is the answer"
 AROUND = "the model of rings has no displacement around the axis, along which they slide"
-PASSES = "changes as long as a run goes on: a cyclic steady state does not exist"
+PASSES = "changes throughout a run: a cyclic steady state does not exist"
 DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
-KEEPS = "what slips keeps any pressure below the threshold, as the way there has left it: no end is known without it"
+KEEPS = "slipping nodes keep any pressure below the threshold, as the way there has left it: no end is known without it"
 FLOWS = "what flows beyond the hardness depends on the way there: no end is known without it"
 
 # Closed cells, by feature, law and way; None for all of them.

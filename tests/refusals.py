@@ -214,7 +214,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "every node slips": (PHYSICS, "an end of partial slip where all slips"),
     },
     "life/model.py": {
-        "it changes as long as a run goes on": (PHYSICS, "steady quantities with laws of depth or distance"),
+        "it changes throughout a run": (PHYSICS, "steady quantities with laws of depth or distance"),
         "is told of constant properties": (
             MODEL,
             "run-in and critical speeds with properties of T: rates of small disturbances of bodies that stay",
@@ -268,8 +268,8 @@ OTHERS: dict[str, tuple[str, ...]] = {
     ),
     "case/units.py": ("a string with a unit",),
     "bodies/shape.py": ("has used up the elements",),
-    "cycle/coupled.py": ("did not come together",),
-    "cycle/stability.py": ("beyond all numbers", "did not come together"),
+    "cycle/coupled.py": ("did not converge",),
+    "cycle/stability.py": ("beyond all numbers", "did not converge"),
     "flash/temperatures.py": (
         "its temperatures in its history",
         "expected one material where",
@@ -290,9 +290,9 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "life/runs.py": ("belongs to another study",),
     "life/quantities.py": ("with a level", "a level with its unit"),
     "life/scatter.py": ("gives impossible values", "KEY=KIND"),
-    "stick/cycle.py": ("did not come together",),
-    "stick/final.py": ("did not come together",),
-    "stick/heat.py": ("did not come together",),
+    "stick/cycle.py": ("did not converge",),
+    "stick/final.py": ("did not converge",),
+    "stick/heat.py": ("did not converge",),
     "stick/interface.py": ("bodies with meshes",),
     "stick/setup.py": ("expected 'coulomb'", "too coarse"),
 }

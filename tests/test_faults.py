@@ -175,7 +175,7 @@ def test_disk_fills_up_during_the_run(fenwear: Run, small_disk: Callable[[int], 
         status, messages = ended(process)
     assert status == 1
     assert messages.count("No space left on device") == 1, messages
-    assert "then go on from the checkpoint of half-cycle" in messages
+    assert "then resume from the checkpoint of half-cycle" in messages
     check_history(folder)
     filler.unlink()
     check_goes_on(fenwear, folder)
@@ -376,7 +376,7 @@ def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
         status, messages = ended(process)
     assert status == 1
     assert messages.count("history.nc cannot be written: it or its folder has been removed") == 1, messages
-    assert "then go on from the checkpoint" in messages
+    assert "then resume from the checkpoint" in messages
     with np.load(folder / "checkpoint" / "state.npz") as moment:
         reached = int(moment["state.half_cycle"])
     done = fenwear("run", "example1-heat", "-o", folder, *options(f"run.half_cycles={reached + 20}"), "--resume")
@@ -408,7 +408,7 @@ def test_results_removed(tmp_path: Path) -> None:
         status, messages = ended(process)
     assert status == 1
     assert messages.count("it or its folder has been removed") == 1, messages
-    assert "start anew" in messages
+    assert "start again" in messages
     assert not folder.exists()
 
 
@@ -507,7 +507,7 @@ def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
     for ranks in (1, 2):
         done = fenwear(*words, ranks=ranks)
         assert done.returncode == 2, done.stderr
-        assert "remove it to go on" in done.stderr
+        assert "remove it to continue" in done.stderr
     history.unlink()
     assert fenwear(*words).returncode == 0
 

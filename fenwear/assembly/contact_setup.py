@@ -372,7 +372,7 @@ class ContactSetup:
 
     @property
     def passing_laws(self) -> list[str]:
-        """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
+        """Keys of coefficients that change throughout a run: with the worn depth, or with what is slid."""
         return self.case.passing_laws
 
     @cached_property

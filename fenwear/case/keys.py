@@ -60,8 +60,14 @@ class Key:
 READ_FIRST = {
     key.path: key
     for key in (
-        Key("base", "", "text", "", "a built-in case, or a .toml beside this file: its keys hold where none is given"),
-        Key("unset", "", "list", "", 'keys of the base that are taken away: ["heat.inflow", "wear.punch"]'),
+        Key(
+            "base",
+            "",
+            "text",
+            "",
+            "a built-in case, or a .toml beside this file: its keys hold unless the case sets them",
+        ),
+        Key("unset", "", "list", "", 'keys of the base to remove: ["heat.inflow", "wear.punch"]'),
         Key("program.file", "", "text", "", "in place of steps: a CSV file beside this file, a step in each line"),
         Key("motion.file", "", "text", "", "in place of columns and rows: a CSV file beside this file", "cycle"),
         Key("BODY.profile.file", "", "text", "", "in place of points: a CSV file beside this file, one in each line"),

@@ -123,7 +123,7 @@ def _check_order(table: CsvTable) -> None:
                 f"row {lines[k]}: {name} = {places[k]:g} stands there three times; expected two for a jump"
             )
     if places[-1] == 0:
-        raise table.wrong(f"{name} ends at 0; expected a table that goes on")
+        raise table.wrong(f"{name} ends at 0; expected a longer table")
 
 
 @dataclass(frozen=True)

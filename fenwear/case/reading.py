@@ -92,7 +92,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     base, unset = data.pop("base", None), data.pop(UNSET, None)
     if base is None:
         if unset is not None:
-            raise CaseError(InputError(UNSET, "expected with a base, whose keys it takes away"))
+            raise CaseError(InputError(UNSET, "expected with a base, whose keys it removes"))
         return data, folder
     if not isinstance(base, str):
         raise CaseError(InputError("base", f"expected the name of a case, got {shown(base)}"))

@@ -238,7 +238,7 @@ class Case(Part):
 
     @property
     def passing_laws(self) -> list[str]:
-        """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
+        """Keys of coefficients that change throughout a run: with the worn depth, or with what is slid."""
         return [key for key, value in self.coefficients.items() if depends_on(value, "depth", "s")]
 
     @property

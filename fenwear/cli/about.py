@@ -52,7 +52,7 @@ def info_command(
             show("\n".join(k.text() for k in found))
             if key == "geometry.file":
                 ready = (f"  {name:22} {geometry.title}" for name, geometry in geometries.items())
-                show("\n".join(("ready ones (fenwear info NAME tells their parameters):", *ready)))
+                show("\n".join(("ready ones (fenwear info NAME lists their parameters):", *ready)))
         return
     if as_json:
         print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})

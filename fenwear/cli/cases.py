@@ -74,7 +74,7 @@ def run(
 
     loaded = load(case, settings)
     if resume and output is None:
-        raise CaseError(InputError("--resume", "expected the folder of the run to go on with, as -o DIR"))
+        raise CaseError(InputError("--resume", "expected the folder of the run to resume, as -o DIR"))
     if quiet and verbose:
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     if overwrite:

@@ -29,7 +29,7 @@ EDGES, EDGES_AT_REST = 2, 20  # times that contact is solved for its own edges i
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
     'set heat.conducting = "nominal", or take weaker dependences: contact and what depends on it, the nodes that '
-    "conduct or the coefficients, did not come together"
+    "conduct or the coefficients, did not converge"
 )
 
 # Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None for none, from a start.

@@ -56,7 +56,7 @@ def jump(
     """
     strokes = system.motion.half_cycles
     if start is not None and start.half_cycle % strokes:
-        message = f"jumps go on from a whole cycle only, got half-cycle {start.half_cycle}"
+        message = f"jumps start from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
     watching = Watching(system.team, watch)
     step: Jumps = system.contact_law.jumps(system, tolerance, watching, loading)

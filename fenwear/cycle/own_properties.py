@@ -61,6 +61,6 @@ def with_own_properties(
         system = warmed_system(system, end)
         state = found(system)
     raise ConvergenceError(
-        f"the temperatures of the steady state and the properties that depend on them, {key}, did not come together "
+        f"the temperatures of the steady state and the properties that depend on them, {key}, did not converge "
         f"in {PASSES} passes: follow them by `run`"
     )

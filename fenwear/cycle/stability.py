@@ -238,8 +238,8 @@ def repeating_temperatures(
             return heat, states
         before = found
     raise ConvergenceError(
-        f"friction and the temperatures that it depends on did not come together in {MAX_ITERATIONS} iterations at "
-        "these pressures: there is no state whose growth could be told"
+        f"friction and the temperatures that it depends on did not converge in {MAX_ITERATIONS} iterations at "
+        "these pressures: there is no state whose growth rate can be computed"
     )
 
 

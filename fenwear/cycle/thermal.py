@@ -104,7 +104,7 @@ class ThermalContact:
                 relaxed = 0.5
             pressure = pressure + relaxed * change
         raise ConvergenceError(
-            f"contact and heat did not come together in {MAX_ITERATIONS} iterations: nodes open and close in turn; "
+            f"contact and heat did not converge in {MAX_ITERATIONS} iterations: nodes open and close in turn; "
             'set heat.conducting = "nominal" or take more heat.steps'
         )
 

@@ -105,7 +105,7 @@ def in_process(path: Path, *, shapes: bool = False) -> dict[str, NDArray[Any]]:
         except subprocess.TimeoutExpired:
             failed, why = True, f"it came to no end in {LONGEST} s"
         if failed:
-            message = f"cannot be read by {program}: {why[:160]}. Write the file anew."
+            message = f"cannot be read by {program}: {why[:160]}. Write the file again."
             raise CaseError(InputError(path.name, message))
         if shapes:
             return {}
@@ -129,7 +129,7 @@ def _mesh(name: str, arrays: dict[str, NDArray[Any]], word: str) -> MeshFile:
             continue
         table = np.asarray(arrays[f"nodes{number}"], dtype=np.int64).reshape(len(labels), -1)
         if not np.isin(table, tags).all():
-            raise CaseError(InputError(name, "has elements on nodes that do not exist. Write the file anew."))
+            raise CaseError(InputError(name, "has elements on nodes that do not exist. Write the file again."))
         blocks.append(Block(kind, np.searchsorted(tags, table), labels, np.zeros(len(labels), np.int64)))
         members.setdefault((dim, tag), []).append(np.arange(start, start + len(labels)))
         start += len(labels)

@@ -78,7 +78,7 @@ def read_shapes(gmsh: Any, path: Path, scale: float) -> None:
                 gmsh.model.occ.synchronize()
                 shapes = _solids(gmsh)
     except Exception as error:  # gmsh raises bare Exception only
-        message = f"cannot be read by OpenCASCADE: {str(error)[:160] or 'no reason given'}. Write the file anew."
+        message = f"cannot be read by OpenCASCADE: {str(error)[:160] or 'no reason given'}. Write the file again."
         raise CaseError(InputError(path.name, message)) from None
     if not shapes:
         raise CaseError(InputError(path.name, "holds no shapes. Export the solids or surfaces of both bodies."))

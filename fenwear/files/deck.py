@@ -178,7 +178,7 @@ class _Deck:
     def read(self) -> MeshFile:
         self.lines_of(self.path, 0)
         if not self.model.labels and not any(part.labels for part in self.parts.values()):
-            raise self.fail(0, "has no nodes: expected a *NODE block. Give the deck with the mesh, or write it anew.")
+            raise self.fail(0, "has no nodes: expected a *NODE block. Give the deck with the mesh, or write it again.")
         return _assembled(self)
 
     # ------------------------------------------------------------------------------------------------ lines

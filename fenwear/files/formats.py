@@ -54,7 +54,7 @@ def read_mesh(path: Path) -> MeshFile:
         raise CaseError(InputError(path.name, message))
     mesh = READERS[path.suffix.lower()][1](path)
     if not np.isfinite(mesh.points).all():
-        raise CaseError(InputError(path.name, "has coordinates that are no numbers. Write the file anew."))
+        raise CaseError(InputError(path.name, "has coordinates that are no numbers. Write the file again."))
     mesh = completed(mesh)
     if not any(block.kind in USABLE for block in mesh.blocks if len(block.nodes)):
         message = "has no triangles, quadrilaterals, tetrahedra or hexahedra to make bodies of. Export its mesh."

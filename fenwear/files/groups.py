@@ -263,7 +263,7 @@ class _Choice:
             if len(bad):
                 text = ", ".join(self.mesh.place(int(one)) for one in bad[:SHOWN])
                 rest = f" and {len(bad) - SHOWN} more" if len(bad) > SHOWN else ""
-                message = f"degenerate or twisted: {text}{rest}. Check the order of their nodes, or mesh it anew."
+                message = f"degenerate or twisted: {text}{rest}. Check the order of their nodes, or mesh it again."
                 self.wrong(f"{self.mesh.name}: {name}", message)
             found.append(Group(name, dim, kinds, ", ".join(map(self.where, cells)), elements))
         return found

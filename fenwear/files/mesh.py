@@ -413,7 +413,7 @@ def read_as(path: Path, kind: str) -> Iterator[None]:
         yield
     except BROKEN as error:
         text = str(error).partition("\n")[0][:140] or type(error).__name__
-        message = f"cannot be read as {kind}: {text}. Write the file anew, or convert it to .msh."
+        message = f"cannot be read as {kind}: {text}. Write the file again, or convert it to .msh."
         raise CaseError(InputError(path.name, message)) from None
 
 

@@ -382,7 +382,7 @@ class Evolution:
         rows = zip(self.memory.names, (*going.contact, *going.strip), strict=True)
         name = next((name for name, row in rows if row.any()), self.memory.names[0])
         raise ConvergenceError(
-            f"no cyclic steady state exists: the state {name!r} of a law goes on as long as it slides, and nothing "
+            f"no cyclic steady state exists: the state {name!r} of a law continues as long as it slides, and nothing "
             "brings it to rest. Follow it by `run`"
         )
 

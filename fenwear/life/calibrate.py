@@ -323,7 +323,7 @@ def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask
         factor = float(np.nanmax(np.sqrt(other) / errors, initial=1.0))
         if factor > WIDER:
             remarks.append(
-                f"the rows do not tell whether the scatter of {' and '.join(dict.fromkeys(added))} adds up from one to "
+                f"the rows do not show whether the scatter of {' and '.join(dict.fromkeys(added))} adds up from one to "
                 f"the next. If it does, standard errors are up to {factor:.2g} times as large. Set `# scatter = adds "
                 "up` or `# scatter = independent` in the file"
             )

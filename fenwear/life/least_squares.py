@@ -51,7 +51,7 @@ def not_determined(keys: Sequence[str], relative: Array) -> list[str]:
             lines.append(f"{keys[parts[0]]}: the data do not determine it within {100 * UNKNOWN:g} %")
             continue
         changes = ", ".join(f"{keys[k]} by {first[k]:+.2g} %" for k in parts)
-        lines.append(f"{' and '.join(keys[k] for k in parts)} cannot be told apart: changes of {changes} together "
+        lines.append(f"{' and '.join(keys[k] for k in parts)} cannot be separated: changes of {changes} together "
                      "alter nothing that was measured beyond its noise; give one of them, or data at another "
                      "load")  # fmt: skip
     return lines

@@ -117,14 +117,14 @@ class Model:
         return system_warnings(self.system())
 
     def _check_stays(self) -> None:
-        """Refuse laws that change as long as a run goes on where a steady state is asked for.
+        """Refuse laws that change throughout a run where a steady state is asked for.
 
         Raises:
             CaseError: there is one.
         """
         for key in self.case.passing_laws:
             message = (
-                "depends on the worn depth or the distance slid: it changes as long as a run goes on, so that no "
+                "depends on the worn depth or the distance slid: it changes throughout a run, so that no "
                 "steady state exists"
             )
             raise CaseError(InputError(key, message))
@@ -298,7 +298,7 @@ class Model:
         """
         system = self.system(values, settings)
         if system.sticks:
-            message = "a quantity of gross sliding: in partial slip wear goes on until what slips carries nothing"
+            message = "a quantity of gross sliding: in partial slip wear continues until slipping nodes carry nothing"
             raise CaseError(InputError(quantity, message))
         return system
 

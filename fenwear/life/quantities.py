@@ -274,7 +274,7 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
 def _unknown(text: str, word: str) -> str:
     """Return what is to be said of a text that names no quantity."""
     if registered_name(word, at_a_place=False):
-        return f"{word} is one number; a place goes with wear, pressure and other values at nodes, got {text!r}"
+        return f"{word} is one number; a place applies to wear, pressure and other values at nodes, got {text!r}"
     listed = [*registry.names_known(), *registry.LARGEST, *OLD_NAMES, *WHOLE]
     near = difflib.get_close_matches(word or text, listed, n=3)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(MAIN)} and others of the results"

@@ -283,7 +283,7 @@ def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") ->
 
 def damaged(folder: Path) -> CaseError:
     """Return the error of a checkpoint that cannot be read."""
-    what = f"the checkpoint in {folder} is damaged, or of an earlier version; expected to start anew, without"
+    what = f"the checkpoint in {folder} is damaged, or of an earlier version; expected to start again, without"
     return CaseError(InputError("--resume", what))
 
 
@@ -337,7 +337,7 @@ def check_case(folder: Path, case: Case) -> None:
     if case.heat is not None and to_and_fro and not (folder / EXTREMES).is_file():
         what = (
             f"the checkpoint in {folder} is of an earlier version, which to and fro had the strip's temperatures below "
-            "the punch in place of those of its material; expected to start anew, without"
+            "the punch in place of those of its material; expected to start again, without"
         )
         raise CaseError(InputError("--resume", what))
     try:

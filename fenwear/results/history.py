@@ -339,7 +339,9 @@ class HistoryWriter:
             if missing:
                 raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
-            message = "cannot be read, or is of another version; remove it to go on with a new one, from the checkpoint"
+            message = (
+                "cannot be read, or is of another version; remove it to continue with a new one, from the checkpoint"
+            )
             raise CaseError(InputError(str(self.path), message)) from None
         self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
         if self.rows < len(stored):

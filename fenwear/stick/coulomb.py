@@ -194,8 +194,8 @@ class Coulomb:
         """
         if any(law.pressure_threshold > 0 for law in system.sliding.wear):
             raise ConvergenceError(
-                "no one final shape exists with a pressure_threshold: what slips keeps any pressure below it, as the "
-                "way there has left it. Follow the wear by `run`"
+                "no one final shape exists with a pressure_threshold: slipping nodes keep any pressure below it, as "
+                "the way there has left it. Follow the wear by `run`"
             )
         found = final_shape(system.law_state.problem)
         while grows(system):

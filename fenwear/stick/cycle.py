@@ -276,7 +276,7 @@ class PartialSlipProblem:
             if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
                 return after
         raise ConvergenceError(
-            "friction and the pressure that it depends on did not come together in a time step: a weaker dependence "
+            "friction and the pressure that it depends on did not converge in a time step: a weaker dependence "
             "on p, or a smoother table may help"
         )
 

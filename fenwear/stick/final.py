@@ -150,7 +150,7 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
         return float(np.abs(change).max()) <= SAME * max(float(np.abs(crept).max()), 1e-300)
 
     first = creep.beginning()
-    return fixed_point(advance, first, close, "what creeps, and the cycle that it belongs to, did not come together")
+    return fixed_point(advance, first, close, "what creeps, and the cycle that it belongs to, did not converge")
 
 
 def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
@@ -162,7 +162,7 @@ def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None
             cycle, see `stick_zone`.
 
     Raises:
-        ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
+        ConvergenceError: nothing sticks, so that wear never ends; the contact did not converge.
         CaseError: the bodies lose no heat.
     """
     return problem.led(partial(_without_flow, problem, stick))
@@ -198,7 +198,7 @@ def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None)
         if np.abs(now - before).max() <= SAME * max(float(np.abs(now).max()), 1e-300):
             return replace(found, temperature=now)
         pressures, before = found.pressures, now
-    raise ConvergenceError(f"contact and temperatures of the end did not come together in {MOST_TIMES} times")
+    raise ConvergenceError(f"contact and temperatures of the end did not converge in {MOST_TIMES} times")
 
 
 def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
@@ -407,7 +407,7 @@ def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
     """
     if not zone.any():
         raise ConvergenceError(
-            "no final shape exists: every node slips in a cycle, so that wear goes on for ever; expected a smaller "
+            "no final shape exists: every node slips in a cycle, so that wear never ends; expected a smaller "
             "stroke or force, or contact.law = 'gross-sliding'"
         )
     unworn = problem.unworn()

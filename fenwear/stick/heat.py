@@ -319,7 +319,7 @@ def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array
 
 CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step
 ENOUGH = 12  # iterations after which nodes that open and close no longer decide who conducts
-APART = "contact with stick and heat did not come together: expected more stick.steps, or less friction heat; tried"
+APART = "contact with stick and heat did not converge: expected more stick.steps, or less friction heat; tried"
 
 
 @dataclass(frozen=True)

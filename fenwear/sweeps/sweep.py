@@ -67,7 +67,7 @@ def sweep(
     if processes is not None and processes < 1:
         raise CaseError(InputError("--processes", f"expected one or more, got {processes}"))
     if resume and folder is None:
-        raise CaseError(InputError("--resume", "expected the folder of the sweep to go on with, as -o DIR"))
+        raise CaseError(InputError("--resume", "expected the folder of the sweep to resume, as -o DIR"))
     begun: list[tuple[Case, Plan, dict[tuple[int, ...], Outcome]]] = []
     on_root(comm, lambda: begun.append(_begin(case, over, of, folder, zipped=zipped, resume=resume)))
     failure: Exception | None = None
@@ -103,11 +103,11 @@ def _begin(
         return case, plan, known
     if not resume:
         if (folder / VARIANTS).is_dir():
-            how = "a new or an empty folder, or --resume to go on with it"
+            how = "a new or an empty folder, or --resume to continue it"
             raise CaseError(InputError("-o", f"{folder} holds a sweep already; expected {how}"))
         make_directory(folder)
     elif not (folder / VARIANTS).is_dir():
-        raise CaseError(InputError("--resume", f"{folder} holds no sweep to go on with"))
+        raise CaseError(InputError("--resume", f"{folder} holds no sweep to resume"))
     with writing(folder):
         (folder / VARIANTS).mkdir(exist_ok=True)
     write_case(folder, case)
@@ -138,7 +138,7 @@ def _told(error: BaseException, plan: Plan, folder: Path | None) -> Exception:
     if folder is None:
         return InterruptedRunError(what)
     count = sum(len(kept(folder, variant)) for variant in plan.variants)
-    return InterruptedRunError(f"{what}\n{count} of {len(plan.variants)} variants are in {folder}, to go on: --resume")
+    return InterruptedRunError(f"{what}\n{count} of {len(plan.variants)} variants are in {folder}, to resume: --resume")
 
 
 def _end(
@@ -196,7 +196,7 @@ def run_sweep(
     if rows is not None and over:
         raise CaseError(InputError("--table", "given together with --over; expected one of them"))
     if resume and output is None:
-        raise CaseError(InputError("--resume", "expected the folder of the sweep to go on with, as -o DIR"))
+        raise CaseError(InputError("--resume", "expected the folder of the sweep to resume, as -o DIR"))
     axes = on_root(comm, lambda: [parse_axis(case, text) for text in over] if rows is None else read_table(rows))
     folder = output or on_root(comm, lambda: free_directory(Path("results") / f"sweep-{name}"))
     hidden = quiet or comm.rank != 0 or not sys.stderr.isatty()

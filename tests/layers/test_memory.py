@@ -213,7 +213,7 @@ def test_what_goes_on_for_ever_has_no_steady_state() -> None:
         added_up = LOAD / 10 * SPEED / 1e4 * 10
         assert float(areas @ marched) == pytest.approx(added_up, rel=1e-9) if most == np.inf else marched.max() <= most
         if most == np.inf:
-            with pytest.raises(ConvergenceError, match="the state 'damage' of a law goes on as long as it slides"):
+            with pytest.raises(ConvergenceError, match="the state 'damage' of a law continues as long as it slides"):
                 steady(system)
         else:
             assert steady(system).states["damage"] == pytest.approx(2.0)

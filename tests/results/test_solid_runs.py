@@ -134,7 +134,7 @@ def test_interrupted_within_a_step(tmp_path: Path, name: str, monkeypatch: pytes
     with monkeypatch.context() as patched:
         patched.setattr(fenwear.signals.RunMonitor, "look", look)
         patched.setattr(fenwear.signals, "LOOK", -1.0)
-        with pytest.raises(InterruptedRunError, match="to go on: --resume"):
+        with pytest.raises(InterruptedRunError, match="to resume: --resume"):
             run(tmp_path / "cut", name, *how)
     reached = int(history(tmp_path / "cut").half_cycle[-1])
     assert 0 < reached < 40

@@ -163,7 +163,7 @@ def test_interrupted_and_resumed_equals_whole(tmp_path: Path, monkeypatch: pytes
     whole = run(tmp_path / "whole", how)
     with monkeypatch.context() as patched:
         interrupted_after(patched, 3)
-        with pytest.raises(InterruptedRunError, match="to go on: --resume"):
+        with pytest.raises(InterruptedRunError, match="to resume: --resume"):
             run(tmp_path / "parts", how)
     so_far = load_history(tmp_path / "parts")
     assert len(so_far.half_cycle) < 2 * len(whole.cycle)

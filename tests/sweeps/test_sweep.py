@@ -152,7 +152,7 @@ def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         return real(self, case, of)
 
     monkeypatch.setattr(engines.VariantRunner, "values", counted)
-    with pytest.raises(InterruptedRunError, match=r"2 of 3 variants are in .*, to go on: --resume"):
+    with pytest.raises(InterruptedRunError, match=r"2 of 3 variants are in .*, to resume: --resume"):
         package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder)
     (folder / "sweep.nc").touch()
     computed.clear()
@@ -165,7 +165,7 @@ def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     again = package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder, resume=True)
     assert computed == [0.3, 0.25, 0.1, 0.2, 0.3]
     np.testing.assert_allclose(again["pressure"], whole["pressure"], rtol=1e-9, atol=1e-9)
-    with pytest.raises(CaseError, match=r"holds a sweep already.*--resume to go on"):
+    with pytest.raises(CaseError, match=r"holds a sweep already.*--resume to continue"):
         package.sweep(CASE, {"contact.friction": [0.1]}, folder=folder)
     with pytest.raises(CaseError, match="holds no sweep"):
         package.sweep(CASE, {"contact.friction": [0.1]}, folder=tmp_path / "none", resume=True)

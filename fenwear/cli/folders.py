@@ -77,8 +77,7 @@ def flash_command(
     as_json: JsonOption = False,
 ) -> None:
     """Compute flash temperatures of a run on a contact grid, by moving sources."""
-    from fenwear.flash.temperatures import flash_temperatures
-    from fenwear.flash.told import dataset, numbers, text
+    from fenwear.flash.temperatures import dataset, flash_temperatures, numbers, text
     from fenwear.report.figures import DPI
     from fenwear.report.maps import flash_figures
     from fenwear.report.style import name_bodies, save

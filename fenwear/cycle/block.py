@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from typing import NamedTuple, Protocol
@@ -70,6 +70,12 @@ class HalfCycleHeat:
         iterations = max(self.coupling_iterations, later.coupling_iterations)
         terms, bulk = self.terms + later.terms, later.temperature_bulk
         return HalfCycleHeat(later.temperature_punch, later.temperature_strip, terms, iterations, bulk)
+
+
+def heat_of_phases(heats: Iterable[HalfCycleHeat | None]) -> HalfCycleHeat | None:
+    """Return the heat of phases one after the other; None of those without."""
+    known = [heat for heat in heats if heat is not None]
+    return reduce(HalfCycleHeat.then, known) if known else None
 
 
 @dataclass(frozen=True, repr=False)

@@ -8,7 +8,6 @@ the temperatures, see `jump_error`.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,7 @@ from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
 from fenwear.assembly.variants import same_conduction
 from fenwear.case import Case
-from fenwear.cycle.block import HalfCycle, HalfCycleHeat
+from fenwear.cycle.block import HalfCycle, heat_of_phases
 from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.jump_error import Estimate, Lengths
 from fenwear.cycle.jump_step import Stepper
@@ -79,8 +78,7 @@ class HalfCycles:
         worn, totals, contacts = state.worn, state.totals, list(state.contacts)
         for phase, end in zip(phases, ends, strict=True):
             worn, totals, contacts[phase] = worn + end.worn, totals + end.record.adds, end.record.contact
-        heats = [end.heat for end in ends if end.heat is not None]
-        heat = reduce(HalfCycleHeat.then, heats) if heats else None
+        heat = heat_of_phases(end.heat for end in ends)
         number = state.half_cycle + 1
         after = RunState(number, worn, tuple(contacts), ends[-1].temperature, totals)
         return after, [HalfCycle(number, [end.record for end in ends], worn, totals, heat, load)]

@@ -40,7 +40,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
+from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord, heat_of_phases
 from fenwear.cycle.coupled import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import ORDER, Estimate, estimated, sizes_of
@@ -443,8 +443,7 @@ class Stepper:
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
             records = [self._phase_record(k, contacts[k], before.contacts[k], cycles, adds[k]) for k in own]
             number = reached - (motion.half_cycles - 1 - stroke)
-            own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
-            heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
+            heat = heat_of_phases(heats[k] for k in own)
             load = self.loading(reached)
             found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found

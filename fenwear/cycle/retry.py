@@ -10,7 +10,7 @@ from functools import reduce
 
 from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
-from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.block import PhaseRecord, heat_of_phases
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import Totals
@@ -86,10 +86,9 @@ def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, tempe
     middle = ends[len(ends) // 2].record
     adds = reduce(Totals.__add__, [end.record.adds for end in ends])
     previous = None if before is None else before.pressure[0]
-    heats = [end.heat for end in ends if end.heat is not None]
     return PhaseEnd(
         PhaseRecord(phase, middle.contact, previous, adds, middle.friction_ratio),
         temperature,
-        reduce(HalfCycleHeat.then, heats) if heats else None,
+        heat_of_phases(end.heat for end in ends),
         reduce(WornDepths.__add__, [end.worn for end in ends]),
     )

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Preparation, Tribosystem, regridded, renewed
+from fenwear.assembly import Preparation, Tribosystem, regridded
 from fenwear.case import Case, OneWay, Reciprocating, Rotation, plausibility_warnings
 from fenwear.cycle import (
     Block,
@@ -216,15 +216,10 @@ class _Run:
         self.comm, self.case = system.comm, system.case
         self.watch = StateMonitor(system)
         start: RunState | None = None
+        self.extremes: dict[str, float] = {}  # of all half-cycles so far
         if resume:
-            grid = checkpoint.grid(directory, system)
-            if grid is not None:
-                system = regridded(system, grid)
-            followed = checkpoint.followed(directory, system)
-            warmed = checkpoint.warmed(directory, system)
-            if followed is not None or warmed is not None:
-                system = renewed(system, followed, warmed)
-            start = checkpoint.load(directory, system)
+            system, start = checkpoint.load(directory, system)
+            self.extremes = checkpoint.extremes(directory, self.comm)
             laid = on_root(self.comm, lambda: grid_of(directory, system))
             if laid is not None and laid != system.pair.punch.grid:  # killed just after it had grown
                 before, system = system, regridded(system, laid)
@@ -243,7 +238,6 @@ class _Run:
         self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
         self._level = level_of(self.case)
-        self.extremes = {} if start is None else checkpoint.extremes(directory, self.comm)  # of all half-cycles so far
         self.numbers: dict[str, float] = {}
         self.warnings: list[str] = []
         self.remedies: Counter[str] = Counter()

@@ -11,8 +11,8 @@ from fenwear.cycle import Block
 from fenwear.cycle.state import RunState, joined
 
 
-def by_short_jumps(last: Block) -> Block | None:
-    """Return the end of a run as short jumps would have it, see `fenwear.cycle.jump`; None where it was not followed.
+def by_short_jumps(last: Block) -> Block:
+    """Return the end of a run as short jumps would have it, see `fenwear.cycle.jump`; as it is where not followed.
 
     Its last half-cycle alone, and the pressures of the last cycle. With stick temperatures are those of the run, whose
     jumps know of them only how far the last one is off.
@@ -22,7 +22,7 @@ def by_short_jumps(last: Block) -> Block | None:
     """
     end, finer = last.end, last.end.finer
     if finer is None:
-        return None
+        return last
     off, totals = end.worn - finer.worn, end.totals - finer.totals
     found = replace(
         last,

@@ -1,12 +1,11 @@
-"""What steps and bases of the heat contribute: to temperatures what is known of both, to pressures what the gap feels.
+"""The contributions to the numerical uncertainty of a run's end: of the mesh, of steps, of the heat and of the solver.
 
-The exchange knows how far contact temperatures and the thermal gap are from those of smaller steps and of the whole
-mesh, relative to themselves. The pressure is solved for once more with a thermal gap that is larger by as much; worn
-depths differ by no more than it does beside a rigid motion, and by no more than the pressure that wears them.
+What steps and bases of the heat contribute: the exchange knows how far contact temperatures and the thermal gap are
+from those of smaller steps and of the whole mesh, relative to themselves. The pressure is solved for once more with a
+thermal gap that is larger by as much; worn depths differ by no more than it does beside a rigid motion, and by no more
+than the pressure that wears them.
 
-The contributions to the numerical uncertainty of a run's end.
-
-How the uncertainty of a run is told: as a table of summary.json, and in words, with the key that lowers it.
+It is told as a table of summary.json, and in words, with the key that lowers it.
 """
 
 from __future__ import annotations
@@ -165,8 +164,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
         again = Again(set_up(in_longer_jumps(base) if longer else base, last.system, lower), until, watch)
         first, end, a_cycle_ago = again.ends()
-        before, without = values_of(end), by_short_jumps(end)
-        short = before if without is None else values_of(without)
+        before, short = values_of(end), values_of(by_short_jumps(end))
         if lower.differs:
             coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
             found["mesh"] = of_mesh(values, coarse, lower.ratio)

@@ -18,14 +18,15 @@ from fenwear.parallel import on_root
 @app.command("info")
 def info_command(
     key: Annotated[
-        str | None,
+        str,
         typer.Argument(
             metavar="KEY",
             help="Explain this key of the case file, this table, or this ready geometry: bushing.geo; or list what a "
             "file has: a mesh, a shape from CAD, a table, a height map.",
             autocompletion=suggestions.keys,
+            show_default=False,
         ),
-    ] = None,
+    ] = "",
     as_json: JsonOption = False,
 ) -> None:
     """Print the versions of the stack and the built-in cases; explain a key of cases; or list the content of a file."""
@@ -41,10 +42,10 @@ def info_command(
         else:
             show(geometries[key].text())
         return
-    if key is not None and Path(key).is_file():
+    if key and Path(key).is_file():
         _list_file(Path(key), as_json=as_json)
         return
-    if key is not None:
+    if key:
         found = find_keys(key)
         if as_json:
             print_json({"keys": [asdict(k) for k in found]})

@@ -1,7 +1,4 @@
-"""What all commands share: the application, its common options, reading a case and printing.
-
-Options and commands that were removed, and what takes their place.
-"""
+"""What all commands share: the application, its common options, reading a case, printing, and what was removed."""
 
 from __future__ import annotations
 

@@ -242,13 +242,14 @@ def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: boo
 @app.command("new")
 def new_command(
     template: Annotated[
-        str | None,
+        str,
         typer.Argument(
             metavar="TEST",
             help="Name of a test, such as block-on-ring; without it all tests are listed.",
             autocompletion=suggestions.tests,
+            show_default=False,
         ),
-    ] = None,
+    ] = "",
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")
     ] = None,
@@ -260,7 +261,7 @@ def new_command(
     """Write a commented case of a usual test, with its dimensions."""
     from fenwear.case.templates import all_text, dimensions_text, write_case_of
 
-    if template is None:
+    if not template:
         show(all_text())
     elif list_dimensions:
         show(dimensions_text(template))

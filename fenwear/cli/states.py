@@ -1,7 +1,4 @@
-"""Commands that find a state directly: the cyclic steady state, and the pressure optimum.
-
-The command that finds the shape to machine.
-"""
+"""Commands that find a state directly: the cyclic steady state, the pressure optimum, and the shape to machine."""
 
 from __future__ import annotations
 
@@ -60,10 +57,10 @@ def steady_command(
     given = load(case, settings)
     held_at(given, _number(step))  # before anything is set up
     law_state = resolve_law(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
-    system, held_step = law_state.system, held(law_state.system, _number(step))
-    of_step = ""
-    if held_step is not None:
-        system, of_step = with_case(system, held_step[0]), held_step[1]
+    system = law_state.system
+    held_case, of_step = held(system, _number(step))
+    if of_step:
+        system = with_case(system, held_case)
     if system.sticks:
         _print_final(case, system, as_json=as_json)
         return
@@ -292,10 +289,10 @@ def optimum_command(
         reason = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
         raise CaseError(InputError("contact.law", reason))
     held_at(given, _number(step))  # before any mesh is made
-    system, of_step = place_case(given), ""
-    held_step = held(system, _number(step))
-    if held_step is not None:
-        system, of_step = place_case(held_step[0]), held_step[1]
+    system = place_case(given)
+    held_case, of_step = held(system, _number(step))
+    if of_step:
+        system = place_case(held_case)
     if not system.rigid.mode_names:
         reason = (
             "they hold the punch along the contact's normal: no rigid motion follows the wear, and no pressure stays"
@@ -343,19 +340,15 @@ def shape_command(
 ) -> None:
     """Find the shape to machine: that of the steady state (of a program: in its last step), without run-in."""
     from fenwear.assembly import with_reduced_heat
-    from fenwear.assembly.variants import with_case
-    from fenwear.cycle import held
+    from fenwear.cycle import at_step
     from fenwear.initial_shape import initial_shape
     from fenwear.law_choice import resolve_law
     from fenwear.parallel import on_root
     from fenwear.results.export import write_shape
 
     law_state = resolve_law(load(case, settings), log, heat="none")
-    loaded, system = law_state.case, law_state.system
+    loaded, system = law_state.case, at_step(law_state.system)
     wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
-    of_step = held(system)
-    if of_step is not None:
-        system = with_case(system, of_step[0])
     if not system.sticks:
         system = with_reduced_heat(system, keep=True)
     shape = initial_shape(system, wanted)

@@ -193,7 +193,7 @@ def _nominal(placed: ContactSetup, key: str) -> float:
     return placed.normal_force
 
 
-def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str] | None:
+def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
     """Return the case of what acts at the end of a step of a program, held for ever, and the step in words.
 
     Args:
@@ -201,7 +201,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str] | No
         step: Its number from 0; by default the last.
 
     Returns:
-        None without a program.
+        Without a program the case itself and "".
 
     Raises:
         CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
@@ -209,7 +209,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str] | No
     """
     found = held_at(placed.case, step)
     if found is None:
-        return None
+        return placed.case, ""
     factor = found.load_factor
     if found.load is not None:
         factor = found.load / _nominal(placed, f"{found.key}.load")
@@ -232,8 +232,8 @@ def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
         CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
             contact carry the loads.
     """
-    found = held(system, step)
-    return system if found is None else with_case(system, found[0])
+    case, text = held(system, step)
+    return with_case(system, case) if text else system
 
 
 def _loaded(case: Case, factor: float) -> Case:

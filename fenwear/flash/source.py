@@ -29,8 +29,6 @@ from fenwear.assembly import (
     heating_friction,
     place_case,
     placed_on,
-    regridded,
-    renewed,
 )
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, Cycle
@@ -319,14 +317,7 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
         raise CaseError(
             InputError("program", "expected none with contact.law = 'coulomb', where a cycle is done again")
         )
-    system = assemble(case)
-    grid = checkpoint.grid(directory, system)
-    if grid is not None:
-        system = regridded(system, grid)
-    followed = checkpoint.followed(directory, system)
-    if followed is not None:
-        system = renewed(system, followed)
-    state = checkpoint.load(directory, system)
+    system, state = checkpoint.load(directory, assemble(case))
     until = state.half_cycle + system.motion.half_cycles
     blocks = list(march(system, until, implicit=True, start=state))
     steps_of = [one for block in blocks for one in block.steps if isinstance(one, Steps)]

@@ -1,12 +1,11 @@
-"""Calibration: keys of a case from measurements, by least squares, with what the data cannot tell.
+"""Calibration: keys of a case from measurements, by least squares, with what the data cannot tell, and their scatter.
 
 Minimised is chi^2 = sum ((prediction - value) / sigma)^2 over the unknown keys and, for every profile, the
 offset and tilt of the trace where they are asked for. The covariance is (J^T J)^-1, J the Jacobian
 of the weighted residuals, times chi^2 / (n - m) where no sigma was given. Unknowns that cannot be
 negative are fitted by their logarithms: their intervals are intervals of a ratio. Intervals end at the key's bounds.
-Errors that depend on each other are whitened, see `fenwear.life.data`.
-
-The scatter between tests of the same kind.
+Errors that depend on each other are whitened, see `fenwear.life.data`. Tests
+of the same kind, each fitted by itself, give the scatter between them.
 """
 
 from __future__ import annotations
@@ -216,10 +215,9 @@ def calibrate(
         ConvergenceError: a run or the fit did not converge.
     """
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
-    kept = Trials() if trials is None else trials
-    problem = LeastSquares(case, data, asked, baseline, comm, progress, kept)
+    problem = LeastSquares(case, data, asked, baseline, comm, progress, trials)
     about = f"{case.to_toml()} {list(data)} {asked} {list(baseline)}"
-    on_root(comm, lambda: kept.begin(about, resume=resume))
+    on_root(comm, lambda: problem.trials.begin(about, resume=resume))
     return problem.team.lead(partial(_calibrated, problem, progress))
 
 

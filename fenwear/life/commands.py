@@ -1,7 +1,4 @@
-"""Pictures of sensitivities, calibrations and lives.
-
-What the commands sensitivity, calibrate and life do: compute, write into a folder, say where.
-"""
+"""What the commands sensitivity, calibrate and life do: compute, draw, write into a folder, say where."""
 
 from __future__ import annotations
 

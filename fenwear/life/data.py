@@ -1,14 +1,4 @@
-"""The scatter of measurements: independent, adding up from one row to the next, or alike over a length.
-
-    independent      each row has an error of its own, with the standard deviation sigma;
-    adds up          a specimen is weighed and goes on: the increments since the row before are independent. sigma is
-                     that of an increment; without it their variance grows with the sliding between the rows;
-    alike over l     the roughness of a profile: neighbours have the correlation exp(-|x - x'| / l).
-
-The file of the measurements says which, by `# scatter = ...`. Residuals are whitened by it (generalised least squares),
-so that standard errors and Student's intervals hold for any number of rows.
-
-Measured data: CSV files with a unit in every column's heading, and what they were measured under.
+"""Measured data: CSV files with a unit in every column's heading, and what they were measured under.
 
     # set punch.loads.0.force = ["0 N", "-5 kN"]
     # after = 3600 m
@@ -19,10 +9,18 @@ Measured data: CSV files with a unit in every column's heading, and what they we
 
 Lines that start with # may set keys of the case for this file (set KEY = VALUE), the amount of sliding
 after which all rows were measured (after), the worn body (body), the standard deviation of the
-measurement (sigma), how it scatters (scatter, see `fenwear.life.data`), and the density that turns a lost mass into a
-volume (density). Columns: x with depth or height (the profile of a worn surface; height is minus the depth), or after
-with volume, mass, depth, scar_width, friction or temperature; sigma belongs to the measured column. Several profiles
-follow each other with a column after.
+measurement (sigma), how it scatters (scatter), and the density that turns a lost mass into a volume (density).
+Columns: x with depth or height (the profile of a worn surface; height is minus the depth), or after with volume, mass,
+depth, scar_width, friction or temperature; sigma belongs to the measured column. Several profiles follow each other
+with a column after. Measurements scatter in one of three ways:
+
+    independent      each row has an error of its own, with the standard deviation sigma;
+    adds up          a specimen is weighed and goes on: the increments since the row before are independent. sigma is
+                     that of an increment; without it their variance grows with the sliding between the rows;
+    alike over l     the roughness of a profile: neighbours have the correlation exp(-|x - x'| / l).
+
+Residuals are whitened by it (generalised least squares), so that standard errors and Student's intervals hold for any
+number of rows.
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.case import Case, Rotation, changed_case
 from fenwear.case.program import cycle_of
 from fenwear.case.units import convert
@@ -77,15 +75,15 @@ class Noise:
             raise ValueError(f"expected a length above zero, got {text!r}")
         return cls("alike", length)
 
-    def check(self, quantity: str, x: Array | None) -> None:
-        """Check that a quantity can scatter so.
+    def check(self, quantity: str, *, profile: bool) -> None:
+        """Check that a quantity, along a profile or not, can scatter so.
 
         Raises:
             ValueError: it cannot.
         """
-        if self.kind == "adds up" and (x is not None or quantity not in GROWING):
+        if self.kind == "adds up" and (profile or quantity not in GROWING):
             raise ValueError(f"{quantity} does not add up; expected {', '.join(GROWING)} after more and more sliding")
-        if self.kind == "alike" and x is None:
+        if self.kind == "alike" and not profile:
             raise ValueError("expected a profile, with a column x")
 
     def whitened(self, values: Array, sigma: Array | None, x: Array | None, after: Array) -> Array:
@@ -253,6 +251,22 @@ class _Reader:
     def _fail(self, where: str, message: str) -> CaseError:
         return CaseError(InputError(f"{self.path}{where and ': ' + where}", message))
 
+    def _check(self, right: Mask, column: str, message: str) -> None:
+        """Raise what is wrong in the first row in which a column is not right (n,)."""
+        for k in np.flatnonzero(~right)[:1]:
+            raise self._fail(f"row {self.table.lines[k]}, column {column!r}", message)
+
+    def _directive(self, name: str, unit: str) -> float:
+        """Return the number above zero that a line `# name = ...` gives, in a unit."""
+        given = self.directives[name]
+        try:
+            value = convert(given, unit)
+        except ValueError as error:
+            raise self._fail(f"# {name}", str(error)) from None
+        if value <= 0:
+            raise self._fail(f"# {name}", f"expected more than zero, got {given!r}")
+        return value
+
     def read(self) -> DataSet:
         names = self.table.names
         body = self._body()
@@ -274,18 +288,21 @@ class _Reader:
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", unit_of(quantity), body)
             of_case(wanted, case, str(self.path))
             x = self._column("x", "mm") if "x" in names else None
-            whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity, x))
+            whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity))
             if x is not None:
                 series += self._profiles(whole, x)
             else:
-                self._check_rising(after, lines, strictly=True)
+                self._check_rising(after, strictly=True)
                 series.append(whole)
         return DataSet(self.path.name, tuple(self.settings), tuple(series), self.table.listing())
 
-    def _column(self, name: str, unit: str) -> Array:
-        """Return a column in a unit (n,)."""
+    def _column(self, name: str, unit: str, *, as_written: bool = False) -> Array:
+        """Return a column (n,) in a unit, or as its numbers are written."""
+        table = self.table
+        if as_written:
+            table = replace(table, heads=tuple(replace(head, unit="") for head in table.heads))
         try:
-            return self.table.numbers(self.table.names.index(name), unit)
+            return table.numbers(table.names.index(name), unit)
         except TableError as error:
             raise self._fail(error.where, error.message) from None
 
@@ -298,12 +315,8 @@ class _Reader:
         if "after" not in self.table.names or not (after == 0).any():
             return
         for name in (name for name in self.table.names if _name(name) in (*GROWING, "wear")):
-            values = self._column(name, _unit(name))
-            wrong = np.flatnonzero((after == 0) & (values != 0))
-            if len(wrong):
-                row = self.table.lines[int(wrong[0])]
-                message = "expected more than zero, or a zero beside it: nothing has worn before"
-                raise self._fail(f"row {row}, column 'after'", message)
+            right = (after != 0) | (self._column(name, _unit(name)) == 0)
+            self._check(right, "after", "expected more than zero, or a zero beside it: nothing has worn before")
         kept = np.flatnonzero(after != 0)
         self.table = replace(
             self.table,
@@ -335,28 +348,20 @@ class _Reader:
             raise TableError("column 'x'", "expected with one column depth or height, and no other measurement")
 
     def _after(self) -> tuple[Array, str]:
-        given, lines = self.directives.get("after"), self.table.lines
+        given = "after" in self.directives
         if "after" not in self.table.names:
-            if given is None:
+            if not given:
                 raise self._fail("", "does not say after how much sliding it was measured; expected a column "
                                  "'after (m)' or a line '# after = 3600 m'")  # fmt: skip
-            amount, counted = self._amount(given, "# after")
-            return np.full(len(lines), amount), counted
-        if given is not None:
+            amount, counted = self._amount(self.directives["after"], "# after")
+            return np.full(len(self.table.lines), amount), counted
+        if given:
             raise self._fail("# after", "given together with a column after; expected one of them")
         unit = self.table.heads[self.table.names.index("after")].unit
         one, counted = self._amount(f"1 {unit}".strip(), "column 'after'")
-        try:
-            values = replace(self.table, heads=tuple(replace(head, unit="") for head in self.table.heads)).numbers(
-                self.table.names.index("after"), ""
-            )
-        except TableError as error:
-            raise self._fail(error.where, error.message) from None
-        values = values * one
-        if (values < 0).any():
-            row = lines[int(np.flatnonzero(values < 0)[0])]
-            raise self._fail(f"row {row}, column 'after'", "expected more than zero: nothing has worn before")
-        self._check_rising(values, lines, strictly=False)
+        values = one * self._column("after", "", as_written=True)
+        self._check(values >= 0, "after", "expected more than zero: nothing has worn before")
+        self._check_rising(values, strictly=False)
         return values, counted
 
     def _amount(self, text: str, where: str) -> tuple[float, str]:
@@ -372,61 +377,41 @@ class _Reader:
             raise self._fail(where, message)
         return parse_amount(f"{float(match['number']) * 2 * np.pi / slid!r}", f"{self.path}: {where}")
 
-    def _check_rising(self, after: Array, lines: Sequence[int], *, strictly: bool) -> None:
-        steps = np.diff(after)
-        wrong = np.flatnonzero(steps <= 0 if strictly else steps < 0)
-        if len(wrong):
-            raise self._fail(
-                f"row {lines[int(wrong[0]) + 1]}, column 'after'", "expected amounts that rise from row to row"
-            )
+    def _check_rising(self, after: Array, *, strictly: bool) -> None:
+        steps = np.diff(after, prepend=-np.inf)
+        self._check(steps > 0 if strictly else steps >= 0, "after", "expected amounts that rise from row to row")
 
     def _measured(self, name: str, *, only: bool) -> tuple[Array, Array | None]:
         """Return values and standard deviations."""
         unit, factor = _unit(name), -1.0 if name == "height" else 1.0
         if name == "mass":
-            text = self.directives.get("density")
-            if text is None:
+            if "density" not in self.directives:
                 raise self._fail(
                     "column 'mass'", "needs the density of what was lost: a line '# density = 7800 kg/m^3'"
                 )
-            try:
-                factor = 1 / convert(text, "N*s^2/mm^4")
-            except (ValueError, ZeroDivisionError) as error:
-                raise self._fail("# density", str(error)) from None
-        lines = self.table.lines
+            factor = 1 / self._directive("density", "N*s^2/mm^4")
         values = factor * self._column(name, unit)
-        if name == "friction" and (values < 0).any():
-            row = lines[int(np.flatnonzero(values < 0)[0])]
-            raise self._fail(f"row {row}, column 'friction'", "expected zero or more")
+        if name == "friction":
+            self._check(values >= 0, "friction", "expected zero or more")
         sigma = self._sigma(unit, only=only)
         return values, None if sigma is None else np.abs(factor) * sigma
 
     def _sigma(self, unit: str, *, only: bool) -> Array | None:
-        names, lines = self.table.names, self.table.lines
-        given = self.directives.get("sigma")
-        if ("sigma" in names or given is not None) and not only:
-            raise self._fail("sigma", "belongs to one measured column; expected a file for each of several")
-        if "sigma" in names:
-            sigma = self._column("sigma", unit)
-            if (sigma <= 0).any():
-                row = lines[int(np.flatnonzero(sigma <= 0)[0])]
-                raise self._fail(f"row {row}, column 'sigma'", "expected more than zero")
-            return sigma
-        if given is None:
+        if "sigma" not in {*self.table.names, *self.directives}:
             return None
-        try:
-            value = convert(given, unit)
-        except ValueError as error:
-            raise self._fail("# sigma", str(error)) from None
-        if value <= 0:
-            raise self._fail("# sigma", f"expected more than zero, got {given!r}")
-        return np.full(len(lines), value)
+        if not only:
+            raise self._fail("sigma", "belongs to one measured column; expected a file for each of several")
+        if "sigma" in self.table.names:
+            sigma = self._column("sigma", unit)
+            self._check(sigma > 0, "sigma", "expected more than zero")
+            return sigma
+        return np.full(len(self.table.lines), self._directive("sigma", unit))
 
-    def _noise(self, quantity: str, x: Array | None) -> Noise:
+    def _noise(self, quantity: str) -> Noise:
         """Return how a measured quantity scatters."""
         try:
             noise = Noise.parse(self.directives["scatter"]) if "scatter" in self.directives else Noise()
-            noise.check(quantity, x)
+            noise.check(quantity, profile="x" in self.table.names)
         except ValueError as error:
             raise self._fail("# scatter", str(error)) from None
         return noise

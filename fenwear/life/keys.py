@@ -1,7 +1,4 @@
-"""Numeric keys of a case: their values and units, read and set by their paths.
-
-Unknown keys of a calibration: their bounds, and the scales on which they are fitted.
-"""
+"""Numeric keys of a case by their paths: values and units; bounds and scales of those that a calibration fits."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""What measurements cannot tell: unknowns and combinations of unknowns that the data leave open.
+"""The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2.
 
-Computed trials of a fit, kept in a file: an interrupted calibration resumes at any run.
-
-The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2.
+It tells what measurements cannot: unknowns and combinations of unknowns that the data leave open. Computed trials are
+kept in a file, so that an interrupted calibration resumes at any run.
 """
 
 from __future__ import annotations

@@ -268,9 +268,8 @@ def wrapped(drawn: dict[str, Figure]) -> dict[str, Figure]:
     for figure in drawn.values():
         used = HIGH_WIDE if figure.get_figwidth() >= NARROW else HIGH_NARROW
         for ax in figure.axes:
-            if (place := ax.get_subplotspec()) is None:
-                continue
-            high = used * 72 * figure.get_figheight() / place.get_gridspec().nrows
+            place = ax.get_subplotspec()  # none of a bar of colours, beside all panels
+            high = used * 72 * figure.get_figheight() / (place.get_gridspec().nrows if place else 1)
             letters = max(SHORTEST, int(high / (LETTER * float(ax.yaxis.label.get_fontsize()))))
             if max(map(len, ax.get_ylabel().split("\n"))) > letters:
                 text = UNIT.sub(lambda unit: unit[0].replace(" ", "\u00a0"), ax.get_ylabel())

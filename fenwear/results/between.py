@@ -1,15 +1,11 @@
-"""What lies between the surfaces, in history.nc and summary.json: the third body, the plastic depth, states of laws.
+"""What is on the surfaces besides wear, in history.nc and summary.json: debris, plastic depth, coatings, creep.
 
-worn volume of both bodies + volume at the start = stored + ejected
+    worn volume of both bodies + volume at the start = stored + ejected
 
 A state that a law remembers is `state_NAME` there, on the strip's material `state_NAME_strip`.
 
-What is left of coatings, and where and when they are worn through, in history.nc and summary.json.
-
 Between two recorded half-cycles a coating ends where what its coefficient would have worn reaches what was left: exact
 where the pressure stays, see `fenwear.sliding.coating`.
-
-What bodies and layer have crept, in history.nc and summary.json, apart from wear.
 
 The depth that a body has crept is how far its contact surface has gone back into it, against its supports or, of a free
 body, the surfaces on which its loads act, by what its compliance has grown to since it was loaded. It is that of the

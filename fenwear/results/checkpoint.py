@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, grows
-from fenwear.bodies.grid import RegularGrid
-from fenwear.case import Case, OneWay, Rotation
+from fenwear.assembly import Tribosystem, grows, regridded, renewed
+from fenwear.case import Case
 from fenwear.compat import geometry_dofmap
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import none_yet
@@ -185,31 +184,6 @@ def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
     return replace(memory, warm=tuple(warm))
 
 
-def followed(directory: Path, system: Tribosystem) -> WornDepths | None:
-    """Return the worn depths that the meshes of a checkpoint follow, None where they are as made; collective.
-
-    Raises:
-        CaseError: there is no checkpoint, or it is of another case.
-    """
-    return on_root(system.comm, lambda: _read(find(directory), system)[0].followed)
-
-
-def grid(directory: Path, system: Tribosystem) -> RegularGrid | None:
-    """Return the contact grid of a checkpoint, None where it stays as it is; collective.
-
-    Raises:
-        CaseError: there is no checkpoint, or it is of another case.
-    """
-
-    def read() -> Array | None:
-        folder = find(directory)
-        check_case(folder, system.case)
-        return _unpacked(Checkpoint, "", folder, _arrays(folder)).grid
-
-    found, own = on_root(system.comm, read), system.pair.punch.grid
-    return None if found is None or own is None else own.with_numbers(found)
-
-
 def last_contact(directory: Path) -> Checkpoint:
     """Return the checkpoint of a run; for one rank.
 
@@ -220,16 +194,15 @@ def last_contact(directory: Path) -> Checkpoint:
     return _unpacked(Checkpoint, "", folder, _arrays(folder))
 
 
-def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
+def _warmed(folder: Path, system: Tribosystem) -> tuple[Array, Array] | None:
     """Return the temperatures that the materials' properties of a checkpoint are taken at (owned,) each; collective.
 
     None where they are those of the initial temperature.
 
     Raises:
-        CaseError: there is no checkpoint, or it is damaged.
+        CaseError: it is damaged.
     """
     comm, bodies = system.comm, system.bodies.heat
-    folder = on_root(comm, lambda: find(directory))
     if not bodies or not on_root(comm, _file(folder, f"{WARMED}_punch").exists):
         return None
     punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
@@ -251,20 +224,30 @@ def swap(directory: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def load(directory: Path, system: Tribosystem) -> RunState:
-    """Return the state of a run's checkpoint; collective.
+def load(directory: Path, system: Tribosystem) -> tuple[Tribosystem, RunState]:
+    """Return the system on the grid, the meshes and with the properties of a checkpoint, and its state; collective.
+
+    Args:
+        directory: Of the run.
+        system: As it was at the start of the run.
 
     Raises:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
     comm = system.comm
     folder = on_root(comm, lambda: find(directory))
-    found, arrays = on_root(comm, lambda: _read(folder, system))
-    temperature = None
+    kept, arrays = on_root(comm, lambda: _read(folder, system.case))
+    grid, temperature = system.pair.punch.grid, None
+    if kept.grid is not None and grid is not None:
+        system = regridded(system, grid.with_numbers(kept.grid))
+    on_root(comm, lambda: _check_sizes(folder, kept, system))
+    warmed = _warmed(folder, system)
+    if kept.followed is not None or warmed is not None:
+        system = renewed(system, kept.followed, warmed)
     if system.bodies.heat:
         read = [read_temperature(folder, body) for body in system.bodies.heat]
-        temperature = HeatState.nodal(system.bodies.heat, read, found.track)
-    return replace(found.state, temperature=temperature, memory=_memory(folder, system, arrays))
+        temperature = HeatState.nodal(system.bodies.heat, read, kept.track)
+    return system, replace(kept.state, temperature=temperature, memory=_memory(folder, system, arrays))
 
 
 def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
@@ -331,15 +314,8 @@ def check_case(folder: Path, case: Case) -> None:
     """Make sure that a checkpoint is of this case.
 
     Raises:
-        CaseError: it is of another one, whose differences are named, of an earlier version, or damaged.
+        CaseError: it is of another one, whose differences are named, or damaged.
     """
-    to_and_fro = not isinstance(case.motion, OneWay | Rotation)
-    if case.heat is not None and to_and_fro and not (folder / EXTREMES).is_file():
-        what = (
-            f"the checkpoint in {folder} is of an earlier version, which to and fro had the strip's temperatures below "
-            "the punch in place of those of its material; expected to start again, without"
-        )
-        raise CaseError(InputError("--resume", what))
     try:
         saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
     except (OSError, ValueError):
@@ -355,19 +331,22 @@ def check_case(folder: Path, case: Case) -> None:
         raise CaseError([InputError("--resume", "the checkpoint is of another case"), *problems])
 
 
-def _read(folder: Path, system: Tribosystem) -> tuple[Checkpoint, dict[str, Any]]:
+def _read(folder: Path, case: Case) -> tuple[Checkpoint, dict[str, Any]]:
     """Return a checkpoint of this case and the arrays that it is made of."""
-    check_case(folder, system.case)
+    check_case(folder, case)
     arrays = _arrays(folder)
-    found: Checkpoint = _unpacked(Checkpoint, "", folder, arrays)
-    expected, worn = system.unworn(), found.state.worn
-    for own, like in ((worn, expected), (found.followed or worn, expected), (found.state.totals, none_yet(system))):
+    return _unpacked(Checkpoint, "", folder, arrays), arrays
+
+
+def _check_sizes(folder: Path, kept: Checkpoint, system: Tribosystem) -> None:
+    """Raise where depths and totals are not those of a system on the checkpoint's grid."""
+    expected, worn = system.unworn(), kept.state.worn
+    for own, like in ((worn, expected), (kept.followed or worn, expected), (kept.state.totals, none_yet(system))):
         pairs = [(getattr(own, field.name), getattr(like, field.name)) for field in fields(like)]
         if any(values.shape != wanted.shape for values, wanted in pairs):
             raise damaged(folder)
     if not all(np.isfinite(depth).all() for depth in (worn.punch, worn.strip)):
         raise damaged(folder)
-    return found, arrays
 
 
 def _flat(tables: Any, path: str = "") -> dict[str, Any]:

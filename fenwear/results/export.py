@@ -1,12 +1,12 @@
-"""CSV files of a run, made from history.nc alone: its course, and the profiles of both surfaces.
+"""Files of runs and shapes for other programs: tables of a run, worn surfaces, shapes to machine.
 
-Nothing here knows the kind of the model: a variable over the records is a column of the course, one over the records
-and the nodes of a surface a column of that surface's profile for each chosen record. A record is a kept half-cycle; in
-partial slip a kept cycle, whose time steps make a file of their own: the loops of force and displacement.
+CSV files are made from history.nc alone: the course of a run, and the profiles of both surfaces. Nothing here knows the
+kind of the model: a variable over the records is a column of the course, one over the records and the nodes of a
+surface a column of that surface's profile for each chosen record. A record is a kept half-cycle; in partial slip a kept
+cycle, whose time steps make a file of their own: the loops of force and displacement.
 
-The files of a shape to machine: its profile, its surface as triangles, and the case of the bodies made with it.
-
-The worn surfaces of a run as files for other programs, and for fenwear again: profile, triangles, mesh with depths.
+A shape to machine is written as its profile, its surface as triangles, and the case of the bodies made with it; worn
+surfaces for fenwear again, too, as a profile, triangles, and a mesh with depths.
 
 A profile has what a surface lies deeper in its body than the mesh of its case: the wear, and the profile that the
 body had before. As `punch.profile.file` or `strip.profile.file` it makes the worn body of a next run, on the same

@@ -1,9 +1,7 @@
-"""What contact nodes carry in space: the force on the punch at node i is A_i p_i (e_n + tau)_i, A_i its area.
+"""Forces of the contact, and where bodies find their place: how far they have moved, a shaft's eccentricity.
 
-tau is the traction of friction over the pressure. Both are those of the middle position of a half-cycle, as all of its
-records are.
-
-Where bodies find their place: how far each free motion has gone, and a shaft's eccentricity in its bore.
+The force on the punch at node i is A_i p_i (e_n + tau)_i, A_i its area and tau the traction of friction over the
+pressure, both of the middle position of a half-cycle, as all of its records are.
 
 A body that supports leave free moves until pressure and friction balance its loads. Its motion is that of the surfaces
 on which its loads act, in the mean, against where it was meshed (of its whole volume where none acts). Of a shaft in a

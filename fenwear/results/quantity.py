@@ -1,9 +1,7 @@
 """A quantity: its name, unit and meaning, and how it is computed of half-cycles, whoever has computed these.
 
 Runs and studies have a block of half-cycles, steady states a `SteadyCycle`; a quantity is computed of both by one
-function. `fenwear.results.registry` lists them.
-
-Temperatures as a case gives them: in results they are in degrees Celsius where the case has any in degrees.
+function. `fenwear.results.registry` lists them. Temperatures are in degrees Celsius where the case has any in degrees.
 """
 
 from __future__ import annotations

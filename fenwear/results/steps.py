@@ -1,9 +1,8 @@
 """The time steps of half-cycles in history.nc, of a law of contact that resolves them: loops, tractions, slip, stick.
 
 Half-cycles may have unlike numbers of steps: those with fewer end in NaN. A model of the plane has values along x, in
-a solid they are those along the sliding and across it.
-
-What is told of a cycle that is a table: ways, pressures and cross-shear over it, and wear per million cycles.
+a solid they are those along the sliding and across it. Of a cycle that is a table ways, pressures and cross-shear over
+it are told, and wear per million cycles.
 
 Where surfaces slide as a whole the ways are those of the motion. Where nodes stick or slip by themselves they are their
 slips of the last cycle, time step by time step.

@@ -1,18 +1,14 @@
-"""The largest pressure that contacts between curved surfaces settle under elastically: their shakedown limit.
+"""The key numbers of a run, as summary.json has them: of all contacts together, of each with a name, shakedown.
 
 Under a contact that rolls or slides to and fro, what yields at first leaves residual stresses by which the rest is
 carried elastically, as long as the largest pressure p_0 is at most 4 k in line contact and 4.7 k in point contact. k is
 the yield stress in shear, by von Mises that in tension over sqrt(3) (K. L. Johnson, Contact Mechanics, 1985, 9.1, 9.2;
-A. R. S. Ponter et al., J. Mech. Phys. Solids 33, 1985, 339). These are the limits without friction
-and hardening: friction lowers them, hardening raises them. Beyond them the surface flows in every cycle.
+A. R. S. Ponter et al., J. Mech. Phys. Solids 33, 1985, 339). These are the limits without friction and hardening:
+friction lowers them, hardening raises them. Beyond them the surface flows in every cycle.
 
-The sheet of each named contact, as summary.json has it beside that of all contacts together.
-
-A geometry names them by its groups, punch_contact_NAME and strip_contact_NAME. What a contact carries is told on the
+A geometry names contacts by groups, punch_contact_NAME and strip_contact_NAME. What a contact carries is told on the
 punch's surface; what is worn off the punch or the strip on the surface of either that has the name. The volume metered
 of a body is shared among its contacts as the integrals of its depths are.
-
-The key numbers of a run, as summary.json has them.
 """
 
 from __future__ import annotations

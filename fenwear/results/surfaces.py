@@ -1,9 +1,7 @@
-"""The contact surfaces of solids and rings in history.nc: nodes, their coordinates, and the facets between them.
+"""The contact surfaces in history.nc: nodes and the facets between them, scars, and how finely nodes lie.
 
 Values live on the dimension `node` (`node_strip` for the strip's own material). Coordinates and facets follow the UGRID
 conventions (ugrid-conventions.github.io), which programs for maps on meshes read.
-
-The geometry of scars: how deep, how long and how wide what is worn off a contact surface is.
 
 A scar is where the depth is more than a share of the largest one, by default a hundredth. Its edge is put between two
 nodes by linear interpolation, and beside what is unworn where the slope inside runs out, if that is nearer: a node that
@@ -11,8 +9,6 @@ has just been reached does not add an element. Length is along the
 sliding and width across it; on rings and on closed tracks the scar goes all the way round, and has a width alone. On
 curves that are no graphs over x it is counted along them. Where a contact has parts that lie apart, it is that of the
 largest scar, without the gaps between them.
-
-How finely nodes lie across a contact, and what stands beside its largest pressure.
 
 A pressure at a node is that of the contact where the contact is many nodes wide: of Hertz's with 9 nodes across it the
 largest is right to 3 %, with 5 to 25 %, with one by a factor. The nodes across the piece of the contact that carries

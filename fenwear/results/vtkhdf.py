@@ -2,9 +2,7 @@
 
 The format is VTK's own, of its version 2.0 (docs.vtk.org, "VTKHDF File Format"): an unstructured grid whose points,
 cells and values of all steps stand one after the other, with the offsets of each step. A step is appended to a
-copy that takes the place of the file: a reader always finds a whole one.
-
-The fields of both bodies at one time as a step of a time series: one grid, its fields by names with units.
+copy that takes the place of the file: a reader always finds a whole one. Both bodies are one grid.
 """
 
 from __future__ import annotations

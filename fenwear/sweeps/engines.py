@@ -1,6 +1,4 @@
-"""What is computed of one variant, by name, with dimensions and units.
-
-Who computes the variants: this process, local processes, or the ranks of an MPI job.
+"""What is computed of one variant, and by whom: this process, local processes, or the ranks of an MPI job.
 
 Ranks use mpi4py's MPICommExecutor, which needs no process to be started by another one and so runs under
 every launcher and in every container. Local processes are joblib's loky: they are started anew, as

@@ -45,7 +45,7 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
     """
     first, second, fixed = _chosen(dataset)
     at_first = dataset.isel(dict.fromkeys(fixed, 0))
-    of_fretting = second is not None and "regime" in at_first
+    of_fretting = bool(second) and "regime" in at_first
     shown = [
         name
         for name in (FRETTING if of_fretting else SHOWN)
@@ -59,7 +59,7 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
         unit = unit or values.attrs["units"]
         ax.set_title(_capital(values.attrs["long_name"]), loc="left")
         label = f"{values.attrs['long_name'].split(' of ')[0]} ({unit})" if unit else values.attrs["long_name"]
-        if second is not None and (at_first.sizes[second] > LINES or of_fretting):
+        if second and (at_first.sizes[second] > LINES or of_fretting):
             _map(figure, ax, factor * values, first, second, label if unit else "")
         else:
             _lines(ax, factor * values, first, second)
@@ -83,13 +83,13 @@ def draw(dataset: xarray.Dataset, folder: Path) -> None:
         sweep_figure(dataset).savefig(path, dpi=150)
 
 
-def _chosen(dataset: xarray.Dataset) -> tuple[str, str | None, list[str]]:
-    """Return the keys along the axis, of the lines, and those that stay at their first value."""
+def _chosen(dataset: xarray.Dataset) -> tuple[str, str, list[str]]:
+    """Return the keys along the axis, of the lines ("" for one line), and those that stay at their first value."""
     swept = [str(name) for name in dataset["trouble"].dims]
     numeric = [key for key in swept if key not in dataset.coords or dataset[key].dtype.kind in "if"]
     ordered = sorted(swept, key=lambda key: (key not in numeric, -dataset.sizes[key]))
     several = [key for key in ordered if dataset.sizes[key] > 1] or ordered
-    first, second = several[0], several[1] if len(several) > 1 else None
+    first, second = several[0], several[1] if len(several) > 1 else ""
     return first, second, [key for key in swept if key not in (first, second)]
 
 
@@ -123,9 +123,9 @@ def _label(values: xarray.Dataset | xarray.DataArray, key: str, at: int) -> str:
 Line = tuple[str | None, xarray.DataArray, dict[str, Any]]
 
 
-def _rows(values: xarray.DataArray, second: str | None) -> Iterator[Line]:
+def _rows(values: xarray.DataArray, second: str) -> Iterator[Line]:
     """Yield name, values and style of each line."""
-    if second is None:
+    if not second:
         yield None, values, {**run_style(0)}
         return
     numeric = second not in values.coords or values[second].dtype.kind in "if"
@@ -137,7 +137,7 @@ def _rows(values: xarray.DataArray, second: str | None) -> Iterator[Line]:
         yield _label(values, second, k), values.isel({second: k}), style
 
 
-def _lines(ax: Axes, values: xarray.DataArray, first: str, second: str | None) -> None:
+def _lines(ax: Axes, values: xarray.DataArray, first: str, second: str) -> None:
     places, names = _places(values, first)
     for label, row, style in _rows(values, second):
         ax.plot(places, row.values, marker="o", markersize=3, label=label, **style)
@@ -148,7 +148,7 @@ def _lines(ax: Axes, values: xarray.DataArray, first: str, second: str | None) -
         ax.set_xscale("log")
     if np.nanmax(values.values) - np.nanmin(values.values) < FLAT * np.nanmax(np.abs(values.values)):
         ax.set_ylim(0.0, 1.2 * float(np.nanmax(values.values)) or 1.0)  # not the rounding of what stays the same
-    if second is not None:
+    if second:
         name = _axis_label(values, second)
         legend_beside(ax, name if len(name) < 20 else name.rpartition(".")[2])
 

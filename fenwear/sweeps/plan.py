@@ -1,7 +1,4 @@
-"""Keys of a case and the values that a sweep gives them.
-
-The variants of a sweep, in the order in which they share most.
-"""
+"""Keys of a case, the values that a sweep gives them, and its variants in the order in which they share most."""
 
 from __future__ import annotations
 

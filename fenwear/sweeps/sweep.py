@@ -1,7 +1,4 @@
-"""A sweep from the case and its keys to the dataset.
-
-What the command sweep does: computes, writes into a folder, tells.
-"""
+"""A sweep from the case and its keys to the dataset, and what the command does with it: writes it, tells of it."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def test_what_jumps_leave_is_found_beside_them(assembled: Assembled, kind: str) 
     alone, exact, last = end(3e-3), end(3e-5), end(3e-3, finer=True)
     np.testing.assert_array_equal(last.end.worn.punch, alone.end.worn.punch)
     short = by_short_jumps(last)
-    assert short is not None
+    assert short is not last
     weights = system.pair.weights
     true, told, left = (
         weights @ np.abs(one.wear[-1] - other.wear[-1]) for one, other in ((last, exact), (last, short), (short, exact))

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import invariants
 
+from fenwear.assembly import Tribosystem
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.results import checkpoint
@@ -63,9 +64,9 @@ def test_a_checkpoint_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> 
     """By what a run comes to that never stopped."""
     true = checkpoint.load
 
-    def load(*given: Any) -> RunState:
-        state = true(*given)
-        return replace(state, worn=WornDepths((1 + 1e-6) * state.worn.punch, state.worn.strip))
+    def load(*given: Any) -> tuple[Tribosystem, RunState]:
+        system, state = true(*given)
+        return system, replace(state, worn=WornDepths((1 + 1e-6) * state.worn.punch, state.worn.strip))
 
     monkeypatch.setattr(checkpoint, "load", load)
     verdict, why = invariants.try_problem(SEEDS["plane, restart"])

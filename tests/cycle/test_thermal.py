@@ -78,7 +78,7 @@ def test_split_tolerance(assembled: Assemble) -> None:
 
 def test_too_much_heat_names_the_half_cycle(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """Too much heat in a half-cycle, without smaller steps, ends with its number and all that came before."""
-    monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
+    monkeypatch.setattr("fenwear.cycle.gross_sliding.PARTS", ())
     system = assembled("example1-heat", *COARSE, "motion.amplitude=14")
     done: list[int] = []
     blocks = march(system, 40)
@@ -91,7 +91,7 @@ def test_too_much_heat_names_the_half_cycle(assembled: Assemble, monkeypatch: py
 
 def test_slow_split_gives_advice(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """A relaxation too small to come to an end in the iterations there are: the error names the key."""
-    monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
+    monkeypatch.setattr("fenwear.cycle.gross_sliding.PARTS", ())
     slow = ("heat.relaxation=0.01", "heat.split_tolerance=1e-12")
     system = assembled("example1-heat", *COARSE, "heat.coupling=split", *slow)
     with pytest.raises(ConvergenceError, match=r"half-cycle 1: the operator split.*heat\.relaxation"):

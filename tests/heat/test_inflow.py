@@ -172,7 +172,7 @@ def test_material_enters_at_the_given_temperature() -> None:
 
 def test_heat_out_of_bounds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps that grow end the run by an error that says heat; not where friction is all that warms."""
-    monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
+    monkeypatch.setattr("fenwear.cycle.gross_sliding.PARTS", ())
     system = pad_on_strip(500.0)
     field = system.exchange.sides[1].field
     list(march(system, 10, implicit=True))

@@ -47,9 +47,8 @@ class Groups:
 
     def summed(self, slopes: Array) -> Array:
         """Return derivatives to the pressures of the time steps (k, ..., n) as those to the contacts' (m, ..., n)."""
-        found = np.zeros((len(self.first), *slopes.shape[1:]))
-        np.add.at(found, self.of, slopes * self.share.reshape(len(self.of), *(1,) * (slopes.ndim - 2), -1))
-        return found
+        members = [self.of == contact for contact in range(len(self.first))]
+        return np.array([np.einsum("k...n,kn->...n", slopes[own], self.share[own]) for own in members])
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 import pint
 import xarray
-from fenwear.bodies.constants import constants
 
-from fenwear.bodies.ready import meshes_folder
+from fenwear.bodies.ready import constants, meshes_folder
 
 Tables = dict[str, Any]
 COUNTS = re.compile(r"elements|grading|growth|angle|pins|across|around|along|layers|quarter|tetrahedra|^outer$|spread")

@@ -71,7 +71,9 @@ def steady_command(
     forces, gain, warnings = _forces(state), *_gain_and_warnings(system, state)
     if not as_json:
         _print_steady(case, state, forces, of_step)
-    uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), {}) if accuracy else {}
+    uncertain: dict[str, Any] = {}
+    if accuracy:
+        uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), uncertain)
     way = time.perf_counter()
     rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
     short = len(state.system.motion.phases) <= FOLLOWED
@@ -100,7 +102,7 @@ def steady_command(
     )
 
 
-def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float, list[str]]:
+def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float | None, list[str]]:
     """Return the largest share that friction heat gives back, and what is to be said of a state, and say it."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings

@@ -114,9 +114,9 @@ class Lifetime:
     def first_share(self) -> list[float]:
         """Of each level, in which share of the parts that reach any it is reached first."""
         lives = np.array([one.lives for one in self.each]).reshape(len(self.each), len(self.lives))
-        lives = lives[:, np.isfinite(lives).any(axis=0)]
-        first = (lives == lives.min(axis=0, initial=np.inf)).sum(axis=1)
-        return [float(count) / max(lives.shape[1], 1) for count in first]
+        ended = lives[:, np.isfinite(lives).any(axis=0)]
+        first = (ended == ended.min(axis=0, initial=np.inf)).sum(axis=1)
+        return [float(count) / max(ended.shape[1], 1) for count in first]
 
     @property
     def counted_in(self) -> str:
@@ -255,9 +255,8 @@ def lifetime(
     on_root(comm, lambda: kept.begin(about, resume=resume))
     lives, failures = _run(model, quantities, scatter.keys, design, kept, limit, comm, progress)
     if folder is not None:
-        rows = zip(range(samples), design.tolist(), lives.tolist(), strict=True)
         heading = ["sample", *scatter.keys, *names, "trouble"]
-        table = [[k, *values, *own, failures.get(k, "")] for k, values, own in rows]
+        table = [[k, *map(float, (*design[k], *lives[k])), failures.get(k, "")] for k in range(samples)]
         on_root(comm, lambda: write_text(folder / SAMPLES, csv_text(heading, table)))
 
     def summary(one: Quantity, own: Array, level: float | None) -> Lifetime:

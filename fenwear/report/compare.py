@@ -248,11 +248,11 @@ def _shapes(history: xarray.Dataset) -> Iterator[Drawn]:
             own = f"{title}, {strip_moves(history)} {words[d]}" if d else title
             for along in (True, False) if solid else (True,):
                 track = tracks_of(history, along=along)[0]
-                way = f", {'along' if along else 'across'} the sliding" if solid else ""
+                cut = f", {'along' if along else 'across'} the sliding" if solid else ""
                 label = track.label.partition(",")[0]
                 x, y = track.line(field.factor * rows[-1], field.body)
                 ends = worn_range(history) if field.body == "strip" and not solid else None
-                yield Drawn(own + way, label, field.label, x, y, ends=ends)
+                yield Drawn(own + cut, label, field.label, x, y, ends=ends)
 
 
 def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:

@@ -177,10 +177,11 @@ SUMMED = {
 def summed(history: xarray.Dataset) -> dict[str, Array]:
     """Return slip (µm), work of friction (µJ/mm²) and largest stress (MPa) of each cycle (k, n), as far as known."""
     pairs = [(history[f"traction{end}"], history[f"slip{end}"]) for end in ("", "_across") if f"slip{end}" in history]
+    work: Any = sum(traction * slip for traction, slip in pairs)
     slid = np.sqrt(sum(slip**2 for _, slip in pairs)).where(history.pressure > 0, 0)
     found = {
         "slip": 1e3 * slid.sum("step").values,
-        "friction_work": -1e3 * sum(traction * slip for traction, slip in pairs).sum("step").values,
+        "friction_work": -1e3 * work.sum("step").values,
         "stress": history.surface_stress.max("step").values,
     }
     return {name: values for name, values in found.items() if np.isfinite(values).all()}

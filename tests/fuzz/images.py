@@ -65,9 +65,9 @@ def scaled(value: Any, sizes: Sizes) -> Any:
     if "parameters" in value:
         defaults = {
             key: float(one) for key, one in constants(meshes_folder() / value["file"]).items() if "diffusion" not in key
-        }  # fenwear finds it where it is not given
+        }
         found["parameters"] = {
-            key: one if COUNTS.search(key) else one * sizes.of("mm")
+            key: one if COUNTS.search(key) else one * sizes.of("mm^2" if key == "diffusion_area" else "mm")
             for key, one in {**defaults, **value["parameters"]}.items()
         }
     if "columns" in value:

@@ -136,15 +136,11 @@ class Tribosystem(ContactSetup):
         sliding = [SlidingContact(self.interfaces[k], ratios[k]) for k in phases]
         return self._contact(sliding)
 
-    def passed_contact(self, phase: int, *, capped: bool = True, following: bool = False) -> ContactSolver:
-        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can.
-
-        Friction may be `following` the pressure (see `CondensedContact.follow`).
-        """
+    def passed_contact(self, phase: int, *, capped: bool = True) -> ContactSolver:
+        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can."""
         return self._contact(
             [SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])],
             self.layers.hardness if capped else np.inf,
-            following=following,
         )
 
     def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
@@ -166,10 +162,8 @@ class Tribosystem(ContactSetup):
         self,
         phases: list[SlidingContact],
         most: float = np.inf,
-        *,
-        following: bool = False,
     ) -> ContactSolver:
-        return CondensedContact(phases, self.remedies, self.team, most, following=following)
+        return CondensedContact(phases, self.remedies, self.team, most)
 
     @told_by_name
     def check_touching(self) -> None:

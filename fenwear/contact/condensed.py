@@ -16,16 +16,16 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from scipy.linalg import block_diag
 
-from fenwear.arrays import Array, Mask
-from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
+from fenwear.arrays import Array, Mask, Nodes
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
-from fenwear.contact.operators import Dense, Operator, Phases, Shifted, Solve
+from fenwear.contact.operators import Blocks, Dense, Operator, Phases, Solve, eliminate
 from fenwear.errors import FULL_START, PIVOTS, SOFTER_START, ConvergenceError, Remedies
 from fenwear.interface import Interface
 from fenwear.interface.compliance import EVERY
@@ -34,9 +34,7 @@ from fenwear.parallel import Team
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
-MANY = 400  # nodes from which on only what those near contact ask for is made
-WHOLE = 2000  # the same where friction follows the pressure, or nodes flow: what then changes asks for all at once
-SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
+MANY = 400  # nodes from which on sets are gone through before SNES starts, and meshes are taken for grids
 NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
 SETTLED, ROUNDS = 1e-10, 50  # change of gaps over those of the load that ends iterations of friction; the most of them
@@ -125,11 +123,11 @@ class CondensedContact:
 
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
     PETSc's absolute tolerances mean the same for every case. Phases meet in what wears in the step only: where
-    there are many, one small elimination for each of them takes the place of one of all. Where nodes are
-    many, no matrix of all of them is made: see `fenwear.contact.blocks`. On several ranks rank 0 solves it.
+    there are many, one small elimination for each of them takes the place of one of all. Where both bodies are
+    convolutions on a grid no matrix is made. On several ranks rank 0 solves it.
 
     Attributes:
-        blocks: Of the phases, where nodes are many.
+        gridded: Whether all compliances are convolutions on a grid.
         most: The largest pressure, MPa.
     """
 
@@ -139,14 +137,11 @@ class CondensedContact:
         remedies: Remedies | None = None,
         team: Team | None = None,
         most: float = np.inf,
-        *,
-        following: bool = False,
     ) -> None:
         """Take the phases, where to note that a contact was solved in another way than usual, and ranks that have it.
 
-        By default every rank has a contact of its own. Of one phase of few nodes no
-        pressure exceeds `most`, MPa: there the surfaces flow, and the gap is what they have to, below zero.
-        Friction may be `following` the pressure.
+        By default every rank has a contact of its own. Of one phase by a matrix no pressure exceeds `most`, MPa: there
+        the surfaces flow, and the gap is what they have to, below zero.
         """
         self.phases = list(phases)
         self._remedies = remedies or Remedies()
@@ -163,19 +158,19 @@ class CondensedContact:
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
         self._team = team or Team.of(MPI.COMM_SELF)
-        gridded = interface.pair.punch.grid is not None and interface.cost is not None
-        few = WHOLE if following or most < np.inf else MANY
-        self._many = n > few or (n > SOME and m * n > TOGETHER) or gridded
         self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
-        self._dense: Array = np.zeros((m, 0 if self._many else size, size))
-        self.blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
         self._rigid_normals = np.array([phase.interface.rigid.rigid_normal.T for phase in self.phases])
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
-        self._splits = True  # whether products of one friction serve where it differs from node to node
-        self._even: dict[int, Array] = {}  # that friction, by phase
-        self._beside: dict[int, Array | None] = {}  # what differs from it, by phase, as forces of unit pressures (n, d)
+        self._even: dict[int, Array] = {}  # where friction differs from node to node, that which products are of
+        self._beside = np.zeros((m, *phases[0].friction_ratio.shape))  # what differs from it
+        self._modes = np.zeros((m, n, r))
+        self._balances = np.zeros((m, r, n))
+        self._on_grid: list[GridCompliance | None] = [None] * m
+        self._take(range(m))
+        self.gridded = None not in self._on_grid
+        self._dense: Array = np.zeros((m, 0 if self.gridded else size, size))
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
@@ -186,45 +181,45 @@ class CondensedContact:
         self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
-        self.most = np.inf if self._many or m > 1 else most
+        self.most = np.inf if self.gridded or m > 1 else most
         upper[:n] = self.most / self._pressure_scale
         self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
-        self.inequality.sets_first, self.inequality.by_digits = self._many, self.gridded
+        self.inequality.sets_first, self.inequality.by_digits = self.gridded or n > MANY, self.gridded
 
-    def _slide(self, phases: Iterable[int]) -> None:
-        """Take the friction of phases."""
-        n, scale = self.shape[1], self._pressure_scale / self._gap_scale
-        blocks: list[PhaseBlock | None] = [*self.blocks] or [None] * len(self.phases)
-        for k in phases:
-            interface, ratio = self.phases[k].interface, self._ratios[k]
-            modes = interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
-            balance = interface.rigid.equilibrium(ratio) * (self._pressure_scale / self._resultant_scale[:, None])
-            if self._many:
-                blocks[k] = self._block(k, scale, modes, balance)
-            else:
-                self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
-                self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
-        self.blocks = [block for block in blocks if block is not None]
-        self.__dict__.pop("_grid", None)
-
-    def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
-        """Return the block of a phase of many nodes.
+    def _take(self, phases: Iterable[int]) -> None:
+        """Take the friction of phases: their rigid motions, balances, and compliances on a grid.
 
         On a grid products are of one friction: that of the first mean. What differs from it is found by iterations.
         """
-        interface, ratio, alone = self.phases[k].interface, self._ratios[k], len(self.phases) == 1
-        self._beside[k] = None
-        if self._splits and interface.cost is not None and np.ptp(ratio, axis=0).any():
-            even = self._even.setdefault(k, np.broadcast_to(ratio.mean(axis=0), ratio.shape))
-            compliance = interface.compliance(even, scale, self._tables)
-            if (on_grid := compliance.on_grid) is not None:
-                self._beside[k] = (ratio - even) * interface.pair.weights[:, None]
-                return PhaseBlock(on_grid, on_grid.diagonal(), modes, balance, iterated=alone)
-        compliance = interface.compliance(ratio, scale, self._tables)
-        known: Any = compliance.on_grid or compliance
-        if compliance.cost is None:
-            known = Columns(len(modes), partial(compliance.entries, EVERY))
-        return PhaseBlock(known, compliance.diagonal(), modes, balance, iterated=alone)
+        for k in phases:
+            interface, ratio = self.phases[k].interface, self._ratios[k]
+            rigid, pair = interface.rigid, interface.pair
+            self._modes[k] = rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
+            self._balances[k] = rigid.equilibrium(ratio) * (self._pressure_scale / self._resultant_scale[:, None])
+            if interface.cost is None or (pair.punch.grid is None and len(pair.weights) <= MANY):
+                continue
+            even = ratio
+            if np.ptp(ratio, axis=0).any():
+                even = self._even.setdefault(k, np.broadcast_to(ratio.mean(axis=0), ratio.shape))
+            self._on_grid[k] = interface.compliance(even, self._scale, self._tables).on_grid
+            self._beside[k] = (ratio - even) * pair.weights[:, None]
+
+    def _slide(self, phases: Iterable[int]) -> None:
+        """Make the matrices of phases from their friction, or the products in their place."""
+        self.__dict__.pop("_grid", None)
+        self._differs = self.gridded and bool(self._beside.any())
+        for k in phases if not self.gridded else ():
+            self._dense[k] = self._matrix(self.phases[k].interface.compliance(self._ratios[k], self._scale).matrix(), k)
+        self._blocks = Blocks(self._dense, self.shape[1])
+
+    @property
+    def _scale(self) -> float:
+        return self._pressure_scale / self._gap_scale
+
+    def _matrix(self, compliance: Array, k: int, nodes: Nodes = EVERY) -> Array:
+        """Return [S, H; E, 0] of a phase, or the rows and columns of some nodes."""
+        modes, balance = self._modes[k][nodes], self._balances[k][:, nodes]
+        return np.block([[compliance, modes], [balance, np.zeros((len(balance),) * 2)]])
 
     def press(self, factor: float) -> None:
         """Take all loads times a factor."""
@@ -240,13 +235,14 @@ class CondensedContact:
         changed = [k for k, (ratio, before) in pairs if ratio is not before and not np.array_equal(ratio, before)]
         self._ratios = list(ratios)
         if changed:
+            self._take(changed)
             self._slide(changed)
             self._elastic = self._operator = None
 
     @property
     def can_follow(self) -> bool:
-        """Whether friction may follow the pressure: of one phase of few nodes."""
-        return not self._many and len(self.phases) == 1
+        """Whether friction may follow the pressure: of one phase, by a matrix."""
+        return not self.gridded and len(self.phases) == 1
 
     def follow(self, mu: Callable[[Array], Array], bare: Array, along: Array) -> None:
         """Take friction that follows the pressure, tau = bare + mu(p) along, until `slide` is called again.
@@ -277,12 +273,11 @@ class CondensedContact:
         slope = (self._mu(pressure + nudge) - mu) / nudge
         matrix = self._dense[0].copy()
         matrix[:, :n] += self._by_mu * (mu + pressure * slope)
-        if self._wearing is None:
-            return Dense(matrix)
-        added, layer = self._wearing.local(pressure[None]), self._wearing.layer(pressure[None])
-        assert added is not None
-        scale = self._pressure_scale / self._gap_scale
-        return Shifted(matrix, scale * (added[0] if layer is None else added[0] + layer[0]))
+        if self._wearing is not None:
+            added, layer = self._wearing.local(pressure[None]), self._wearing.layer(pressure[None])
+            assert added is not None
+            matrix[:n, :n] += np.diag(self._scale * (added[0] if layer is None else added[0] + layer[0]))
+        return Dense(matrix)
 
     def _residual(self, x: Array) -> Array:
         f = self._linear.multiply(x)
@@ -309,41 +304,29 @@ class CondensedContact:
     def _linear(self) -> Operator:
         """The derivative of the residual without what wears in the step."""
         if self._elastic is None:
-            self._elastic = self._of_nodes() if self._many and self._coupling is None else self._as_phases()
+            if self.gridded and self._coupling is None:
+                self._elastic = GriddedPhases(self._grid)
+            else:
+                self._elastic = self._as_phases()
         return self._elastic
-
-    @property
-    def gridded(self) -> bool:
-        """Whether all compliances are convolutions on a grid."""
-        return bool(self.blocks) and all(isinstance(block.compliance, GridCompliance) for block in self.blocks)
 
     @cached_property
     def _grid(self) -> PhasesGrid:
         """The grid of the phases."""
-        return PhasesGrid(self.blocks, [phase.interface.pair for phase in self.phases])
-
-    def _of_nodes(
-        self, wear: Array | None = None, before: Operator | None = None, layer: Array | None = None
-    ) -> ManyNodes | GriddedPhases:
-        """Return the derivative without a matrix of all nodes."""
-        if self.gridded and wear is None:
-            return GriddedPhases(self._grid)
-        return ManyNodes(self.blocks, wear, before if isinstance(before, ManyNodes) else None, layer)
+        of = [one for one in self._on_grid if one is not None]
+        return PhasesGrid(of, list(self._modes), list(self._balances), [phase.interface.pair for phase in self.phases])
 
     def _as_phases(
-        self,
-        border: tuple[Array, Array] | None = None,
-        local: Array | None = None,
-        layer: Array | None = None,
+        self, border: tuple[Array, Array] | None = None, local: Array | None = None, layer: Array | None = None
     ) -> Phases:
         """Return the derivative by matrices of all nodes."""
-        scale = self._pressure_scale / self._gap_scale
-        dense = np.array([block.matrix() for block in self.blocks]) if self._many else self._dense
+        blocks = self._blocks
+        if self.gridded:
+            matrices = [self._matrix(one.matrix(), k) for k, one in enumerate(self._grid.of)]
+            blocks = Blocks(np.array(matrices), self.shape[1])
         if layer is not None:
-            nodes = np.arange(self.shape[1])
-            dense = dense.copy()
-            dense[:, nodes, nodes] += layer
-        return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
+            blocks = blocks.added(layer)
+        return Phases(blocks, None if self._coupling is None else self._coupling * self._scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
         if self._mu is not None:
@@ -351,25 +334,21 @@ class CondensedContact:
         if self._wearing is None:
             return self._linear
         m, n = self.shape
-        pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
+        pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._scale
         if self.gridded and self._coupling is None:
             return self._worn_on_grid(pressure, scale)
         left, slope = None, self._wearing.local(pressure)
         if slope is None:
             left, slope = self._wearing.border(pressure)
-        layer, last = self._wearing.layer(pressure), self._operator
-        if last is None or not self._known(slope, layer):
+        layer = self._wearing.layer(pressure)
+        if self._operator is None or not self._known(slope, layer):
             self._slopes = slope, layer
             layer = None if layer is None else layer * scale
             if left is not None:
                 self._operator = self._as_phases(border=(left, slope * scale), layer=layer)
-            elif self._many and self._coupling is None:
-                self._operator = self._of_nodes(slope * scale, last, layer)
-            elif m == 1 and self._coupling is None:
-                self._operator = Shifted(self._dense[0], slope[0] * scale + (0.0 if layer is None else layer[0]))
             else:
                 self._operator = self._as_phases(local=slope * scale, layer=layer)
-        return self._operator or self._linear
+        return self._operator
 
     def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
         """Return the derivative with what wears at a pressure (m, n), on a grid."""
@@ -428,18 +407,10 @@ class CondensedContact:
                 return found
         raise ConvergenceError(f"{self.inequality.name}: friction that differs from node to node did not settle")
 
-    @property
-    def _differs(self) -> bool:
-        """Whether friction differs from that of the products in some phase."""
-        return any(beside is not None for beside in self._beside.values())
-
     def _opened_beside(self, pressure: Array) -> Array:
         """Return the gaps (m, n) that pressures (m, n) open by what friction differs from that of the products."""
-        opened = np.zeros(self.shape)
-        for k, beside in self._beside.items():
-            if beside is not None:
-                opened[k] = self.phases[k].interface.apply(beside * pressure[k][:, None])[:, 0]
-        return opened
+        phases = zip(self.phases, self._beside, pressure, strict=True)
+        return np.array([phase.interface.apply(beside * own[:, None])[:, 0] for phase, beside, own in phases])
 
     def _solved(
         self, gap: Array, start: ContactState | None, wearing: WearCompliance | None, coupling: Array | None
@@ -481,13 +452,17 @@ class CondensedContact:
             use: Called with the operator on the unknowns of `closed` and of the rigid motions.
             closed: Nodes of the only phase that touch (n,); by default all nodes of all phases.
         """
-        if self._differs:
-            self._splits = False
-            self._slide(range(len(self.phases)))
-            self._elastic = self._operator = None
-        every = np.arange(self.size, dtype=np.int32)
-        kept = every if closed is None else every[np.append(closed, np.ones(self.size - len(closed), dtype=bool))]
-        return self._team.lead(lambda: use(self._linear.factor(kept)))
+        n = self.shape[1]
+        closed = np.ones(n, dtype=bool) if closed is None else closed
+        if not self._differs:
+            kept = np.append(closed, np.ones(self._offset.shape[1] - n, dtype=bool))
+            every = np.flatnonzero(np.tile(kept, len(self.phases))).astype(np.int32)
+            return self._team.lead(lambda: use(self._linear.factor(every)))
+        nodes, matrices = np.flatnonzero(closed), []
+        for k, (phase, ratio) in enumerate(zip(self.phases, self._ratios, strict=True)):
+            compliance = phase.interface.compliance(ratio, self._scale).entries(nodes, nodes)
+            matrices.append(self._matrix(compliance, k, nodes))
+        return self._team.lead(lambda: use(eliminate(block_diag(*matrices))))
 
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
         """Return the solution: unknowns, residual and iterations.

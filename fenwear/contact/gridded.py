@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, hstack, vstack
 
 from fenwear.arrays import Array
-from fenwear.contact.blocks import PhaseBlock
 from fenwear.contact.endless import SAME, EndlessGrid, Passing, Patch
 from fenwear.contact.krylov import flexible
 from fenwear.contact.operators import Indices, Solve
@@ -71,13 +70,20 @@ class PhasesGrid:
     """The grid that phases stand on, and what products on boxes of it need, which is kept.
 
     Args:
-        blocks: Of each phase, whose compliances are convolutions on one grid.
+        of: Compliance of each phase, on one grid.
+        modes: H of each phase (n, r), the gap that each rigid mode opens.
+        balances: E of each phase (r, n), what each node's pressure puts on each mode.
         pairs: The surfaces opposite each other in each phase.
     """
 
-    def __init__(self, blocks: Sequence[PhaseBlock], pairs: Sequence[ContactPair]) -> None:
-        self.blocks, self.pairs = list(blocks), list(pairs)
-        self.of = [block.compliance for block in blocks if isinstance(block.compliance, GridCompliance)]
+    def __init__(
+        self,
+        of: Sequence[GridCompliance],
+        modes: Sequence[Array],
+        balances: Sequence[Array],
+        pairs: Sequence[ContactPair],
+    ) -> None:
+        self.of, self.modes, self.balances, self.pairs = list(of), list(modes), list(balances), list(pairs)
         self.places, self.shape = self.of[0].of.places, self.of[0].of.counts
         self.boxes = Boxes(self.places, self.shape, lambda box: PhasesBox(self, box))
 
@@ -110,8 +116,8 @@ class PhasesBox:
     def __init__(self, grid: PhasesGrid, box: Box) -> None:
         self.grid, self.box = grid, box
         self.products = OnBox(grid.of, box)
-        self.modes = self._boxed(np.array([block.modes.T for block in grid.blocks]))  # (m, r, ...)
-        self.balance = self._boxed(np.array([block.balance for block in grid.blocks]))
+        self.modes = self._boxed(np.array([modes.T for modes in grid.modes]))  # (m, r, ...)
+        self.balance = self._boxed(np.array(grid.balances))
         # Where weights are even, a balance is its motion times a number.
         size = np.abs(self.balance).sum() / max(np.abs(self.modes).sum(), 1e-300)
         apart = np.abs(self.balance - size * self.modes).max(initial=0.0)
@@ -171,7 +177,8 @@ class GriddedPhases:
 
     def __init__(self, grid: PhasesGrid, opened: Opened | None = None) -> None:
         self.grid, self.opened = grid, opened
-        self.m, self.n, self.size = len(grid.blocks), grid.blocks[0].nodes, grid.blocks[0].size
+        self.m, (self.n, r) = len(grid.of), grid.modes[0].shape
+        self.size = self.n + r
         self._slopes = None if opened is None else grid.boxes.whole.slopes(opened)
 
     def multiply(self, x: Array) -> Array:
@@ -245,10 +252,10 @@ class GriddedPhases:
             f: Their residual, small in the balances.
         """
         parts, forces = x.reshape(self.m, -1).copy(), f.reshape(self.m, -1)[:, self.n :]
-        for own, block, rest in zip(parts, self.grid.blocks, forces, strict=True):
+        for own, modes, balance, rest in zip(parts, self.grid.modes, self.grid.balances, forces, strict=True):
             pressure = own[: self.n]
-            by_share = block.balance @ (pressure[:, None] * block.modes)
-            share = block.modes @ np.linalg.lstsq(by_share, -rest)[0]
+            by_share = balance @ (pressure[:, None] * modes)
+            share = modes @ np.linalg.lstsq(by_share, -rest)[0]
             if np.abs(share).max(initial=0.0) < SLIGHT:
                 own[: self.n] = pressure * (1 + share)
         return np.asarray(parts.ravel())

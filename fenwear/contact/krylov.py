@@ -1,90 +1,29 @@
-"""Large systems by GMRES: where a factor would cost more than the few products that it saves.
-
-The preconditioner is what couples each node with itself, with the rigid motions and the balance of forces beside it,
-eliminated exactly: the compliance of a contact is a smooth operator on top of that, which needs some tens of
-iterations at any number of nodes, fewer with wear.
-"""
+"""Large systems by GMRES: where a factor would cost more than the few products that it saves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 from fenwear.arrays import Array
 
-ACCURACY = 1e-11  # residual over the right-hand side
+ACCURACY, ENOUGH = 1e-11, 2e-12  # residual over the right-hand side, and scaled to 1, that end iterations of `solution`
 RESTART, RESTARTS = 80, 4
 FEW = 1e-6  # accuracy that directions which are at right angles to half of all digits are enough for
 
 
-class NotSolvedError(Exception):
-    """GMRES did not reach its accuracy."""
-
-
-def iterative(
-    multiply: Callable[[Array], Array], near: csc_array, count: Callable[[int], None]
-) -> Callable[[Array], Array]:
-    """Return the solution operator of a square matrix (size, size), for one right-hand side (size,).
-
-    Args:
-        multiply: The product with the matrix.
-        near: A sparse matrix near it, which is eliminated.
-        count: Told of the iterations of each solution.
+def solution(multiply: Callable[[Array], Array], precondition: Callable[[Array], Array], b: Array) -> Array:
+    """Return the solution of a square system (size,) to many digits; arguments as of `flexible`.
 
     Raises:
-        LinAlgError: the sparse matrix is singular. The solution operator raises NotSolvedError.
+        LinAlgError: the accuracy was not reached.
     """
-    try:
-        factor = splu(near)
-    except RuntimeError as error:  # SuperLU's way of saying that it is singular
-        raise np.linalg.LinAlgError("singular matrix") from error
-    return lambda b: gmres_solution(multiply, factor.solve, b, count)
-
-
-def gmres_solution(
-    multiply: Callable[[Array], Array],
-    precondition: Callable[[Array], Array],
-    b: Array,
-    count: Callable[[int], None] = lambda _: None,
-    enough: float = 0.0,
-) -> Array:
-    """Return the solution of a square system (size,).
-
-    Args:
-        multiply: The product with its matrix.
-        precondition: That with a matrix near its inverse.
-        b: Right-hand side (size,).
-        count: Told of the iterations.
-        enough: Residual that ends them in any case.
-
-    Raises:
-        NotSolvedError: the accuracy was not reached.
-    """
-    shape, iterations = (len(b), len(b)), 0
-
-    def note(_residual: float) -> None:
-        nonlocal iterations
-        iterations += 1
-
-    x, failed = gmres(
-        LinearOperator(shape, matvec=multiply, dtype=float),
-        b,
-        rtol=ACCURACY,
-        atol=enough,
-        restart=min(RESTART, len(b)),
-        maxiter=RESTARTS,
-        M=LinearOperator(shape, matvec=precondition, dtype=float),
-        callback=note,
-        callback_type="pr_norm",
-    )
-    count(iterations)
-    if failed or not np.isfinite(x).all():
-        raise NotSolvedError
-    result: Array = x
-    return result
+    accuracy = max(ACCURACY, ENOUGH / max(float(np.linalg.norm(b)), 1e-300))
+    x, rest, *_ = flexible(multiply, precondition, b, accuracy, RESTART, RESTARTS)
+    if not (rest <= accuracy and np.isfinite(x).all()):
+        raise np.linalg.LinAlgError("iterations do not converge")
+    return x
 
 
 def flexible(

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.contact.krylov import NotSolvedError, iterative
+from fenwear.contact.krylov import solution
 
 Indices = NDArray[np.int32]
 Solve = Callable[[Array], Array]
@@ -20,11 +21,9 @@ SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
 TINY = 1e-300
 LARGE = 300  # unknowns above which a factor follows its set; below it a new one costs as little
 UPDATES = 0.1  # of the unknowns of a factor: what may have come and gone before a new one is made
-ITERATED = 1000  # unknowns from which on a set that is far from the factor's may be solved by iterations
-FACTOR, COLUMN = 0.03, 0.1  # products that cost as much: a factor for each unknown, a column of an update (measured)
-ITERATIONS = 40  # that a solution takes, before there was one
-BORDERS = 12  # rows without a diagonal entry, as the balance of forces has none, that iterations go with
 DENSE = 400  # unknowns up to which one elimination of the whole beats one for each block
+DIRECT = 150  # nodes up to which what all phases open is eliminated; above it GMRES costs less
+ALIKE, KEPT = 1.5, 3  # ratio of wear up to which a preconditioner serves; how many are kept
 
 
 class Operator(Protocol):
@@ -78,33 +77,16 @@ class Updating:
 
     whose Schur complement has as many rows as unknowns have come and gone. Columns once solved for are kept.
 
-    A large set that is far from K is solved by iterations, until as much was spent on them as a factor costs: so
-    whatever comes, it takes about twice the time at most of who knows it before. Costs are counted, not measured by a
-    clock: every process comes to the same decision.
-
     Args:
         entries: Returns the numbers of some rows and columns.
-        diagonal: The numbers on the diagonal (size,); without them there are no iterations.
-        multiply: The product with the whole matrix; None to have that of the entries.
-        cost: Of that product, in entries of a matrix in memory that could be multiplied meanwhile.
 
     Attributes:
         base: What was eliminated last.
-        iterations: All that there were.
     """
 
-    def __init__(
-        self,
-        entries: Callable[[Indices, Indices], Array],
-        diagonal: Array | None = None,
-        multiply: Callable[[Array], Array] | None = None,
-        cost: float | None = None,
-    ) -> None:
-        self._entries, self._multiply, self._diagonal, self._cost = entries, multiply, diagonal, cost
+    def __init__(self, entries: Callable[[Indices, Indices], Array]) -> None:
+        self._entries = entries
         self.base: _Base | None = None
-        self.iterations = 0
-        self._expected = ITERATIONS
-        self._spent = 0.0  # on iterations since the last factor, in entries
         self._columns: dict[int, Array] = {}  # solutions by the base of what has come or gone
 
     def factor(self, kept: Indices) -> Solve:
@@ -119,77 +101,14 @@ class Updating:
             out = np.setdiff1d(base.kept, kept, assume_unique=True)
             if not len(into) + len(out):
                 return base.solve
-            if len(into) + len(out) <= UPDATES * len(base.kept) and self._update_pays(base, into, out):
+            if len(into) + len(out) <= UPDATES * len(base.kept):
                 return self._updated(base, kept, into, out)
-        if self._diagonal is not None and len(kept) >= ITERATED and self._spent < FACTOR * len(kept) ** 3:
-            solve = self._by_iterations(kept, self._diagonal)
-            if solve is not None:
-                return solve
-        return self._eliminated(kept)
-
-    def _update_pays(self, base: _Base, into: Indices, out: Indices) -> bool:
-        """Return whether what has come and gone costs less than iterations."""
-        size = len(base.kept)
-        if self._diagonal is None or size < ITERATED:
-            return True
-        new = sum(int(i) not in self._columns for i in (*into, *out))
-        return COLUMN * new * size**2 <= self._expected * self._product_cost(size)
-
-    def _product_cost(self, size: int) -> float:
-        return float(size**2) if self._cost is None or self._multiply is None else self._cost
-
-    def _eliminated(self, kept: Indices) -> Solve:
-        self.base, self._columns, self._spent = None, {}, 0.0
+        self.base, self._columns = None, {}
         solve = eliminate(self._entries(kept, kept))
         place = np.full(int(kept.max(initial=0)) + 1, -1)
         place[kept] = np.arange(len(kept))
         self.base = _Base(kept, place, solve)
         return solve
-
-    def _by_iterations(self, kept: Indices, diagonal: Array) -> Solve | None:
-        """Return the solution operator by GMRES; None where the matrix is none for it."""
-        own = diagonal[kept]
-        border = np.flatnonzero(np.abs(own) <= SINGULAR * np.abs(own).max(initial=0.0))
-        if len(border) > BORDERS:
-            return None
-        near, multiply = _bordered(own, border, kept, self._entries), self._product(kept)
-        try:
-            solve = iterative(multiply, near, lambda iterations: self._count(iterations, len(kept)))
-        except np.linalg.LinAlgError:
-            return None
-
-        eliminated: Solve | None = None
-
-        def solve_or_eliminate(b: Array) -> Array:
-            nonlocal eliminated
-            if eliminated is None and self._spent < FACTOR * len(kept) ** 3:
-                try:
-                    return solve(b)
-                except NotSolvedError:
-                    pass
-            if eliminated is None:  # a set that stays has its factor in the end
-                eliminated = self._eliminated(kept)
-            return eliminated(b)
-
-        return solve_or_eliminate
-
-    def _count(self, iterations: int, size: int) -> None:
-        self.iterations += iterations
-        self._expected = iterations
-        self._spent += iterations * self._product_cost(size)
-
-    def _product(self, kept: Indices) -> Callable[[Array], Array]:
-        """Return the product with the rows and columns `kept`."""
-        if self._multiply is None:
-            matrix = self._entries(kept, kept)
-            return lambda x: matrix @ x
-        multiply, whole = self._multiply, np.zeros(len(self._diagonal if self._diagonal is not None else kept))
-
-        def product(x: Array) -> Array:
-            whole[kept] = x.ravel()
-            return multiply(whole)[kept]
-
-        return product
 
     def _updated(self, base: _Base, kept: Indices, into: Indices, out: Indices) -> Solve:
         size, come = len(base.kept), len(into)
@@ -224,27 +143,12 @@ class Updating:
         return solve
 
 
-def _bordered(
-    own: Array, border: NDArray[np.int64], kept: Indices, entries: Callable[[Indices, Indices], Array]
-) -> csc_array:
-    """Return the diagonal of some rows and columns, with the whole of those rows and columns that have none."""
-    size, inner = len(kept), np.setdiff1d(np.arange(len(kept)), border)
-    parts = [(inner, inner, own[inner])]
-    if len(border):
-        rows, columns = entries(kept[border], kept), entries(kept[inner], kept[border])
-        every = np.arange(size)
-        parts.append((np.repeat(border, size), np.tile(every, len(border)), rows.ravel()))
-        parts.append((np.repeat(inner, len(border)), np.tile(border, len(inner)), columns.ravel()))
-    i, j, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return csc_array(coo_array((values, (i, j)), shape=(size, size)))
-
-
 class Dense:
     """A matrix of numbers (size, size)."""
 
     def __init__(self, matrix: Array) -> None:
         self.matrix = matrix
-        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal())
+        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)])
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
@@ -255,26 +159,6 @@ class Dense:
         if len(kept) > LARGE:
             return self._updating.factor(kept)
         return eliminate(self.matrix[np.ix_(kept, kept)])
-
-
-@dataclass(frozen=True)
-class Shifted:
-    """A matrix of numbers (size, size) with others (n,) added to the first of its diagonal."""
-
-    matrix: Array
-    added: Array
-
-    def multiply(self, x: Array) -> Array:
-        """Return the matrix times x."""
-        found: Array = self.matrix @ x
-        found[: len(self.added)] += self.added * x[: len(self.added)]
-        return found
-
-    def factor(self, kept: Indices) -> Solve:
-        """Return the solution operator of the rows and columns `kept`."""
-        part, first = self.matrix[np.ix_(kept, kept)], np.searchsorted(kept, len(self.added))
-        part.flat[: first * (len(kept) + 1) : len(kept) + 1] += self.added[kept[:first]]
-        return eliminate(part)
 
 
 def eliminate(matrix: Array) -> Solve:
@@ -315,84 +199,187 @@ def _equilibrated(matrix: Array) -> Solve:
     return solve
 
 
-class Phases:
-    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + diag(d_j) + L_k R_j.
+class Blocks:
+    """The matrices A_k = [S_k, H; E_k, 0] of m phases, n pressures and the rigid modes each, and what is kept of them.
 
     Args:
-        blocks: A_k (m, size, size).
-        coupling: C (m, n, m, n) on the first n unknowns of each block; None where there is none.
+        matrices: (m, size, size).
+        nodes: n; the other unknowns are those of rigid modes.
+    """
+
+    def __init__(self, matrices: Array, nodes: int) -> None:
+        self.matrices, self.nodes = matrices, nodes
+        self.parts = [Dense(own) for own in matrices]
+        self._near: list[tuple[Array, Dense]] = []  # of the last steps, by their wear
+
+    @cached_property
+    def _mean(self) -> Array:
+        """The mean of the phases' S with the balance of forces added, for rigid modes open gaps, too."""
+        n = self.nodes
+        return np.asarray(sum(own[:n, :n] + own[:n, n:] @ own[n:, :n] for own in self.matrices) / len(self.matrices))
+
+    def added(self, diagonal: Array) -> Blocks:
+        """Return the same with numbers (m, n) added to their own nodes."""
+        found, every = self.matrices.copy(), np.arange(self.nodes)
+        found[:, every, every] += diagonal
+        return Blocks(found, self.nodes)
+
+    def near(self, wear: Array, touched: Indices) -> Solve:
+        """Return what is near the inverse of 1 + (sum of D_k) S^-1 on nodes that touch: S (S + sum of D_k)^-1.
+
+        That of another step serves whose wear is alike.
+
+        Args:
+            wear: D_k summed up (n,).
+            touched: Numbers of the nodes.
+        """
+        self._near.sort(key=lambda one: _unlike(one[0], wear))
+        if not self._near or _unlike(self._near[0][0], wear) > ALIKE:
+            self._near.insert(0, (wear, Dense(self._mean + np.diag(wear))))
+            del self._near[KEPT:]
+        own, matrix = self._near[0]
+        solve = matrix.factor(touched)
+        return lambda v: v - own[touched] * solve(v)
+
+
+def _unlike(one: Array, other: Array) -> float:
+    """Return the largest ratio of two wears (n,)."""
+    both = np.array([one, other])
+    least, most = both.min(axis=0), both.max(axis=0)
+    return float((most / np.where(least > 0, least, np.where(most > 0, TINY, 1.0))).max(initial=0.0))
+
+
+class Phases:
+    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + L_k R_j.
+
+    Where wear of the phases' own pressures opens all of them, D_k what unit pressure of phase k wears at its node,
+    L_k = 1 and R_j = D_j. The depth y that all phases have follows then from
+
+        (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
+
+    with the phases' factors, which do not change with the length of a step: 5 to 20 iterations of GMRES.
+
+    Args:
+        blocks: A_k.
+        coupling: C (m, n, m, n) on the nodes; None where there is none.
         border: L (m, n, q) and R (m, q, n), on the same; None where there is none.
-        local: d (m, n), in place of a border: what each unknown of phase j adds to its own place in all phases.
+        local: D (m, n), in place of a border.
     """
 
     def __init__(
         self,
-        blocks: Array,
+        blocks: Blocks,
         coupling: Array | None = None,
         border: tuple[Array, Array] | None = None,
         local: Array | None = None,
     ) -> None:
-        m, size, _ = blocks.shape
-        self.blocks, self.border = blocks, border
+        m, size, _ = blocks.matrices.shape
+        self.blocks, self.border, self.local = blocks, border, local
         self._whole: Dense | None = None
         if m == 1 and coupling is None and border is None and local is None:
-            self._whole = Dense(blocks[0])
+            self._whole = blocks.parts[0]
         elif m == 1 or coupling is not None or m * size <= DENSE:
-            self._whole = Dense(whole(blocks, coupling, border, local))
-        elif local is not None:
-            unit, n = np.eye(local.shape[1]), local.shape[1]
-            self.border = np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
+            self._whole = Dense(whole(blocks.matrices, coupling, border, local))
+        elif local is not None and blocks.nodes <= DIRECT:
+            self.border = _as_border(local)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (m size,)."""
         if self._whole is not None:
             return self._whole.multiply(x)
-        parts = x.reshape(len(self.blocks), -1)
-        result = np.matmul(self.blocks, parts[:, :, None])[:, :, 0]
+        n, parts = self.blocks.nodes, x.reshape(len(self.blocks.parts), -1)
+        result = np.matmul(self.blocks.matrices, parts[:, :, None])[:, :, 0]
         if self.border is not None:
             left, right = self.border
-            n = left.shape[1]
             result[:, :n] += left @ np.einsum("kqn,kn->q", right, parts[:, :n])
+        elif self.local is not None:
+            result[:, :n] += (self.local * parts[:, :n]).sum(axis=0)
         return result.ravel()
 
     def factor(self, kept: Indices) -> Solve:
         """Return the solution operator of the rows and columns `kept`.
 
+        Raises:
+            LinAlgError: they are singular.
+        """
+        if self._whole is not None:
+            return self._whole.factor(kept)
+        size, m = self.blocks.matrices.shape[1], len(self.blocks.parts)
+        cuts = list(np.searchsorted(kept, np.arange(m + 1) * size))
+        own: list[Indices] = [kept[cuts[k] : cuts[k + 1]] - np.int32(k * size) for k in range(m)]
+        solves = [part.factor(rows) for part, rows in zip(self.blocks.parts, own, strict=True)]
+        nodes = [rows[rows < self.blocks.nodes] for rows in own]
+
+        def apart(b: Array) -> list[Array]:
+            return [solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)]
+
+        if self.border is not None:
+            return self._eliminated(self.border, own, solves, apart)
+        if self.local is None:
+            return lambda b: np.concatenate(apart(b))
+        wear, touched = self.local, np.unique(np.concatenate(nodes)).astype(np.int32)
+        at = [np.searchsorted(touched, one) for one in nodes]
+        near = self.blocks.near(wear.sum(axis=0), touched)
+
+        def worn(parts: Sequence[Array]) -> Array:
+            depth = np.zeros(len(touched))
+            for there, k in zip(at, range(m), strict=True):
+                depth[there] += wear[k, nodes[k]] * parts[k][: len(there)]
+            return depth
+
+        def opened(depth: Array) -> list[Array]:
+            right = np.zeros(len(kept))
+            for k, there in enumerate(at):
+                right[cuts[k] : cuts[k] + len(there)] = depth[there]
+            return apart(right)
+
+        def solve(b: Array) -> Array:
+            first = apart(b)
+            try:
+                y = solution(lambda v: v + worn(opened(v)), near, worn(first))
+            except np.linalg.LinAlgError:
+                return self._eliminated(_as_border(wear), own, solves, apart)(b)
+            return np.concatenate(first) - np.concatenate(opened(y))
+
+        return solve
+
+    def _eliminated(
+        self,
+        border: tuple[Array, Array],
+        kept: Sequence[Indices],
+        solves: Sequence[Solve],
+        apart: Callable[[Array], list[Array]],
+    ) -> Solve:
+        """Return the solution operator, with what lies between the phases eliminated.
+
         With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
         (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
         blocks, where an elimination of the whole would grow with its cube.
         """
-        if self._whole is not None:
-            return self._whole.factor(kept)
-        m, size, _ = self.blocks.shape
-        cuts = list(np.searchsorted(kept, np.arange(m + 1) * size))
-        own: list[Indices] = [kept[cuts[k] : cuts[k + 1]] - k * size for k in range(m)]
-        solves = [eliminate(self.blocks[k][np.ix_(rows, rows)]) for k, rows in enumerate(own)]
-        if self.border is None:
-            return lambda b: np.concatenate([solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)])
-        left, right = self.border
-        n, q = left.shape[1:]
-        columns: list[Array] = []
-        rights: list[Array] = []
-        schur: Array = np.eye(q)
-        for k, (solve_block, rows) in enumerate(zip(solves, own, strict=True)):
-            nodes = rows[rows < n]
-            by_between = np.zeros((len(rows), q))
-            by_between[: len(nodes)] = left[k][nodes]
+        left, right = border
+        columns, rights, schur = list[Array](), list[Array](), np.eye(left.shape[2])
+        for k, (solve_block, rows) in enumerate(zip(solves, kept, strict=True)):
+            own = rows[rows < self.blocks.nodes]
+            by_between = np.zeros((len(rows), left.shape[2]))
+            by_between[: len(own)] = left[k][own]
             columns.append(solve_block(by_between))
-            rights.append(right[k][:, nodes])
-            schur = schur + rights[k] @ columns[k][: len(nodes)]
+            rights.append(right[k][:, own])
+            schur += rights[k] @ columns[k][: len(own)]
         solve_schur = eliminate(schur)
 
         def solve(b: Array) -> Array:
-            parts = [solve_block(b[cuts[k] : cuts[k + 1]]) for k, solve_block in enumerate(solves)]
-            between = np.zeros(q)
-            for at, part in zip(rights, parts, strict=True):
-                between += at @ part[: at.shape[1]]
-            y = solve_schur(between)
+            parts = apart(b)
+            y = solve_schur(np.sum([at @ part[: at.shape[1]] for at, part in zip(rights, parts, strict=True)], axis=0))
             return np.concatenate([part - by @ y for part, by in zip(parts, columns, strict=True)])
 
         return solve
+
+
+def _as_border(local: Array) -> tuple[Array, Array]:
+    """Return L and R of what unit pressures wear at their own nodes (m, n)."""
+    m, n = local.shape
+    unit = np.eye(n)
+    return np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
 
 
 def whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None, local: Array | None) -> Array:

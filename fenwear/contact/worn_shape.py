@@ -27,10 +27,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
-from fenwear.contact.krylov import NotSolvedError, gmres_solution
+from fenwear.contact.krylov import solution
 from fenwear.contact.operators import Dense, Indices, Solve, Updating, eliminate
 
-ENOUGH = 2e-12  # residual, scaled to 1, that ends the iterations
 WHOLE = 600
 
 
@@ -258,7 +257,6 @@ class ByShape:
 
     def __init__(self, equations: ShapeEquations, wear: Sequence[csr_array], held: Array) -> None:
         self.equations, self.wear, self.held = equations, list(wear), held
-        self.iterations = 0
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
@@ -282,7 +280,7 @@ class ByShape:
             right[kept] = b
             try:
                 return reduced.solve(right)[kept]
-            except NotSolvedError:
+            except np.linalg.LinAlgError:
                 return equations.whole(self.wear, self.held).factor(kept)(b)
 
         return solve
@@ -373,7 +371,7 @@ class _Reduced:
         """Return all unknowns for the right sides of all rows, those that are not free zero.
 
         Raises:
-            NotSolvedError: GMRES did not converge.
+            LinAlgError: GMRES did not converge.
         """
         m, n, r = self.equations.shape
         gaps, wear = right[: m * n].reshape(m, n), right[m * n : (m + 1) * n]
@@ -383,10 +381,7 @@ class _Reduced:
         target = -self._rows(p, none, none[0], np.zeros(r))
         target[len(target) - r :] += forces[0]
         target[len(target) - r - len(self.shaped) : len(target) - r] += wear[self.shaped]
-        y = gmres_solution(self.multiply, self.precondition, target, self._count, ENOUGH)
+        y = solution(self.multiply, self.precondition, target)
         thermal, omega, velocity = self._opened(y)
         p, a = self.pressed(gaps - thermal - omega, forces)
         return np.concatenate([p.ravel(), omega, a.ravel(), velocity])
-
-    def _count(self, iterations: int) -> None:
-        self.derivative.iterations += iterations

@@ -132,7 +132,7 @@ class PhaseStep:
         self._wears_after = apart and friction.constant
         self._slides_before = apart and not friction.constant and not asks("p", "pm")
         follows = apart and not system.exchange.conducts and asks("p", "pm")
-        self._contact = system.passed_contact(phase, following=follows)
+        self._contact = system.passed_contact(phase)
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
         self._kind = ThermalContact if system.exchange.conducts else ColdContact
         self._thermal = self._kind(system, phase, self._contact)

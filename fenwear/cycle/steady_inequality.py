@@ -10,7 +10,6 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState
-from fenwear.contact.blocks import PhaseBlock
 from fenwear.contact.grid_shape import GridShape
 from fenwear.contact.gridded import PhasesGrid
 from fenwear.contact.inequality import AT_BOUND, Inequality
@@ -117,8 +116,8 @@ class SteadyInequality:
         found = [own.compliance(ratio, scale, known).on_grid for own, ratio in zip(interfaces, ratios, strict=True)]
         if None in found:
             return None
-        blocks = [PhaseBlock(one, one.diagonal(), modes, balances[k]) for k, one in enumerate(found) if one is not None]
-        return PhasesGrid(blocks, self.system.pairs)
+        on_grid = [one for one in found if one is not None]
+        return PhasesGrid(on_grid, [modes] * len(on_grid), list(balances), self.system.pairs)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None = None) -> None:  # noqa: ARG002
         """Take friction and wear at the conditions of the phases; what states of laws do there, they have done."""

@@ -33,9 +33,9 @@ def fenwear() -> Found:
     """Return the times of our contact inequality, with the influence of constant pressures on squares."""
     import large_contact
 
-    cold, *_ = large_contact.wear(SIDE, 1, [1.0], "iterated")
-    two, *_ = large_contact.wear(SIDE, 2, [1.0, 1.02], "iterated")
-    every, _, touching, p = large_contact.wear(SIDE, STEPS, [1.0], "iterated")
+    cold, *_ = large_contact.wear(SIDE, 1, [1.0], "factors")
+    two, *_ = large_contact.wear(SIDE, 2, [1.0, 1.02], "factors")
+    every, _, touching, p = large_contact.wear(SIDE, STEPS, [1.0], "factors")
     return cold[0], two[1], sum(every), touching[-1], float(p.max())
 
 

@@ -65,7 +65,6 @@ def test_blocks_are_the_matrix(seed: int, m: int, heat: bool, local: bool) -> No
     for operator in (blocks, whole):
         found = operator.factor(kept)(b)
         np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
-    assert blocks.iterations > 0
 
 
 @given(SEEDS, st.sampled_from([1, 2, 3]), st.booleans())
@@ -99,16 +98,19 @@ def test_worn_shape(seed: int, m: int, local: bool) -> None:
     np.testing.assert_allclose(x, np.linalg.solve(whole, b), rtol=0, atol=1e-14 * scale * np.linalg.cond(whole))
 
 
-def test_iterations_do_not_grow() -> None:
+def test_iterations_do_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """The preconditioner is as near with 400 nodes as with 50, and for 2 phases as for 12."""
     random = np.random.default_rng(2)
-    counts = []
+    counts, products = list[int](), list[int]()
+    multiply = worn_shape._Reduced.multiply
+    monkeypatch.setattr(worn_shape._Reduced, "multiply", lambda self, y: (products.append(1), multiply(self, y))[1])
     for m, n in ((2, 50), (2, 400), (12, 50)):
         system = equations(m, n, random, heat=False)
         kept, held = free(system, random)
         blocks = ByShape(system, [csr_array(np.eye(n))] * m, held)
+        products.clear()
         blocks.factor(kept)(random.uniform(-1, 1, len(kept)))
-        counts.append(blocks.iterations)
+        counts.append(len(products))
     assert max(counts) < 1.5 * counts[0] < 60
 
 

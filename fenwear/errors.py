@@ -83,7 +83,7 @@ class MeshQualityError(ConvergenceError):
 
 
 FULL_START = "contact solved from full contact on"
-PIVOTS = "contact solved by pivots"
+INTERIOR = "contact solved by an interior-point method"
 SOFTER_START = "contact solved by way of softer bodies"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"

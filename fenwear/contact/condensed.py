@@ -26,7 +26,7 @@ from fenwear.arrays import Array, Mask, Nodes
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
 from fenwear.contact.operators import Blocks, Dense, Operator, Phases, Solve, eliminate
-from fenwear.errors import FULL_START, PIVOTS, SOFTER_START, ConvergenceError, Remedies
+from fenwear.errors import FULL_START, INTERIOR, SOFTER_START, ConvergenceError, Remedies
 from fenwear.interface import Interface
 from fenwear.interface.compliance import EVERY
 from fenwear.interface.convolution import GridCompliance
@@ -39,7 +39,6 @@ NUDGE = 1e-6  # of the largest pressure, for differences
 NONE = np.zeros(())
 SETTLED, ROUNDS = 1e-10, 50  # change of gaps over those of the load that ends iterations of friction; the most of them
 STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
-PIVOTED = 3000  # unknowns up to which pivots are tried: their cost is the number's third power
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
 
@@ -467,9 +466,9 @@ class CondensedContact:
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
         """Return the solution: unknowns, residual and iterations.
 
-        SNES starts from a contact that is given, else from full contact. Where both fail a homotopy in the bodies'
-        compliance leads to the solution. Where that fails, too, Lemke's method does, but for many unknowns, for a
-        largest pressure, and where heat bulges the surfaces: there may be solutions that time does not lead to.
+        SNES starts from a contact that is given, else from full contact. Where both fail the interior-point method
+        leads to the solution, but without a matrix, for a largest pressure, and where heat bulges the surfaces, which
+        it has no proof for: there a homotopy in the bodies' compliance does.
         """
         n, inequality = self.shape[1], self.inequality
         if start is not None:
@@ -484,8 +483,8 @@ class CondensedContact:
         failure: ConvergenceError | None = None
         for remedy, found in (
             (FULL_START if start is not None else "", inequality.solve),
+            (INTERIOR, self._from_inside),
             (SOFTER_START, self._from_softer_bodies),
-            (PIVOTS, self._by_pivots),
         ):
             try:
                 x = found(begin.ravel())
@@ -498,17 +497,15 @@ class CondensedContact:
         assert failure is not None
         raise failure
 
-    def _by_pivots(self, begin: Array) -> Array:
-        """Return the solution by Lemke's method.
+    def _from_inside(self, begin: Array) -> Array:
+        """Return the solution by the interior-point method.
 
         Raises:
             ConvergenceError: it does not find one, or the contact is none for it.
         """
-        if self.size > PIVOTED or self._coupling is not None or self.most < np.inf:
-            raise ConvergenceError(
-                f"{self.inequality.name} has too many unknowns for pivots, a largest pressure or heat"
-            )
-        return self.inequality.solve_by_pivots(begin)
+        if self._coupling is not None or self.most < np.inf:
+            raise ConvergenceError(f"{self.inequality.name} has a largest pressure or heat")
+        return self.inequality.solve_from_inside(begin)
 
     def _from_softer_bodies(self, begin: Array) -> Array:  # noqa: ARG002 (its own start)
         """Return the solution by way of softer bodies, whose contact is larger.

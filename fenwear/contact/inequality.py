@@ -10,8 +10,8 @@ own set, whose factor is kept. The next set holds what has come out beyond a bou
 residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). Where sets come again and
 again, SNES starts. An operator whose solutions cost by their digits goes through sets itself, to some of them.
 
-Where SNES does not converge Lemke's method does, which ends at a solution wherever there is one, for matrices as those
-of contact without friction (see `fenwear.contact.pivoting`).
+Where SNES does not converge an interior-point method does, which ends at a solution wherever there is one, for matrices
+as those of contact without friction (see `fenwear.contact.interior`).
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
-from fenwear.contact.operators import Approximate, Indices, Operator, Solve
-from fenwear.contact.pivoting import complementary
+from fenwear.contact.interior import complementary
+from fenwear.contact.operators import Approximate, Dense, Indices, Operator, Phases, Solve
 from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
@@ -36,7 +36,7 @@ EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave o
 SETS = 40  # steps, each on a set of its own, before SNES starts
 AGAIN = 2  # times that a set may come again: where the derivative changes it is another one
 FALLS = 0.3  # of the residual in a step: by less rounding may be at its end
-PIVOTS_COST = 10  # iterations of SNES, as which pivots are counted that look for the set
+INTERIOR_COST = 10  # iterations of SNES, as which a linear problem by the interior-point method counts
 ROUNDS = 40  # of some digits each, where the derivative changes
 CLOSE = 1e-9  # of residuals, where solutions cost by their digits
 
@@ -195,24 +195,25 @@ class Inequality:
             x = self._by_sets(start)
         return self._by_snes(start, most) if x is None else x
 
-    def solve_by_pivots(self, start: Array) -> Array:
-        """Return the solution (size,) by Lemke's method, of the derivative at the start, at its solution, and so on.
+    def solve_from_inside(self, start: Array) -> Array:
+        """Return the solution (size,) by the interior-point method, of the derivative at the start, and so on.
 
         There have to be lower bounds alone, and they have to be zero.
 
         Raises:
-            ConvergenceError: pivots find none, or their solutions do not settle.
+            ConvergenceError: it finds none, its solutions do not settle, or the derivative is no matrix.
         """
         x, free = start, np.isneginf(self._lower)
         snes = self._snes = self._snes or self._make()
-        for _ in range(snes.getTolerances()[3] // PIVOTS_COST):  # options that limit SNES limit this
+        for _ in range(snes.getTolerances()[3] // INTERIOR_COST):  # options that limit SNES limit this
             operator = self._jacobian(x)
-            matrix = np.array([operator.multiply(unit) for unit in np.eye(len(x))]).T
-            x = complementary(matrix, self._function(x) - operator.multiply(x), free)
+            if not isinstance(operator, Dense | Phases):
+                break
+            x = complementary(operator.matrix, self._function(x) - operator.multiply(x), free)
             found = self._by_sets(x)
             if found is not None:
                 return found
-        raise ConvergenceError(f"{self.name} did not converge by pivots")
+        raise ConvergenceError(f"{self.name} did not converge from inside its bounds")
 
     def _by_sets(self, start: Array) -> Array | None:
         """Return the solution by a step of Newton's on each of a sequence of sets; None where they come again."""

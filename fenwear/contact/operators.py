@@ -283,6 +283,13 @@ class Phases:
         elif local is not None and blocks.nodes <= DIRECT:
             self.border = _as_border(local)
 
+    @cached_property
+    def matrix(self) -> Array:
+        """All of it (m size, m size)."""
+        blocks = self.blocks.matrices
+        local = self.local if self.border is None else None
+        return whole(blocks, None, self.border, local) if self._whole is None else self._whole.matrix
+
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (m size,)."""
         if self._whole is not None:

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from fenwear import ConvergenceError, Tribosystem, assemble, march
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
-from fenwear.errors import SOFTER_START
+from fenwear.errors import INTERIOR
 from fenwear.interface import Interface
 from fenwear.sliding.wear import WornDepths
 from fenwear_verify.full_space import FullContact
@@ -165,7 +165,7 @@ def test_a_steel_ball_on_a_few_nodes_of_a_steel_cup(assembled: Callable[..., Tri
         rigid, ratio = own.rigid, system.friction_ratios()[phase]
         np.testing.assert_allclose(rigid.equilibrium(ratio) @ pressure, -rigid.resultant, rtol=0, atol=1e-6)
         assert 3 <= (pressure > 0).sum() < 8
-    assert ways[SOFTER_START] > 0
+    assert ways[INTERIOR] > 0
 
 
 def test_friction_follows_the_pressure_of_many_nodes(

@@ -1,4 +1,4 @@
-"""Lemke's method against every set of unknowns that may be at zero."""
+"""The interior-point method against every set of unknowns that may be at zero."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenwear.arrays import Array
-from fenwear.contact.pivoting import complementary
+from fenwear.contact.interior import complementary
 from fenwear.errors import ConvergenceError
 
 FREE = np.array([False] * 7 + [True])
@@ -53,11 +53,11 @@ def test_alike_nodes_do_not_go_round() -> None:
     springs, ones = np.eye(6), np.ones((6, 1))
     matrix = np.block([[springs, ones], [ones.T, np.zeros((1, 1))]])
     x = complementary(matrix, np.append(np.zeros(6), -3.0), np.array([False] * 6 + [True]))
-    np.testing.assert_allclose(x, [0.5] * 6 + [-0.5], rtol=1e-14)
+    np.testing.assert_allclose(x, [0.5] * 6 + [-0.5], rtol=1e-12)
 
 
 def test_a_load_that_nothing_carries() -> None:
     matrix, vector = contact(np.random.default_rng(0), 0.0)
     vector[7] = 1.0  # it pulls
-    with pytest.raises(ConvergenceError, match="ray"):
+    with pytest.raises(ConvergenceError):
         complementary(matrix, vector, FREE)

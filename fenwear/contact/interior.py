@@ -9,6 +9,8 @@ wherever there is one, in a number of steps that hardly grows with that of unkno
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
@@ -41,6 +43,9 @@ def complementary(matrix: Array, vector: Array, free: Mask) -> Array:
         rest[bounded] -= w
         if max(float(np.abs(rest).max()), float(products.mean()) / size) <= CLOSE * size:
             x[bounded[x[bounded] < w]] = 0.0
+            kept = np.flatnonzero(free | (x > 0))
+            with suppress(np.linalg.LinAlgError):  # where several solutions have this set the path's end is one of them
+                x[kept] = np.linalg.solve(matrix[np.ix_(kept, kept)], -vector[kept])
             return x
         if not w.max() < FAR * size:
             break

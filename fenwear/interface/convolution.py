@@ -40,7 +40,7 @@ from fenwear.bodies.convolution import (
 )
 
 T = TypeVar("T")
-WASTE = 1.5  # of a box: how much larger than needed it may be
+WASTE = 1.3  # of a box: how much larger than needed along an axis it may be
 LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may leave of it
 STIFF = 3.0, 20.0  # of tangents, over what a node's own traction moves it
 MARGIN = {1: 2.0, 2: 1.0}  # of a line, of a rectangle: the period of what is inverted, which does not end
@@ -188,8 +188,11 @@ class Boxes(Generic[T]):
 
     def around(self, touched: NDArray[np.int64]) -> T:
         """Return that of a box around some nodes."""
-        box = Box.around(self.places, self._shape, touched)
-        if not any(last.holds(self.places[touched]) and last.size <= WASTE * box.size for last, _ in self._last):
+        places = self.places[touched]
+        wide = np.ptp(places, axis=0) + 1
+        largest = np.maximum(WASTE * wide, wide + 4)
+        if not any(last.holds(places) and (np.array(last.counts) <= largest).all() for last, _ in self._last):
+            box = Box.around(self.places, self._shape, touched)
             self._last = [(box, self._make(box))]
         return self._last[0][1]
 

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator
 
 from fenwear import Tribosystem, assemble, load_case, march
 from fenwear.arrays import Array
-from fenwear.cycle import explicit_limit, stability_number
+from fenwear.cycle import stability, stability_number
 
 MEAN = 1e4 / 600
 EVEN = ("geometry.degree=1", "geometry.parameters.edge_grading=1", "geometry.parameters.elements_along_contact=32")
@@ -71,5 +71,5 @@ def test_modes_that_lie_together(monkeypatch: pytest.MonkeyPatch) -> None:
         largest.append(np.abs(np.linalg.eigvals(operator @ np.eye(operator.shape[0]))).max())
         raise ArpackNoConvergence("not apart", np.zeros(0), np.zeros((0, 0)))
 
-    monkeypatch.setattr(explicit_limit, "eigs", not_apart)
+    monkeypatch.setattr(stability, "eigs", not_apart)
     assert stability_number(system) == pytest.approx(max(largest) / 2, rel=0.02)

@@ -329,7 +329,7 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
     resumed, whole = tmp_path / "resumed", tmp_path / "whole"
     with running(resumed, *settings, case=case) as process:
         if name == "followed meshes":
-            _wait_for(resumed, "followed_punch")
+            _wait_for(resumed, "followed.punch")
         process.send_signal(signal.SIGKILL)
         process.communicate(timeout=PATIENCE)
     with np.load(resumed / "checkpoint" / "state.npz") as moment:
@@ -467,14 +467,14 @@ def test_nan_in_a_checkpoint(fenwear: Run, tmp_path: Path) -> None:
     path = folder / "checkpoint" / "state.npz"
     with np.load(path) as stored:
         arrays = dict(stored)
-    arrays["wear"][3] = np.nan
+    arrays["state.worn.punch"][3] = np.nan
     np.savez(path, **arrays)
     done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume")
     assert done.returncode == 2, done.stderr
     assert "is damaged" in done.stderr
 
 
-@pytest.mark.parametrize("array", ["wear_strip", "followed_punch", "followed_strip"])
+@pytest.mark.parametrize("array", ["state.worn.strip", "followed.punch", "followed.strip"])
 @pytest.mark.parametrize("damage", ["NaN", "too short", "missing"])
 def test_damaged_depths_in_a_checkpoint(fenwear: Run, tmp_path: Path, array: str, damage: str) -> None:
     """Of the strip's wear and of what the meshes follow."""

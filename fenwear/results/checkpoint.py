@@ -339,13 +339,15 @@ def _read(folder: Path, case: Case) -> tuple[Checkpoint, dict[str, Any]]:
 
 
 def _check_sizes(folder: Path, kept: Checkpoint, system: Tribosystem) -> None:
-    """Raise where depths and totals are not those of a system on the checkpoint's grid."""
-    expected, worn = system.unworn(), kept.state.worn
-    for own, like in ((worn, expected), (kept.followed or worn, expected), (kept.state.totals, none_yet(system))):
+    """Raise where depths and totals are not those of a system on the checkpoint's grid, or are no numbers."""
+    expected = system.unworn()
+    worn = kept.state.worn
+    followed = kept.followed or worn
+    for own, like in ((worn, expected), (followed, expected), (kept.state.totals, none_yet(system))):
         pairs = [(getattr(own, field.name), getattr(like, field.name)) for field in fields(like)]
         if any(values.shape != wanted.shape for values, wanted in pairs):
             raise damaged(folder)
-    if not all(np.isfinite(depth).all() for depth in (worn.punch, worn.strip)):
+    if not all(np.isfinite(depth).all() for one in (worn, followed) for depth in (one.punch, one.strip)):
         raise damaged(folder)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -238,3 +239,16 @@ def test_crossed_cylinders_touch_in_hertz_ellipse() -> None:
         assert np.sqrt(5 * np.average(system.pair.punch.x[:, along] ** 2, weights=carried)) == pytest.approx(
             half_axis, rel=0.04
         )
+
+
+def test_friction_heats_a_pin() -> None:
+    """With the heat of its last lines, and where nodes in contact alone conduct, a pin keeps all heat (line 24)."""
+    text = fill_in(find_template("pin-on-disc"))
+    tables = tomllib.loads(re.sub(r"^# (\[heat\]|convection =|track =)", r"\1", text, flags=re.MULTILINE))
+    tables["geometry"]["degree"] = 1
+    case = make_case(tables)
+    assert case.heat.conducting == "closed"
+    (block,) = march(assemble(case), 2)
+    assert block.pressure.min() > 0
+    assert block.heat.balance_error.max() < 1e-9
+    assert block.heat.largest_temperature[-1] > block.heat.largest_temperature[0] > 0

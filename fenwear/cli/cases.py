@@ -200,7 +200,8 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     if system.heat is None:
         return system, []
     nodes = sum(body.space.dofmap.index_map.size_global for body in system.bodies.heat)
-    log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does, for at most {seconds:g} s")
+    limit = f", for at most {seconds:g} s" if system.comm.size == 1 else ""  # ranks do not end together
+    log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does{limit}")
     try:
         with time_limit(seconds, system.comm):
             warm = with_reduced_heat(system, keep=True)

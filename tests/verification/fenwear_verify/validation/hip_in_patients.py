@@ -7,7 +7,6 @@ import numpy as np
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
 from fenwear_verify.validation.runs import history_of
 
-YEARS, CYCLES = 10, 10_000_000  # a million cycles a year
 PINS = 0  # row of the flat pins of GUR 1050 in the table of wear factors
 # Standard uncertainties of the inputs as shares of the penetration, which goes with k N F / R; the pins' are measured.
 DIAMETER = 0.10  # heads between 22 and 32 mm, all alike likely
@@ -37,8 +36,8 @@ def compare(scope: Scope) -> Finding:
     """Return the comparison with both studies."""
     measured, factors = table("hip_in_patients.csv"), table("polyethylene.csv")
     factor, deviation = factors["wear factor (1e-6 mm3/Nm)"][PINS], factors["deviation"][PINS]
-    settings = [f"wear.punch.coefficient={1e-9 * factor} 1/MPa", f"run.half_cycles={CYCLES}"]
-    history, _ = history_of("ball-in-cup", settings, SHORT, scope)
+    settings = [f"wear.punch.coefficient={1e-9 * factor} 1/MPa"]
+    history, _ = history_of("hip_in_patients.toml", settings, SHORT, scope)
     years, depth = 1e-6 * history["half_cycle"].values, history["largest_depth"].values
     share = float(np.sqrt((deviation / factor) ** 2 + DIAMETER**2 + ACTIVITY**2 + WEIGHT**2))
     curves = [Curve("from the pins' wear factor", years, depth, share * depth)]

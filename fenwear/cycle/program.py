@@ -169,12 +169,17 @@ def loading_of(system: Tribosystem, stage: Stage) -> Loading:
     """Return the factor of all loads over a stage, linear in the half-cycles.
 
     Raises:
-        CaseError: a load is given where supports and not the contact carry the loads.
+        CaseError: a load is given where supports and not the contact carry the loads, or the hardness does not carry
+            it.
     """
     ends = stage.load_factor
     if stage.load is not None:
         nominal = _nominal(system, f"program.steps.{stage.step}.load")
         ends = stage.load[0] / nominal, stage.load[1] / nominal
+    mean = max(ends) * system.rigid.mean_pressure
+    if system.layers.hardness <= mean:
+        message = f"expected more than the mean pressure of {mean:.6g} MPa in program.steps.{stage.step}"
+        raise CaseError(InputError("contact.hardness", f"{message}: nothing softer carries the load"))
     if ends == (1.0, 1.0):
         return as_given
     first, last = ends

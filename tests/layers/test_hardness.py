@@ -9,6 +9,7 @@ import pytest
 
 from fenwear import assemble, load_case, march
 from fenwear.cycle import Block, evolve
+from fenwear.errors import CaseError
 from fenwear.layers.between import PLASTIC
 
 LENGTHS = {
@@ -120,3 +121,12 @@ def test_half_cycles_in_which_little_flows(tmp_path: Path) -> None:
     assert flown[0] > 0
     assert flown == pytest.approx(flown[0], rel=1e-5)
     assert block.pressure.max() == pytest.approx(5500, rel=1e-7)
+
+
+def test_a_step_of_a_program_is_no_heavier_than_the_hardness_carries() -> None:
+    """Twice 16.7 MPa in the mean on a hardness of 25 MPa: rejected by key, as without a program."""
+    settings = ("geometry.parameters.elements_along_contact=4", "geometry.degree=1", "contact.hardness='25 MPa'")
+    for step in ("load_factor=[1, 2]", "load=['10 kN', '20 kN']"):
+        case = load_case("example2", [*settings, f"program={{steps=[{{cycles=1, {step}}}]}}", "run.half_cycles=2"])
+        with pytest.raises(CaseError, match=r"contact.hardness.*33\.33"):
+            list(evolve(assemble(case)))

@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import solution
-from fenwear.contact.operators import Dense, Indices, Solve, Updating, eliminate
+from fenwear.contact.operators import Dense, Indices, Solve, Updating
 
 WHOLE = 600
 
@@ -174,7 +174,7 @@ class ShapeEquations(ShapeRows):
             own[np.diag_indices_from(own)] += slope
         return replace(self, compliances=found)
 
-    def derivative(self, wear: Sequence[csr_array], held: Array) -> WornShape | ByShape:
+    def derivative(self, wear: Sequence[csr_array], held: Array) -> Dense | ByShape:
         """Return the left side's derivative with wear, as the number of unknowns makes it cheapest.
 
         Args:
@@ -183,7 +183,7 @@ class ShapeEquations(ShapeRows):
         """
         return self.whole(wear, held) if self.size <= WHOLE else ByShape(self, wear, held)
 
-    def whole(self, wear: Sequence[csr_array], held: Array) -> WornShape:
+    def whole(self, wear: Sequence[csr_array], held: Array) -> Dense:
         """Return the same as one matrix."""
         (m, n, _), matrix = self.shape, self.matrix()
         omega = np.arange(m * n, (m + 1) * n)
@@ -191,61 +191,7 @@ class ShapeEquations(ShapeRows):
             rows, columns = own.nonzero()
             matrix[m * n + rows, k * n + columns] -= own[rows, columns]
         matrix[omega, omega] += held
-        return WornShape(matrix, m, n)
-
-
-class WornShape(Dense):
-    """The derivative of the cyclic steady state as one matrix, for few unknowns.
-
-    Rows of phase k hold omega_i once, with the factor 1; rows of the wear balance hold p_ki once a phase where
-    wear is local. A node that touches gives both: omega_i by its gap in the phase that wears it most, and p
-    there by the wear balance. What is left to eliminate are the pressures of the other phases: (m - 1) n and
-    a few unknowns in place of (m + 1) n. For two phases that is a 27th of the work.
-
-    Args:
-        matrix: Its numbers (size, size).
-        phases: m.
-        nodes: n.
-    """
-
-    def __init__(self, matrix: Array, phases: int, nodes: int) -> None:
-        super().__init__(matrix)
-        self.shape = (phases, nodes)
-
-    def factor(self, kept: Indices) -> Solve:
-        """Return the solution operator of the rows and columns `kept`."""
-        (m, n), matrix = self.shape, self.matrix
-        free = np.zeros(len(matrix), dtype=bool)
-        free[kept] = True
-        nodes, balance = np.arange(n), m * n + np.arange(n)
-        wear = np.abs(matrix[balance, np.arange(m * n).reshape(m, n)]) * free[: m * n].reshape(m, n)
-        most = wear.argmax(axis=0)
-        shaped = free[balance] & (wear.max(axis=0) > 0) & (matrix[balance, balance] == 0)
-        gap = (most * n + nodes)[shaped].astype(np.int32)  # rows of the gap, and columns of the pressure in it
-        shape = balance[shaped].astype(np.int32)  # rows of the wear balance, and columns of omega
-        local = csr_array(matrix[np.ix_(shape, gap)])
-        if not len(gap) or local.nnz != len(gap):  # what one node wears opens others, too
-            return super().factor(kept)
-        rest = np.setdiff1d(kept, np.concatenate([gap, shape]))
-        by_pressure, by_shape = matrix[np.ix_(rest, gap)], csr_array(matrix[np.ix_(rest, shape)])
-        # p = p_0 - Q z and omega = omega_0 - O z, with z what is left.
-        slope = matrix[shape, gap]
-        compliance = matrix[np.ix_(gap, gap)]
-        pressures = csr_array(csr_array(matrix[np.ix_(shape, rest)]) / slope[:, None])
-        shapes = matrix[np.ix_(gap, rest)] - compliance @ pressures
-        solve_rest = eliminate(matrix[np.ix_(rest, rest)] - by_pressure @ pressures - by_shape @ shapes)
-        where = np.searchsorted(kept, np.concatenate([gap, shape, rest]))
-        at_gap, at_shape, at_rest = np.split(where, np.cumsum([len(gap), len(shape)]))
-
-        def solve(b: Array) -> Array:
-            x = np.empty_like(b)
-            pressure = (b[at_shape].T / slope).T
-            omega = b[at_gap] - compliance @ pressure
-            z = solve_rest(b[at_rest] - by_pressure @ pressure - by_shape @ omega)
-            x[at_gap], x[at_shape], x[at_rest] = pressure - pressures @ z, omega - shapes @ z, z
-            return x
-
-        return solve
+        return Dense(matrix)
 
 
 class ByShape:

@@ -10,8 +10,8 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.contact import worn_shape
-from fenwear.contact.operators import Indices
-from fenwear.contact.worn_shape import ByShape, ShapeEquations, WornShape
+from fenwear.contact.operators import Dense, Indices
+from fenwear.contact.worn_shape import ByShape, ShapeEquations
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -67,37 +67,6 @@ def test_blocks_are_the_matrix(seed: int, m: int, heat: bool, local: bool) -> No
         np.testing.assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
 
 
-@given(SEEDS, st.sampled_from([1, 2, 3]), st.booleans())
-def test_worn_shape(seed: int, m: int, local: bool) -> None:
-    """Node by node and then the rest: the same solution as by one elimination, whichever rows are kept."""
-    random = np.random.default_rng(seed)
-    n, more = 12, 2 * m
-    size = m * n + n + more
-    matrix = np.zeros((size, size))
-    matrix[: m * n, : m * n] = random.uniform(-1, 1, (m * n, m * n)) / n + np.eye(m * n)
-    omega, last = slice(m * n, m * n + n), slice(m * n + n, None)
-    for k in range(m):
-        rows = slice(k * n, (k + 1) * n)
-        matrix[rows, omega] = np.eye(n)
-        wear = np.diag(random.uniform(0.5, 1, n)) + (0 if local else random.uniform(0, 0.1, (n, n)))
-        matrix[omega, rows] = -wear
-    matrix[: m * n, last] = random.uniform(-1, 1, (m * n, more))
-    matrix[omega, last] = random.uniform(-1, 1, (n, more))
-    matrix[last, : m * n] = random.uniform(-1, 1, (more, m * n))
-    opened = m * n + np.flatnonzero(random.uniform(size=n) < 0.1)
-    matrix[opened, opened] += 1e-3
-    free = np.ones(size, dtype=bool)
-    free[: m * n] = random.uniform(size=m * n) < 0.8
-    free[omega] = free[: m * n].reshape(m, n).any(axis=0) | (matrix[omega, omega].diagonal() > 0)
-    kept = np.flatnonzero(free).astype(np.int32)
-    b = random.uniform(-1, 1, len(kept))
-    whole = matrix[np.ix_(kept, kept)]
-    x = WornShape(matrix, m, n).factor(kept)(b)
-    scale = np.linalg.norm(whole, 2) * np.abs(x).max()
-    np.testing.assert_allclose(whole @ x, b, rtol=0, atol=1e-12 * scale)
-    np.testing.assert_allclose(x, np.linalg.solve(whole, b), rtol=0, atol=1e-14 * scale * np.linalg.cond(whole))
-
-
 def test_iterations_do_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """The preconditioner is as near with 400 nodes as with 50, and for 2 phases as for 12."""
     random = np.random.default_rng(2)
@@ -137,6 +106,6 @@ def test_heat_keeps_the_factors() -> None:
     phases = system.phases
     assert system.with_heat(np.zeros((40, 40))).phases is phases
     wear = [csr_array(np.eye(20))] * 2
-    assert isinstance(system.derivative(wear, np.zeros(20)), WornShape)
+    assert isinstance(system.derivative(wear, np.zeros(20)), Dense)
     many = equations(2, worn_shape.WHOLE // 3 + 1, random, heat=False)
     assert isinstance(many.derivative(wear, np.zeros(20)), ByShape)

@@ -352,9 +352,10 @@ class CondensedContact:
     def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
         """Return the derivative with what wears at a pressure (m, n), on a grid."""
         assert self._wearing is not None
-        slopes = Opened(*self._wearing.by_body(pressure), self._wearing.layer(pressure)).times(scale)
+        parts = *self._wearing.by_body(pressure), self._wearing.layer(pressure)
+        slopes = Opened(*(0.0 if one is None else scale * one for one in parts))
         last = self._operator
-        if not isinstance(last, GriddedPhases) or last.opened is None or not last.opened.same(slopes):
+        if not isinstance(last, GriddedPhases) or not last.opened.same(slopes):
             last = self._operator = GriddedPhases(self._grid, slopes)
         return last
 

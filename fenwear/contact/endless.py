@@ -74,7 +74,7 @@ class EndlessGrid:
         if passing is not None:
             self._read = _short([self._transfer(one.read, -one.read_at) for one in passing])
             self._put = _short([self._transfer(one.put, one.put_at) for one in passing])
-        self.take(None, None, 0.0)
+        self.take(np.zeros(1), np.zeros(1), 0.0)
 
     def _transfer(self, numbers: Array, at: NDArray[np.int64]) -> Waves:
         """Return the waves (i, j) of numbers at places (k, axes)."""
@@ -82,19 +82,19 @@ class EndlessGrid:
         np.add.at(wrapped, tuple((at % np.array(self.period)).T), numbers)
         return _rows(scipy.fft.rfftn(wrapped))
 
-    def take(self, common: Array | None, strip: Array | None, own: float) -> None:
+    def take(self, common: Array, strip: Array, own: float) -> None:
         """Take what unit pressures open besides the bodies, on average.
 
         Args:
-            common: Worn off the punch in each phase (m,); None for nothing.
-            strip: Worn off the strip (m,); None for nothing.
+            common: Worn off the punch in each phase (m,).
+            strip: Worn off the strip (m,).
             own: In their own phase alone.
         """
         symbol = self._symbol + own
         pairs: list[tuple[Waves, Waves]] = []  # of U (i, j, m) and V
-        if common is not None:
+        if common.any():
             pairs.append((np.ones((1, 1, len(common)), dtype=complex), common[None, None].astype(complex)))
-        if strip is not None and self._read is not None and self._put is not None:
+        if strip.any() and self._read is not None and self._put is not None:
             pairs.append((self._read, strip * self._put))
         self.inverse: Array = 1 / symbol[:, None]
         self._worn: tuple[Waves, Waves, Waves] | None = None

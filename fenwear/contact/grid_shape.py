@@ -125,7 +125,7 @@ class _Near:
         self.touching = on.box.spread(touching.astype(float))
         rate = np.array([own.diagonal()[touched].mean() for own in of.wear])
         endless = EndlessGrid(on.products, None)
-        endless.take(self.length * rate, None, 0.0)
+        endless.take(self.length * rate, np.zeros(m), 0.0)
         moved, balanced = (
             on.box.spread(values.reshape(-1, n)).reshape(m, r, *on.box.counts) * self.touching[:, None]
             for values in (np.broadcast_to(self.equations.modes.T, (m, r, n)), self.equations.balances)

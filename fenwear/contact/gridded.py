@@ -12,8 +12,8 @@ bit of what comes in, would be left in pressures that few digits are asked of (1
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +37,8 @@ RESTART, RESTARTS = 40, 15
 SLIGHT = 1e-2  # of pressures: what brings them into balance
 
 
-@dataclass(frozen=True)
-class Opened:
-    """What unit pressures open besides the bodies, over the phases' nodes (m, n); None for nothing.
+class Opened(NamedTuple):
+    """What unit pressures open besides the bodies, over the phases' nodes (m, n); 0 for nothing.
 
     Attributes:
         common: At their own nodes of the punch, in every phase.
@@ -47,23 +46,16 @@ class Opened:
         own: At their own nodes in their own phase alone.
     """
 
-    common: Array | None = None
-    strip: Array | None = None
-    own: Array | None = None
-
-    def times(self, factor: float) -> Opened:
-        """Return all of it times a factor."""
-        return Opened(*(None if one is None else factor * one for one in self.parts))
-
-    @property
-    def parts(self) -> tuple[Array | None, Array | None, Array | None]:
-        """The three."""
-        return self.common, self.strip, self.own
+    common: Array | float = 0.0
+    strip: Array | float = 0.0
+    own: Array | float = 0.0
 
     def same(self, other: Opened) -> bool:
         """Return whether another one is equal."""
-        pairs = zip(self.parts, other.parts, strict=True)
-        return all(a is b or (a is not None and b is not None and np.array_equal(a, b)) for a, b in pairs)
+        return all(np.array_equal(a, b) for a, b in zip(self, other, strict=True))
+
+
+NOTHING = Opened()
 
 
 class PhasesGrid:
@@ -123,11 +115,10 @@ class PhasesBox:
         apart = np.abs(self.balance - size * self.modes).max(initial=0.0)
         self.even = size if apart <= SAME * np.abs(self.balance).max(initial=0.0) else None
 
-    def multiply(self, p: Array, a: Array, by: Opened | None) -> tuple[Array, Array]:
+    def multiply(self, p: Array, a: Array, by: Opened) -> tuple[Array, Array]:
         """Return the gaps (m, ...) of pressures and of rigid motions (m, r), and the forces (m, r) of pressures."""
         gaps, (m, r) = self.products.apply(p[:, None])[:, 0], a.shape
-        if by is not None:
-            gaps += self.opened(by, p)
+        gaps += self.opened(by, p)
         size = p[0].size  # of the box: there may be no rigid motions
         gaps += (a[:, None] @ self.modes.reshape(m, r, size)).reshape(gaps.shape)
         return gaps, (self.balance.reshape(m, r, size) @ p.reshape(m, size, 1))[:, :, 0]
@@ -154,17 +145,15 @@ class PhasesBox:
 
     def opened(self, by: Opened, p: Array) -> Array:
         """Return what pressures in the box (m, ...) open besides the bodies, by slopes there."""
-        found: Array = np.zeros_like(p) if by.own is None else by.own * p
-        if by.common is not None:
-            found += np.einsum("m...,m...->...", by.common, p)
-        if by.strip is not None:
+        found = by.own * p + (by.common * p).sum(axis=0)
+        if np.any(by.strip):
             to, back = self._strip
             found += (back @ (to @ (by.strip * p).ravel())).reshape(p.shape)
         return found
 
     def slopes(self, by: Opened) -> Opened:
         """Return slopes of all nodes in the box."""
-        return Opened(*(None if one is None else self.box.spread(one) for one in by.parts))
+        return Opened(*(self.box.spread(one) if isinstance(one, np.ndarray) else one for one in by))
 
 
 class GriddedPhases:
@@ -172,14 +161,14 @@ class GriddedPhases:
 
     Args:
         grid: The phases.
-        opened: What unit pressures open besides the bodies; None for nothing.
+        opened: What unit pressures open besides the bodies; by default nothing.
     """
 
-    def __init__(self, grid: PhasesGrid, opened: Opened | None = None) -> None:
+    def __init__(self, grid: PhasesGrid, opened: Opened = NOTHING) -> None:
         self.grid, self.opened = grid, opened
         self.m, (self.n, r) = len(grid.of), grid.modes[0].shape
         self.size = self.n + r
-        self._slopes = None if opened is None else grid.boxes.whole.slopes(opened)
+        self._slopes = grid.boxes.whole.slopes(opened)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
@@ -200,7 +189,7 @@ class GriddedPhases:
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
         on = self.grid.boxes.around(touched)
-        slopes = None if self.opened is None else on.slopes(self.opened)
+        slopes = on.slopes(self.opened)
         closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]) > 0, parts[:, self.n :])
 
         def solve(b: Array) -> Array:
@@ -235,7 +224,7 @@ class GriddedPhases:
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
         on = self.grid.boxes.around(touched)
-        slopes = None if self.opened is None else on.slopes(self.opened)
+        slopes = on.slopes(self.opened)
         change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
         p, a, touches = change.solve(enough, below)
         found = parts.copy()
@@ -272,7 +261,7 @@ class _Change:
         forces: That are not balanced (m, r).
     """
 
-    def __init__(self, on: PhasesBox, slopes: Opened | None, before: Array, gaps: Array, forces: Array) -> None:
+    def __init__(self, on: PhasesBox, slopes: Opened, before: Array, gaps: Array, forces: Array) -> None:
         self.on, self.slopes = on, slopes
         self.before, self.gaps, self.forces = before, gaps, forces
 
@@ -323,7 +312,7 @@ class _Closed:
     def __init__(
         self,
         on: PhasesBox,
-        slopes: Opened | None,
+        slopes: Opened,
         closed: NDArray[np.bool_],
         rigid: NDArray[np.bool_],
         before: _Closed | None = None,
@@ -332,7 +321,7 @@ class _Closed:
         self.closed = closed.astype(np.float64)
         self._shape = (len(closed), -1)
         if before is None:
-            self._mean(slopes or Opened())
+            self._mean(slopes)
         free = rigid.reshape(*rigid.shape, *(1,) * len(on.box.counts)) * self.closed[:, None]
         self.patch = Patch(on.endless, on.modes * free, on.balance * free if on.even is None else on.even)
 
@@ -341,11 +330,8 @@ class _Closed:
         inner = tuple(range(1, self.closed.ndim))
         count = np.maximum(self.closed.sum(axis=inner), 1.0)
 
-        def mean(values: Array | None) -> Array | None:
-            return None if values is None else np.asarray((values * self.closed).sum(axis=inner) / count)
-
-        common, strip, own = map(mean, slopes.parts)
-        self.on.endless.take(common, strip, 0.0 if own is None else float(own.mean()))
+        common, strip, own = (np.asarray((values * self.closed).sum(axis=inner) / count) for values in slopes)
+        self.on.endless.take(common, strip, float(own.mean()))
 
     def _parts(self, x: Array) -> tuple[Array, Array]:
         """Return pressures (m, ...) and rigid motions (m, r) of a vector."""

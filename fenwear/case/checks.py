@@ -274,7 +274,9 @@ def coefficient_problems(case: Case) -> Iterator[str]:
 
 def body_problems(case: Case) -> Iterator[str]:
     """Yield what is wrong with the bodies that carry debris and set the temperature of friction."""
-    given = {"friction_temperature": (case.contact.friction_temperature, ("mean", "hotter"))}
+    given: dict[str, tuple[str, tuple[str, ...]]] = {
+        "friction_temperature": (case.contact.friction_temperature, ("mean", "hotter"))
+    }
     if case.contact.third_body:
         given["third_body.carried_by"] = (case.contact.third_body.carried_by, ())
     for key, (name, others) in given.items():

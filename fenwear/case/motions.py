@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -198,7 +198,7 @@ class _Along(Part):
     )
     along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
 
-    checks = (
+    checks: ClassVar[tuple[Check, ...]] = (
         Check(lambda s: s.present("along") and not any(s.along), "along: expected a direction, got zero"),
         Check(lambda s: s.present("along") and s.axis != "x", "along: give either along or axis"),
     )
@@ -210,7 +210,7 @@ class _About(Part):
     axis: Vector = Field(default=(0.0, 0.0, 1.0), description="axis of the rotation")
     centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")
 
-    checks = (Check(lambda s: not any(s.axis), "axis: expected a direction, got zero"),)
+    checks: ClassVar[tuple[Check, ...]] = (Check(lambda s: not any(s.axis), "axis: expected a direction, got zero"),)
 
 
 class _ToAndFro(Part):
@@ -241,7 +241,7 @@ class _Profile(_ToAndFro):
     )
 
     one_of = (("angular_frequency", "period"),)
-    checks = (
+    checks: ClassVar[tuple[Check, ...]] = (
         Check(
             lambda s: bool(s.ramp) != (s.profile == "trapezoidal"),
             "ramp: expected with a trapezoidal profile, and only then",
@@ -302,7 +302,7 @@ class Tabulated(_Along, _ToAndFro):
         description="displacements of the strip, towards +x"
     )
 
-    checks = (
+    checks: ClassVar[tuple[Check, ...]] = (
         Check(
             lambda s: len(s.times) != len(s.displacements),
             "displacements: expected as many values as times, one for each",

@@ -181,7 +181,7 @@ class Case(Part):
     def debris_on_strip(self) -> bool:
         """Whether debris lies on the strip."""
         third = self.contact.third_body
-        return bool(third) and self.names.role_of(third.carried_by) == "strip"
+        return third is not None and self.names.role_of(third.carried_by) == "strip"
 
     @property
     def strip_changes(self) -> bool:

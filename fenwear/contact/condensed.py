@@ -304,9 +304,10 @@ class CondensedContact:
         """The derivative of the residual without what wears in the step."""
         if self._elastic is None:
             if self.gridded and self._coupling is None:
-                self._elastic = GriddedPhases(self._grid)
+                elastic: Operator = GriddedPhases(self._grid)
             else:
-                self._elastic = self._as_phases()
+                elastic = self._as_phases()
+            self._elastic = elastic
         return self._elastic
 
     @cached_property
@@ -409,8 +410,8 @@ class CondensedContact:
 
     def _opened_beside(self, pressure: Array) -> Array:
         """Return the gaps (m, n) that pressures (m, n) open by what friction differs from that of the products."""
-        phases = zip(self.phases, self._beside, pressure, strict=True)
-        return np.array([phase.interface.apply(beside * own[:, None])[:, 0] for phase, beside, own in phases])
+        forces = self._beside * pressure[:, :, None]
+        return np.array([phase.interface.apply(forces[k])[:, 0] for k, phase in enumerate(self.phases)])
 
     def _solved(
         self, gap: Array, start: ContactState | None, wearing: WearCompliance | None, coupling: Array | None

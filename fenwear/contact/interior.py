@@ -37,7 +37,8 @@ def complementary(matrix: Array, vector: Array, free: Mask) -> Array:
     """
     bounded = np.flatnonzero(~free)
     size = max(float(np.abs(vector).max()), 1.0)
-    x, w = np.where(free, 0.0, size), np.full(len(bounded), size)
+    x: Array = np.where(free, 0.0, size)
+    w: Array = np.full(len(bounded), size)
     for _ in range(STEPS):
         rest, products = matrix @ x + vector, x[bounded] * w
         rest[bounded] -= w

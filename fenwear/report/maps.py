@@ -52,24 +52,24 @@ def map_figure(history: xarray.Dataset, field: Field, half_cycles: Sequence[int]
     All have the same colours, but worn depths, which are shown over the largest one of each half-cycle.
     """
     surface = surface_of(history, field.body)
-    values = field.factor * history[field.variable].sel(half_cycle=list(half_cycles)).values
+    values: Array = field.factor * history[field.variable].sel(half_cycle=list(half_cycles)).values
     largest, label = values.max(axis=1), field.label
     levels, extend = _levels(history, field, values, half_cycles)
     names = [look.in_words(history, row_of(history, n)) for n in half_cycles]
-    titles = [f"{name}\n{_size(field, own)}" for name, own in zip(names, values, strict=True)]
+    titles = [f"{name}\n{_size(field, values[k])}" for k, name in enumerate(names)]
     if field.variable.startswith("wear"):
         values = values / np.where(largest > 0, largest, 1.0)[:, None]
-        levels, extend, label = np.linspace(0, 1, 11), "neither", f"{field.title} over the largest one"
+        levels, extend, label = np.arange(11) / 10, "neither", f"{field.title} over the largest one"
     if field.variable == "pressure" and one_way(history):
         arrows = [surface.arrow(int(d)) for d in history.direction.sel(half_cycle=list(half_cycles)).values]
         titles = [title.replace("\n", f" {arrow}\n") for title, arrow in zip(titles, arrows, strict=True)]
     figure, axes = map_panels(surface, titles, look)
     fill_maps(surface, axes, values, label, look, levels=levels, colours=field.colours, extend=extend)
     if field.variable == "pressure":
-        for ax, own in zip(axes, values, strict=True):
-            level = EDGE_OF_CONTACT * float(own.max())
-            if own.min() < level < own.max():
-                surface.contours(ax, own, filled=False, levels=[level], colors="black", linewidths=1.0)
+        for k, ax in enumerate(axes):
+            level = EDGE_OF_CONTACT * float(values[k].max())
+            if values[k].min() < level < values[k].max():
+                surface.contours(ax, values[k], filled=False, levels=[level], colors="black", linewidths=1.0)
     return figure
 
 
@@ -133,8 +133,8 @@ def fill_maps(
 ) -> None:
     """Draw values at the nodes (k, n) as areas between levels on each of k maps, with a bar of the colours."""
     drawn: Any = None
-    for ax, own in zip(axes, values, strict=True):
-        drawn = surface.contours(ax, np.clip(own, levels[0], None), levels=levels, cmap=colours, extend=extend)
+    for k, ax in enumerate(axes):
+        drawn = surface.contours(ax, np.clip(values[k], levels[0], None), levels=levels, cmap=colours, extend=extend)
     colour_bar(axes[0].figure, drawn, list(axes), label, **bar_place(look))
 
 

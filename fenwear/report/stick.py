@@ -155,7 +155,7 @@ def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     figure, axes = panels(len(places), 2.4, look=look)
     for ax, place in zip(axes, places, strict=True):
         cycle = cycle_at(history, place)
-        at, states = parted(history.x.values, _states(cycle), gaps_of(history))
+        at, states = parted(history.x.values, _states(cycle).astype(float), gaps_of(history))
         steps = np.arange(1, cycle.sizes["step"] + 1)
         colours = ListedColormap(("white", COLOURS[SLIP], COLOURS[STICK]))
         ax.pcolormesh(at, steps, states, cmap=colours, vmin=OPEN, vmax=STICK, shading="nearest", rasterized=True)
@@ -178,7 +178,8 @@ def summed(history: xarray.Dataset) -> dict[str, Array]:
     """Return slip (µm), work of friction (µJ/mm²) and largest stress (MPa) of each cycle (k, n), as far as known."""
     pairs = [(history[f"traction{end}"], history[f"slip{end}"]) for end in ("", "_across") if f"slip{end}" in history]
     work: Any = sum(traction * slip for traction, slip in pairs)
-    slid = np.sqrt(sum(slip**2 for _, slip in pairs)).where(history.pressure > 0, 0)
+    squares: Any = sum(slip**2 for _, slip in pairs)
+    slid = (squares**0.5).where(history.pressure > 0, 0)
     found = {
         "slip": 1e3 * slid.sum("step").values,
         "friction_work": -1e3 * work.sum("step").values,

@@ -20,7 +20,7 @@ from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 FORMATS = ("png", "pdf", "svg")
 LEAST, MOST = 50.0, 500.0  # mm
@@ -227,7 +227,7 @@ def from_zero(ax: Axes) -> None:
     ax.set_ylim(0, 1.08 * max(tops, default=0.0) or None)
 
 
-def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **where: Any) -> Any:
+def colour_bar(figure: Figure | SubFigure, drawn: Any, axes: Any, label: str, **where: Any) -> Any:
     """Return a bar of colours with its label, in letters of the size of the panels' labels."""
     bar = figure.colorbar(drawn, ax=axes, **where)
     size = np.ravel(axes)[0].yaxis.label.get_fontsize()

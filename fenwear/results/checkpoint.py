@@ -177,10 +177,9 @@ def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
     if not any(name.startswith(f"{MEMORY}.") for name in arrays):
         return None
     memory, bodies = _unpacked(system.contact_law.memory, MEMORY, folder, arrays), system.bodies.heat
-    warm: list[HeatState] = []
-    while bodies and on_root(system.comm, (folder / f"{REMEMBERED}_{len(warm)}").is_dir):
-        own = folder / f"{REMEMBERED}_{len(warm)}"
-        warm.append(HeatState.nodal(bodies, [read_temperature(own, body) for body in bodies]))
+    count = on_root(system.comm, lambda: len(list(folder.glob(f"{REMEMBERED}_*")))) if bodies else 0
+    folders = [folder / f"{REMEMBERED}_{k}" for k in range(count)]
+    warm = [HeatState.nodal(bodies, [read_temperature(own, body) for body in bodies]) for own in folders]
     return replace(memory, warm=tuple(warm))
 
 

@@ -109,14 +109,14 @@ class Frozen:
         self._passing = _passing(problem, cycle, begin)
         phases, offsets = [], []
         closed = LayerStep(self._passing, cycle.worn, None, implicit=False).opening(self.groups.pressure(pressure))
-        of_contacts = zip(self.positions, pressure, self.contact.gap, self.groups.first, strict=True)
-        for position, p, open_, first in of_contacts:
+        for k, (position, first) in enumerate(zip(self.positions, self.groups.first, strict=True)):
+            p, gap = pressure[k], self.contact.gap[k]
             rigid = position.rigid
             rigid = replace(rigid, resultant=-rigid.equilibrium(0.0) @ p)
             surfaces = replace(position.interface, rigid=rigid, frame=None, like=None)
             bent = position.compliance.apply(np.concatenate([p, np.zeros(len(position.weights) - len(p))]))[: len(p)]
             phases.append(SlidingContact(surfaces, np.zeros_like(rigid.pair.normal)))
-            offsets.append(open_ - bent - closed[first] - problem.opening(position, cycle.worn) - surfaces.load_gap)
+            offsets.append(gap - bent - closed[first] - problem.opening(position, cycle.worn) - surfaces.load_gap)
         self._offset = np.array(offsets)
         self._solver = CondensedContact(phases, team=interface.team)
         period, self._crept = problem.program.period, cycle.worn.crept
@@ -176,10 +176,10 @@ def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Po
         for k, step in enumerate(own)
     ]
     pressure = np.maximum(records.pressure, 0.0)
-    touching = pressure.any(axis=1)
+    touching: NDArray[np.bool_] = np.any(pressure, axis=1)
     touching = touching if touching.any() else ~touching  # one that is open all through a time step needs no contact
     first_key = keys[int(touching.argmax())]
-    keys = [key if touches else first_key for key, touches in zip(keys, touching, strict=True)]
+    keys = [key if touching[k] else first_key for k, key in enumerate(keys)]
     known = {key: number for number, key in enumerate(dict.fromkeys(keys))}
     of = np.array([known[key] for key in keys])
     first = np.array([next(k for k in np.flatnonzero(touching) if of[k] == number) for number in range(len(known))])
@@ -221,5 +221,5 @@ def _by_steps(rates: Sequence[BodyRate | None], slid: Array, duration: Array) ->
     known = [rate for rate in rates if rate is not None]
     if not known:
         return None
-    lost = [rate.rate * rate.slide(own, float(tau)) for rate, own, tau in zip(known, slid, duration, strict=True)]
+    lost = [rate.rate * rate.slide(slid[k], float(duration[k])) for k, rate in enumerate(known)]
     return BodyWear(np.array(lost), known[0].law)

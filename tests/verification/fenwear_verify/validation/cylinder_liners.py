@@ -66,7 +66,7 @@ def compare(scope: Scope) -> Finding:
             if law == "running-in":
                 curves += [liner, predicted]
                 rows += [
-                    (liner.name[-1], *(f"{value:.2f}" for value in (year, s, s / wide, s * wide, d)))
+                    (liner.name[-1], f"{year:.2f}", f"{s:.2f}", f"{s / wide:.2f}", f"{s * wide:.2f}", f"{d:.2f}")
                     for year, s, d in later
                 ]
         errors[law] = percentage_error(np.array([c.predicted for c in of_law]), np.array([c.measured for c in of_law]))

@@ -48,6 +48,6 @@ def compare(scope: Scope) -> Finding:
     pins = list(GRADES.values())
     return Finding(
         f"mass within {abs(worst.percent):.0f} %, within the scatter of the pins "
-        f"({100 * max(deviations[pins] / factors[pins]):.0f} %)",
+        f"({100 * np.max(deviations[pins] / factors[pins]):.0f} %)",
         worst.percent, comparisons, ("million cycles", "mass lost (mg)"), curves,
     )  # fmt: skip

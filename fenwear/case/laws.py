@@ -325,6 +325,7 @@ class Stick(Part):
 
 
 COEFFICIENTS = ("coefficient", "archard", "energy", "per_area")
+TOUCHING = 0.1  # MPa: the pressure above which a place touches, by default
 
 
 class Coating(Part):
@@ -415,7 +416,7 @@ class WearLaw(Part):
         "polyethylene; in place of a law of the pressure",
     )
     touching_from: Annotated[Stress, Field(gt=0)] = Field(
-        default=0.1,
+        default=TOUCHING,
         description="with per_area: pressure above which a place touches; below it the wear is proportional to the "
         "pressure",
     )
@@ -485,7 +486,7 @@ class WearLaw(Part):
             "per_area: expected without pressure_cap and pressure_threshold",
         ),
         Check(
-            lambda s: not s.present("per_area") and s.touching_from != type(s).model_fields["touching_from"].default,
+            lambda s: not (s.present("per_area") or math.isclose(s.touching_from, TOUCHING)),
             "touching_from: expected with per_area",
         ),
         *map(_zero_or_more, ("coefficient", "beta")),

@@ -48,10 +48,11 @@ def complementary(matrix: Array, vector: Array, free: Mask) -> Array:
             with suppress(np.linalg.LinAlgError):  # where several solutions have this set the path's end is one of them
                 x[kept] = np.linalg.solve(matrix[np.ix_(kept, kept)], -vector[kept])
             return x
-        if not w.max() < FAR * size:
+        slope = w / x[bounded]
+        if not (w.max() < FAR * size and np.isfinite(slope).all()):
             break
         sloped = matrix.copy()
-        sloped[bounded, bounded] += w / x[bounded]
+        sloped[bounded, bounded] += slope
         factor = lu_factor(sloped)
 
         dx, dw = _step(factor, -rest, bounded, x[bounded], w, -products)
@@ -71,6 +72,8 @@ def _step(
     """Return changes of all unknowns, and of w, by which products of x and w change by so much."""
     right = right.copy()
     right[bounded] += products / x
+    if not np.isfinite(right).all():
+        raise ConvergenceError("the interior-point method overflows")
     dx = lu_solve(factor, right)
     return dx, (products - w * dx[bounded]) / x
 

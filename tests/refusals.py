@@ -215,7 +215,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "life/model.py": {
         "it changes throughout a run": (PHYSICS, "steady quantities with laws of depth or distance"),
-        "is told of constant properties": (
+        "requires constant properties": (
             MODEL,
             "run-in and critical speeds with properties of T: rates of small disturbances of bodies that stay",
         ),

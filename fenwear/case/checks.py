@@ -105,7 +105,7 @@ CHECKS = (
     ),
     Check(
         lambda c: strip_track(c) and isinstance(c.motion, Cycle) and c.motion.positions == "middle",
-        "motion.positions: expected 'steps', since the strip's wear goes with its material",
+        "motion.positions: expected 'steps', since the strip's wear moves with its material",
     ),
     Check(
         lambda c: c.strip.creep and one_way(c) and c.passes,
@@ -126,7 +126,7 @@ AGAINST_STICK = (
     Check(
         lambda c: c.model.kind == "axisymmetric",
         "model.kind: expected a plane model or a solid, such as fretting-sphere with motion.kind = 'oscillation': "
-        "rings slide around their axis, where displacements in (r, z) do not give way, so that nothing sticks",
+        "rings slide around their axis, and their displacements in (r, z) allow no stick there,",
     ),
     Check(
         lambda c: c.heat and c.heat.operator == "full",
@@ -139,7 +139,7 @@ AGAINST_STICK = (
     Check(one_way, "motion.kind: expected a motion to and fro, or a cycle,"),
     Check(
         lambda c: not c.passes and not isinstance(c.motion, Cycle),
-        "motion.axis: expected 'x', as bodies of a plane model do not give way along y,",
+        "motion.axis: expected 'x', since a plane model has no displacements along y,",
     ),
     Check(
         lambda c: c.model.kind == "plane" and any(name.endswith("shift_y") for name in columns(c)),
@@ -293,7 +293,7 @@ def program_problems(case: Case) -> Iterator[str]:
     for number, step in enumerate(program.steps):
         yield from step_problems(case, step, f"program.steps.{number}")
     if program.radius and not case.turns:
-        yield f"program.radius: does not go with motion.kind = '{motion.kind}', which does not turn"
+        yield f"program.radius: expected a motion that turns, not motion.kind = '{motion.kind}', which does not turn"
     if not program.radius and case.turns and any(step.distance for step in program.steps):
         yield (
             "program.radius: missing, but required where the strip turns and a step has a distance: the radius at "

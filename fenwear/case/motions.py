@@ -107,8 +107,8 @@ def row_problems(names: Sequence[str], rows: Sequence[Sequence[float]]) -> Itera
                 yield (
                     int(k) + 1,
                     (
-                        f"{name} goes on by {np.degrees(turned[k]):.4g} degrees from the row before: expected less "
-                        "than 180, by more rows"
+                        f"{name} changes by {np.degrees(turned[k]):.4g} degrees from the row before: expected less "
+                        "than 180. Add rows between them"
                     ),
                 )
 

@@ -69,7 +69,7 @@ class Names:
         first, second = f"{self.punch}_", f"{self.strip}_"
         if not found and (first.startswith(second) or second.startswith(first)):
             found.append(
-                f"strip.name: expected one that tells groups of both bodies apart, got {self.punch!r}, {self.strip!r}"
+                f"strip.name: expected a name that keeps the bodies' groups apart, got {self.punch!r}, {self.strip!r}"
             )
         return found
 

@@ -115,7 +115,7 @@ def pair(
     if placement == HERE:
         for surface in (punch, strip):
             if folds(surface):
-                _not_facing(f"{surface.body}_contact folds back on itself: it goes on around an edge")
+                _not_facing(f"{surface.body}_contact folds back on itself: it continues around an edge")
     parts = patches(punch, strip, placement)
     _check_covered(parts, placement)
     if axisymmetric:

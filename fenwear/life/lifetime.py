@@ -155,7 +155,7 @@ class Lifetime:
         lines.append(f"  {'share that fails before':24} {heading:>13} {'95 % interval':>27}")
         lines += [f"  {one.level:24.0%} {one.value:13.5g} {_end(one.low)} {_end(one.high)}" for one in self.quantiles]
         if any(_end(end).endswith("-") for one in self.quantiles for end in (one.low, one.high)):
-            lines.append("  - an end that so few samples do not tell")
+            lines.append("  - too few samples to give this end")
         if self.reliability is not None:
             one = self.reliability
             lines.append(

@@ -137,7 +137,7 @@ class Model:
         """
         for name, material in self.case.materials.items():
             for key in material.dependent:
-                message = f"depends on the temperature, and the {quantity} is told of constant properties; expected one"
+                message = f"depends on the temperature, but the {quantity} requires constant properties; expected one"
                 raise CaseError(InputError(f"materials.{name}.{key}", message))
 
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:

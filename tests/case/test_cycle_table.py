@@ -56,7 +56,7 @@ def test_order_of_angles() -> None:
         ({"columns": ["time (s)", "angle_y", "force_z (kN)"]}, "column 'angle_y': has no unit"),
         ({"columns": ["angle_y (deg)", "time (s)", "force_z (kN)"]}, "expected one of time and percent"),
         ({"rows": [[0, 0, -1], [0.5, 30], [1, 0, -1]]}, "row 2 of rows: expected 3 values, got 2"),
-        ({"rows": [[0, 0, -1], [0.5, 200, -2], [1, 0, -1]]}, "row 2 of rows: angle_y goes on by 200 degrees"),
+        ({"rows": [[0, 0, -1], [0.5, 200, -2], [1, 0, -1]]}, "row 2 of rows: angle_y changes by 200 degrees"),
         ({"rows": [[0, 0, -1], [0.5, 30, -2], [1, 10, -1]]}, "ends where it begins"),
         ({"load": None}, "load: expected together with columns"),
         ({"period": "1 s"}, "period: expected with the column percent"),

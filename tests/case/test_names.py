@@ -118,8 +118,8 @@ def test_ready_geometries_go_with_names() -> None:
     ("settings", "text"),
     [
         (["punch.name=strip"], "punch.name: expected another name than that of the strip, got 'strip'"),
-        (["punch.name=pad", "strip.name=pad"], "strip.name: expected one that tells groups of both bodies apart"),
-        (["punch.name=pad", "strip.name=pad_2"], "strip.name: expected one that tells groups of both bodies apart"),
+        (["punch.name=pad", "strip.name=pad"], "strip.name: expected a name that keeps"),
+        (["punch.name=pad", "strip.name=pad_2"], "strip.name: expected a name that keeps"),
         (["punch.name=2nd"], "punch.name: expected a word of letters"),
         (["punch.name=a pad"], "punch.name: expected a word of letters"),
     ],

@@ -106,7 +106,7 @@ def test_distance_where_the_strip_turns() -> None:
     assert (first.end, second.end) == (round(3000 / (2 * np.pi * 25)), 19 + round(4 / (np.pi / 2)))
     with pytest.raises(CaseError, match=r"program\.radius: missing"):
         load_case("ring-on-ring", [turning[0], "program.steps=[{distance='3 m'}]"])
-    with pytest.raises(CaseError, match=r"program\.radius: does not go with motion\.kind = 'reciprocating'"):
+    with pytest.raises(CaseError, match=r"program\.radius: .*motion\.kind = 'reciprocating'"):
         load_case("example1", ["program.radius=3", "program.steps=[{cycles=3}]", "run.half_cycles=6"])
     small = ("geometry.parameters.across=2", "geometry.degree=2", "run.half_cycles=6")
     case = load_case("ring-on-ring", [*turning, *small, "program.radius=31", "program.steps=[{cycles=6}]"])

@@ -225,7 +225,7 @@ class _Run:
                 before, system = system, regridded(system, laid)
                 start = on_other_grid(start, before, system)
             if start.half_cycle >= self.case.run.half_cycles:
-                message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
+                message = f"the run is at half-cycle {start.half_cycle} already; set a larger number to resume it"
                 raise CaseError(InputError("run.half_cycles", message))
         else:
             on_root(self.comm, lambda: make_directory(directory))

@@ -85,8 +85,8 @@ def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Bloc
         if gain < 1:
             raise
         raise type(error)(
-            f"{error}; the friction heat of a half-cycle gives back up to {gain:.3g} times the pressure "
-            f"it is from: {NO_JUMPS}"
+            f"{error}; within a half-cycle, friction heat raises the pressure by up to {gain:.3g} times "
+            f"itself: {NO_JUMPS}"
         ) from error
 
 

@@ -224,9 +224,9 @@ def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays, or no one rigid motion can follow it."""
     if system.track_deepens:
         raise ConvergenceError(
-            "no cyclic steady state exists: the strip wears, and under a punch that goes to and fro its track deepens "
-            "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "
-            '"jump", or take wear.strip away'
+            "no cyclic steady state exists: the strip wears, and under a punch that moves to and fro its track deepens "
+            "without end. Follow the wear by `run` with run.integration = "
+            '"jump", or remove wear.strip'
         )
     if system.passing_laws:
         raise ConvergenceError(
@@ -241,7 +241,7 @@ def _check_exists(system: Tribosystem) -> None:
     if not np.abs(system.rigid.rigid_normal).max(initial=0.0):
         raise ConvergenceError(
             "no cyclic steady state with any pressure exists: supports hold the bodies along the contact's normal, so "
-            "that wear goes on until nothing presses any more. Follow it by `run`"
+            "that wear continues until no pressure is left. Follow the wear by `run`"
         )
     rigid_of_phases(system)
 
@@ -284,8 +284,8 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
         if system.strip_wears or _uniform_wear_exists(system):
             raise
         raise ConvergenceError(
-            f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
-            "it goes on changing its shape. Expected less friction, a lower pin or a wider contact"
+            f"{error}; no cyclic steady state exists: friction tips the punch so far that no pressures wear the whole "
+            "contact by a rigid motion. Reduce the friction, lower the pin or widen the contact"
         ) from error
     if (capped := _no_state_under_cap(problem)) and _any_shape_stays(problem, contact):
         raise ConvergenceError(capped)

@@ -304,8 +304,8 @@ def _bulks(
             continue
         bulk = bulk_of(body, elastic, one.conductivity, spots)
         if bulk is None:
-            text = f"the {name} loses heat nowhere, so that it has no steady temperature: told is the flash above the"
-            return None, [f"{text} bulk alone; give heat.convection, or {name}.temperatures"]
+            text = f"the {name} loses heat nowhere and has no steady temperature. Results are the flash above the"
+            return None, [f"{text} bulk alone. Set heat.convection or {name}.temperatures"]
         found.append(bulk)
     return (found[0], found[1]), remarks
 
@@ -348,8 +348,8 @@ def _warnings(
     found = []
     if min(_across(heating)) < FEW:
         found.append(
-            f"what touches is {min(_across(heating))} nodes wide, and temperatures are rough below {FEW}: take a finer "
-            "grid"
+            f"the contact is {min(_across(heating))} nodes wide, and temperatures are rough below {FEW}. Use a finer "
+            "contact grid"
         )
     if heating.pasts and max(numbers[1]) > QUICK:
         found.append(
@@ -358,8 +358,8 @@ def _warnings(
         )
     if feedback is not None and feedback > FELT:
         found.append(
-            f"the bulge of the heat would give back {feedback:.2g} of a pressure: it is left out here, and from about "
-            f"{FELT:g} on the contact would be smaller, pressed more and hotter"
+            f"thermoelastic feedback is left out here: thermal expansion would raise the pressure by {feedback:.2g} "
+            f"times itself. From about {FELT:g} on, the contact is smaller and hotter, with higher pressures"
         )
     return found
 
@@ -444,7 +444,7 @@ def text(found: FlashTemperatures, name: str) -> str:
         f"share of the heat into the punch {'-' if share is None else f'{100 * share:.4g} %'}",
     ]
     if found.feedback is not None:
-        lines.append(f"share of a pressure that its bulge would give back {found.feedback:.2g}")
+        lines.append(f"thermoelastic feedback, over the pressure {found.feedback:.2g}")
     return "\n".join([*lines, *(f"warning: {one}" for one in found.warnings)])
 
 

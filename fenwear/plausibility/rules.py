@@ -530,8 +530,8 @@ RULES: dict[str, Rule] = {
     "clipped": Rule(
         clipped,
         "geometry",
-        "contact is clipped {when}: it reaches the end of the {end} {where}, where the bodies go on. Pressures "
-        "and depths "
+        "contact is clipped {when}: it reaches the end of the {end} {where}, and the bodies extend beyond it. "
+        "Pressures and depths "
         "are those of a narrower surface: {then}",
         ("start", "run", "steady", "final"),
         latest=True,

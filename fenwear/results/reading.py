@@ -46,8 +46,8 @@ TAKEN_NAMES = (
     (r"^friction_coefficient", "mean_friction_coefficient"),
 )
 OLDER = (
-    "of an older fenwear, in which worn_area and worn_volume were those of a half-cycle and not from the start; "
-    "expected the results of this version: run the case anew"
+    "of an older fenwear, in which worn_area and worn_volume were values of a half-cycle, not from the start. "
+    "Run the case again with this version"
 )
 
 

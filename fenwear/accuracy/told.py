@@ -441,6 +441,6 @@ def uncertainty_text(system: Tribosystem, found: Uncertainty) -> str:
         size = f"{total[worst]:.2g} K" if name == "largest_temperature" else f"{100 * shares[worst]:.2g} %"
         told.append(f"{words} {size}{by}")
     lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
-    lines += [f"not told of the {in_words(source)}: {why}" for source, why in found.untold.items()]
+    lines += [f"uncertainty from the {in_words(source)} not estimated: {why}" for source, why in found.untold.items()]
     lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]
     return "\n".join(lines)

@@ -112,10 +112,10 @@ def final_text(numbers: dict[str, Any]) -> str:
     worn = _between(numbers[f"{what}_{unit}"], np.array(numbers[f"{what}_between_{unit}"]))
     return (
         f"  the stick zone, {stick}, carries all of the load in the end, {numbers['normal_force_N']:.5g} N\n"
-        f"  {scar}, {depth} µm deep in both bodies together, {worn} {'mm³' if solid else 'mm²'}:\n"
-        "  as far as the nodes tell where the stick zone ends\n"
-        f"  largest pressure {numbers['largest_pressure_MPa']:.4g} MPa, at the edges of the stick zone: "
-        "as high as nodes are near to them" + _warm_text(numbers)
+        f"  {scar}, {depth} µm deep in both bodies together, {worn} {'mm³' if solid else 'mm²'};\n"
+        "  the ranges come from the node spacing at the ends of the stick zone\n"
+        f"  largest pressure {numbers['largest_pressure_MPa']:.4g} MPa, at the edges of the stick zone; "
+        "it rises as nodes come closer to them" + _warm_text(numbers)
     )
 
 

@@ -232,7 +232,7 @@ def _print_steady(case: str, state: SteadyState, forces: dict[str, tuple[str, An
           + _velocities(state.velocity, "per cycle"))  # fmt: skip
     if state.passes:
         times = "once" if state.passes == 1 else f"{state.passes} times"
-        show(f"  properties of materials are those of these temperatures, taken anew {times}")
+        show(f"  material properties are those at these temperatures, updated {times}")
     if state.heat is not None:
         degrees = degrees_of(system.case)
         punch, strip = (degrees.of(body.max()) for body in (state.heat.punch, state.heat.strip))

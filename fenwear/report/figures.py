@@ -70,9 +70,9 @@ TEXTS = {
     "cross-shear ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
     "cuts_along": "Pressure, worn depths and temperatures along the sliding at {chosen}.",
     "cuts_across": "Pressure, worn depths and temperatures across the sliding at {chosen}.",
-    "between": "What lies between the surfaces along the contact at {chosen}: debris, plastic depth, what is left "
-    "of coatings, and what laws remember there, where there are any.",
-    "program": "What acted over the run: load, sliding speed and ambient temperature, where they change.",
+    "between": "State between the surfaces along the contact at {chosen}: debris, plastic depth, remaining coatings, "
+    "and what laws remember there, where there are any.",
+    "program": "Load, sliding speed and ambient temperature over the run, where they change.",
     "peaks": "Largest contact pressure and {size} in contact{hot}, for each sliding direction, over the {axis}.",
     "place": "The shaft in its bore: the way from the middle of the unworn bore to that of the unworn shaft, "
     "its size and its angle from the way in which the load presses the shaft (of several bores, what each of them "

@@ -47,8 +47,8 @@ LABELS = {
     "heat_change_by_halving_steps": "largest change of contact temperatures by halving them, relative",
     "heat_difference_from_whole_mesh": "largest difference of contact temperatures and thermal gap from the whole "
     "mesh's, relative",
-    "heat_gain": "largest share of a change of pressure that its friction heat of a half-cycle gives back; from 1 on "
-    "contact may have several answers",
+    "heat_gain": "thermoelastic feedback: largest rise of a pressure by its friction heat of a half-cycle, over it; "
+    "from 1 on the contact may have several solutions",
     "wear_step_over_explicit_limit": "wear of a half-cycle over the limit of explicit steps",
     "growth_rate_per_s": "growth rate of disturbances of the final state; below 0 they die out",
     "largest_complementarity_error": "largest error of p >= 0, gap >= 0 and p gap = 0, over their scales",

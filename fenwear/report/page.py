@@ -103,7 +103,7 @@ def page(directory: Path, look: Style = STANDARD) -> str:
         title=str(history.attrs.get("title", "")) or "fenwear run",
         name=directory.resolve().name,
         half_cycles=int(history.half_cycle[-1]),
-        stop=summary.get("stop", "no summary yet: the run still goes on, or it was killed"),
+        stop=summary.get("stop", "no summary yet: the run has not ended, or it was killed"),
         written=datetime.fromtimestamp(written).astimezone(),
         warnings=summary.get("warnings", ()),
         answers=answers(summary),
@@ -140,7 +140,7 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
         last = [_number(one.key, float(history[one.name][-1]), "", one.key) for one in found]
         return {"At the last recorded half-cycle": last}
     numbers, places = numbers_of(summary), summary.get("x_mm", [])
-    starts = {"sliding": "What a tribometer measures", **{body: body.capitalize() for body in BODIES}}
+    starts = {"sliding": "Quantities that a tribometer measures", **{body: body.capitalize() for body in BODIES}}
     for way in WAYS:
         starts[way] = f"Last half-cycle with the strip {'turning' if 'clockwise' in way else 'moving'} {way}"
     starts |= {"heat_mJ": "Heat of the last half-cycle"}

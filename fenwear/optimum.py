@@ -321,9 +321,7 @@ def optimum_on_track(
         pressure = found.pressure
         if np.abs(pressure - before).max() <= AT_REST * pressure.max():
             return found
-    raise ConvergenceError(
-        "the optimum on a closed track did not come to rest: the strip wears much more than the punch"
-    )
+    raise ConvergenceError("the optimum on a closed track did not converge: the strip wears much more than the punch")
 
 
 def _tangential(rigid: RigidEquilibrium, velocity: Array) -> Array:

@@ -229,7 +229,7 @@ class Team:
         try:
             return self._packed(content)
         except Exception as error:  # of the packing, whatever the object makes of it
-            raise RanksError(f"what one rank has found cannot reach the others: {error}") from None
+            raise RanksError(f"the result of one rank cannot be sent to the others: {error}") from None
 
     def _crossing(self, error: BaseException) -> BaseException:
         """Return an error as it can cross ranks: itself, or its words where it cannot be packed or unpacked."""

@@ -140,6 +140,6 @@ def _check_steps_stay(middle: ContactPair, motion: Motion) -> None:
             message = (
                 f"from row {number + 1} to row {number + 2} the strip's surface does not slide along itself: it would "
                 "open the contact, or go into the punch. Expected turns about the middle of round surfaces "
-                "(motion.centre), and shifts along flat ones; what brings bodies together is the load"
+                "(motion.centre), and shifts along flat ones; the load brings bodies together"
             )
             raise CaseError(InputError("motion.rows", message))

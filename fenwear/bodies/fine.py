@@ -230,18 +230,18 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
         before = np.where(more, rests, before)
     if not rests.max() <= TRUSTED:
         message = (
-            f"what the {elastic.body.name} does otherwise than a half-space is not smooth at the contact: polynomials "
-            f"through {' x '.join(map(str, counts))} points leave {100 * rests.max():.2g} % of the compliance, where "
-            f"'fine' expects at most {100 * TRUSTED:.2g} %; make grid.size smaller, so that the contact keeps away "
-            "from edges, or take 'condensed'"
+            f"the {elastic.body.name}'s difference from a half-space is not smooth at the contact: polynomials "
+            f"through {' x '.join(map(str, counts))} points leave {100 * rests.max():.2g} % of the compliance, and "
+            f"'fine' allows at most {100 * TRUSTED:.2g} %. Set a smaller grid.size, so that the contact keeps away "
+            "from edges, or use 'condensed'"
         )
         raise CaseError(InputError(key, message))
     uneven = correction.uneven / _mean_compliance(ground)
     if uneven > UNEVEN:
         message = (
-            f"what the {elastic.body.name} does otherwise than a half-space violates Betti's theorem by "
-            f"{100 * uneven:.2g} % of the half-space's compliance, where 'fine' expects at most {100 * UNEVEN:g} %. "
-            "Take smaller elements, a smaller grid.size (the contact should be small against the radius of the "
+            f"the {elastic.body.name}'s difference from a half-space violates Betti's theorem by "
+            f"{100 * uneven:.2g} % of the half-space's compliance, and 'fine' allows at most {100 * UNEVEN:g} %. "
+            "Use smaller elements, a smaller grid.size (the contact should be small against the radius of the "
             "surface), or 'condensed'"
         )
         raise CaseError(InputError(key, message))

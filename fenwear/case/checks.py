@@ -109,8 +109,8 @@ CHECKS = (
     ),
     Check(
         lambda c: c.strip.creep and one_way(c) and c.passes,
-        "strip.creep: expected a motion to and fro: sliding one way, what has crept leaves the contact, and other "
-        "material comes in that has not",
+        "strip.creep: expected a motion to and fro: sliding one way, crept material leaves the contact, and other "
+        "material enters that has not crept",
     ),
     Check(
         lambda c: c.contact.law == "gross-sliding" and c.stick != Stick(),
@@ -249,7 +249,7 @@ def cycle_problems(case: Case) -> Iterator[str]:
         return
     yield from case.motion.model_problems(case.model.kind, case.model.axes)
     if case.heat and case.model.kind == "plane" and case.passes:
-        why = "with heat: what moves along x as well takes heat out of a plane model"
+        why = "with heat: motion along x as well takes heat out of a plane model"
         leaving = [name for name in columns(case) if name.endswith("shift_y")]
         yield from (f"motion.columns: expected no column {name} {why}" for name in leaving)
 

@@ -173,7 +173,7 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, accuracy: bool, 
     if warm.exchange.conducts:
         log(fineness_text(warm))
         if loaded.run.integration == "jump":
-            log(f"heat: jumps keep what its steps in a cycle do, about {memory_size(cycle_memory(warm.exchange))}")
+            log(f"heat: jumps keep the maps of its steps in a cycle, about {memory_size(cycle_memory(warm.exchange))}")
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip

@@ -28,8 +28,8 @@ SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns i
 EDGES, EDGES_AT_REST = 2, 20  # times that contact is solved for its own edges in a step, and in the steady state
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
-    'set heat.conducting = "nominal", or take weaker dependences: contact and what depends on it, the nodes that '
-    "conduct or the coefficients, did not converge"
+    'set heat.conducting = "nominal", or use weaker dependences: contact, the conducting nodes and the coefficients '
+    "did not converge"
 )
 
 # Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None for none, from a start.
@@ -50,7 +50,7 @@ def check_cycle_memory(system: Tribosystem) -> None:
         CaseError: they do not.
     """
     exchange = with_reduced_heat(system).exchange
-    what = "what jumps and steady states keep of each step of the heat in a cycle"
+    what = "the map of each heat step in a cycle, which jumps and steady states keep,"
     advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
     check_memory(system.comm, cycle_memory(exchange), "heat", what, advice)
 

@@ -134,7 +134,7 @@ def _factors(
         cycle, rest = tangent @ cycle, lies_after(system, phase, pressure[phase], heat, state, rest)
     if not np.isfinite(cycle).all():
         raise ConvergenceError(
-            "what disturbances become in a cycle is beyond all numbers: wear, heat or load are too large"
+            "growth of disturbances in a cycle is beyond all numbers: wear, heat or load is too large"
         )
     return np.asarray(np.linalg.eigvals(cycle), dtype=complex)
 
@@ -273,7 +273,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
         if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):
             break
     else:
-        raise ConvergenceError("debris does not come to a thickness at which as much is lost as comes")
+        raise ConvergenceError("the thickness of debris at which gain and loss balance did not converge")
     return layers.with_thickness(rest, thickness)
 
 

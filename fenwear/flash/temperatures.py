@@ -353,7 +353,7 @@ def _warnings(
         )
     if heating.pasts and max(numbers[1]) > QUICK:
         found.append(
-            "each instant of the long stroke is by itself, its heat shared as if it had always been shared so; heat "
+            "each instant of the long stroke is computed independently, as if its share of heat were constant. Heat "
             f"spreads over the contact in {max(numbers[1]):.2g} half-cycles, where 1 is expected at most"
         )
     if feedback is not None and feedback > FELT:

@@ -217,8 +217,8 @@ def run_calibrate(
     if found.at_bound:
         raise CaseError(
             [
-                InputError(f"--unknown {key}", "the data want a value beyond its bound; expected bounds that hold it "
-                        f"(what was found is in {folder})")
+                InputError(f"--unknown {key}", "the best fit lies beyond its bound. Widen the bounds; the fit so far "
+                        f"is in {folder}")
                 for key in found.at_bound
             ]
         )  # fmt: skip

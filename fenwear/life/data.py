@@ -387,7 +387,7 @@ class _Reader:
         if name == "mass":
             if "density" not in self.directives:
                 raise self._fail(
-                    "column 'mass'", "needs the density of what was lost: a line '# density = 7800 kg/m^3'"
+                    "column 'mass'", "needs the density of the lost material: a line '# density = 7800 kg/m^3'"
                 )
             factor = 1 / self._directive("density", "N*s^2/mm^4")
         values = factor * self._column(name, unit)

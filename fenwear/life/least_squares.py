@@ -86,7 +86,7 @@ def known_together(keys: Sequence[str], correlation: Array, at_bound: Sequence[s
         for j in range(i)
         if abs(correlation[i, j]) > TOGETHER
     ]
-    lines += [f"{key} is at a bound: the data want a value beyond it" for key in at_bound]
+    lines += [f"{key} is at a bound: the best fit lies beyond it" for key in at_bound]
     return lines
 
 
@@ -267,7 +267,7 @@ class LeastSquares:
         """
         scale = float(np.abs(self._tried(np.asarray(z, dtype=float))).max()) or 1.0
         problems = [
-            InputError(f"--unknown {one.unknown.key}", "has no influence on what was measured")
+            InputError(f"--unknown {one.unknown.key}", "has no influence on the measured values")
             for one, column in zip(self.unknowns, jacobian.T, strict=True)
             if np.abs(column).max() <= NO_INFLUENCE * scale
         ]

@@ -45,7 +45,7 @@ TEXTS = {
     "geometry": "Geometry: (a) whole, (b) near the contact, with elements, supports (red), loads (blue) and the "
     "contact (green); x along the contact, z upwards.",
     "loops": "Fretting loops: (a) tangential force over the displacement of the strip, a loop for each cycle named, "
-    "and (b) over what of it is more than full stick's at the same force.",
+    "and (b) over its part beyond full stick's at the same force.",
     "zones": "Where the surfaces stick and slip over the time steps of the first and of the last cycle.",
     "tractions": "Tangential traction along the sliding at five times of the first and the last cycle, between "
     "plus and minus µ p (grey: of the cycle's largest pressure).",
@@ -89,7 +89,7 @@ TEXTS = {
     "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
     "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
     "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
-    "heat_balance": "Heat of each half-cycle over the {axis}: what friction makes is the sum of the others.",
+    "heat_balance": "Heat of each half-cycle over the {axis}: friction heat is the sum of the others.",
 }
 AXES = {
     "cycles": ("cycles", "the cycles named"),

@@ -78,7 +78,7 @@ SLIDING = (
     Quantity("pressure_integral", RECORD, "N", "integral of the pressure over the contact, mean over the half-cycle; "
              "more than the load on curved contacts", _integral, "mean", steady=True, nodal=True, of="sliding"),
     Quantity("friction_force", RECORD, "N",
-             "friction force: resultant of friction, mean over what is slid in the half-cycle",
+             "friction force: resultant of friction, mean over the distance slid in the half-cycle",
              lambda b: _over(b.adds.of("drag_distance"), b.adds.of("distance"), 0.0), "mean", steady=True,
              of="sliding"),
     Quantity("friction_coefficient", RECORD, "1", "friction coefficient: mean over the sliding of the pressure",

@@ -55,7 +55,7 @@ VARIABLES: dict[str, Variable] = {
     "energy_balance_error": (("half_cycle",), "1", "missing energy of the half-cycle over its largest term"),
     "stick_width": (("half_cycle",), "mm", "width that sticks all through the cycle that ends here"),
     "stick_width_within": (("half_cycle",), "mm", "half the interval in which the width that sticks is known to lie"),
-    "jump_error": (("half_cycle",), "1", "estimated error of the depths of the jump that ends here, over what it wore"),
+    "jump_error": (("half_cycle",), "1", "estimated error of the depths of the jump that ends here, over its wear"),
 }
 HEAT_VARIABLES: dict[str, Variable] = {
     "step_temperature_punch": (("half_cycle", STEP, "x"), "K", "temperature of the punch's surface at the step's end"),

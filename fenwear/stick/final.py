@@ -150,7 +150,7 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
         return float(np.abs(change).max()) <= SAME * max(float(np.abs(crept).max()), 1e-300)
 
     first = creep.beginning()
-    return fixed_point(advance, first, close, "what creeps, and the cycle that it belongs to, did not converge")
+    return fixed_point(advance, first, close, "creep and the cycle that it belongs to did not converge")
 
 
 def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
@@ -180,7 +180,7 @@ def _without_flow(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | No
             return found
     raise ConvergenceError(
         f"no final shape without plastic flow exists: pressures reach contact.hardness = {layers.hardness:.4g} MPa, "
-        "and what has flown by then depends on the way there. Follow it by `run`"
+        "and the plastic flow until then depends on the way there. Follow it by `run`"
     )
 
 

@@ -48,7 +48,7 @@ from fenwear.stick.state import PartialSlipState
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 SHARE = 1 - np.sqrt(0.5)  # of a step, that a stage is long
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
-TOO_LARGE = "what many cycles wear is too large for numbers: expected a smaller wear coefficient"
+TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SHORTEST = 1 / 256  # of a cycle: the shortest part of one
 

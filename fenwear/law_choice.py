@@ -53,7 +53,7 @@ class ResolvedCase:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """What the summary of a run says of it."""
+        """The entries of the summary of a run."""
         known = None if self.choice is None else self.choice.share
         share = elastic_share(self.system) if known is None else known
         return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
@@ -63,7 +63,7 @@ def choose_law(system: Tribosystem) -> LawChoice:
     """Return the law that the stroke of a system calls for; collective.
 
     Stick where the bodies take up more than `watch.TAKEN_UP` of the amplitude elastically and nothing in the case
-    goes against it; gross sliding elsewhere.
+    rules it out; gross sliding elsewhere.
 
     Args:
         system: Both bodies condensed, from a case.
@@ -119,7 +119,7 @@ def resolve_law(
 
 
 def with_law(case: Case, law: Law) -> Case:
-    """Return the case with a law that goes with it."""
+    """Return the case with a law that fits it."""
     return case.model_copy(update={"contact": case.contact.model_copy(update={"law": law})})
 
 

@@ -177,7 +177,7 @@ def preparation_of(case: Case) -> Preparation:
 
 
 def _way_on(reached: int | None) -> str:
-    """Say how to go on after a fault of the disk, from a checkpoint of this half-cycle."""
+    """Return how to resume after a fault of the disk, from a checkpoint of this half-cycle."""
     if reached is None:
         return "there is no checkpoint to resume from: mend the cause, then start again in a new folder"
     return f"mend the cause, then resume from the checkpoint of half-cycle {reached}: --resume"
@@ -437,7 +437,7 @@ class _Run:
         return "all half-cycles done" if self.state.half_cycle >= self._last else "periodic"
 
     def results_so_far(self, failure: Exception) -> str:
-        """Say what there is after a run that ended early, and how to go on."""
+        """Return the text on the results of a run that ended early, and on how to resume it."""
         if self.state.half_cycle == 0:
             return f"no half-cycle was done; {self.directory} can be removed"
         reached = f"the results up to half-cycle {self.state.half_cycle} are in {self.directory}"
@@ -447,7 +447,7 @@ class _Run:
         return f"{reached}, to resume: --resume{how}"
 
     def finish(self, how: dict[str, Any]) -> dict[str, Any]:
-        """Write what a run ends with, from where it can go on first, and return the summary; collective."""
+        """Write the checkpoint first, then the results of a run, and return the summary; collective."""
         self._on_history(HistoryWriter.close)
         if self.last is None:
             return {}
@@ -475,7 +475,7 @@ class _Run:
         return summary
 
     def _uncertainty(self, last: Block) -> dict[str, Any]:
-        """Return the table of how uncertain the numbers of the end are, and tell it; collective.
+        """Return the table of the uncertainty of the final numbers, and report it; collective.
 
         The results are safe by now: what fails here is a warning.
         """

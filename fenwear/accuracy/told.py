@@ -1,11 +1,11 @@
 """The contributions to the numerical uncertainty of a run's end: of the mesh, of steps, of the heat and of the solver.
 
-What steps and bases of the heat contribute: the exchange knows how far contact temperatures and the thermal gap are
+The contribution of steps and bases of the heat: the exchange knows how far contact temperatures and the thermal gap are
 from those of smaller steps and of the whole mesh, relative to themselves. The pressure is solved for once more with a
 thermal gap that is larger by as much; worn depths differ by no more than it does beside a rigid motion, and by no more
 than the pressure that wears them.
 
-It is told as a table of summary.json, and in words, with the key that lowers it.
+The result is a table of summary.json, and a text with the keys that lower the uncertainty.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def of_mesh(values: Values, coarse: Values, ratio: float) -> Contribution:
 
 
 def order_of(quantity: Quantity, value: Value) -> float:
-    """Return the order at which a number is taken to approach its limit, in the distance of nodes.
+    """Return the order at which a number is taken to approach its limit, in the spacing of nodes.
 
     At the end of a contact displacements go as r^(3/2) and pressures as r^(1/2). In the mean square over the contact
     pressures are off by order 1, nearly all of it beside its ends; what is inside feels the ends by weak norms, by
@@ -250,7 +250,7 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
     """Return what steps of half-cycles leave: in depths, of first order, half of what the wear of one has changed.
 
     The sums of explicit and of implicit steps differ by the wear of the first half-cycle less that of the last one, and
-    lie on either side of the wear that goes on within the steps. Pressure and temperature are half a half-cycle late.
+    lie on either side of the wear that continues within the steps. Pressure and temperature are half a half-cycle late.
     """
     strokes = last.system.motion.half_cycles
     late = float(last.periodicity[-1]) * pressure_scale(last.system, last.pressure[-1]) / (2 * strokes)
@@ -306,7 +306,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
 
 
 def _why(error: CaseError | ConvergenceError) -> str:
-    """Return why there is nothing to compare with; what a case is refused for is of a coarser one."""
+    """Return why there is nothing to compare with; an error that rejects a case is that of the coarser one."""
     coarser_one = "of the coarser mesh or grid that would be compared with: " if isinstance(error, CaseError) else ""
     return f"{coarser_one}{error}"
 
@@ -429,7 +429,7 @@ def in_words(source: str) -> str:
 
 
 def uncertainty_text(system: Tribosystem, found: Uncertainty) -> str:
-    """Return in a few lines how uncertain the numbers are, what of, and what would help."""
+    """Return a text (a few lines): the uncertainty of each number, its largest source and the key that lowers it."""
     told, helps, total = [], remedies(system, found), found.total
     for name, words in WORDS.items() if found.is_whole else ():
         shares = {q: total[q] / max(abs(v.number), 1e-300) for q, v in found.values.items() if q.name == name}

@@ -219,7 +219,7 @@ class Load(Part):
         return "motion.load" if self._of_table else f"{body}.loads.{number}"
 
     def moment_problems(self, key: str, model: str) -> list[str]:
-        """Return what of it does not go with a plane, an axisymmetric or a solid model."""
+        """Return the problems of moments in a plane, an axisymmetric or a solid model."""
         if model == "axisymmetric":
             wrong = self.present("through", "moment")
             return [f"{key}.{name}: expected none in rings: what acts on them is the same all around" for name in wrong]
@@ -310,7 +310,7 @@ class Prescribed(Part):
 
 
 class Profile(Part):
-    """What the surface that touches differs by from the mesh's: a depth at places on it, straight in between."""
+    """The depths by which the contact surface differs from the mesh, at places on it, linear in between."""
 
     points: Annotated[
         tuple[Annotated[tuple[Length, ...], Field(min_length=2, max_length=4)], ...], Field(min_length=2)

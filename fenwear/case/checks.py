@@ -1,6 +1,6 @@
-"""What does not go together in a case, of several tables: by subject, a table of what is simple.
+"""Combinations of tables that a case rejects: by subject, with a table of the simple ones.
 
-What a table must not be by itself stands with it, see `quantities.Part`. Each problem is a key and what it expects.
+Problems of a single table stand with the table, see `quantities.Part`. Each problem is a key and what it expects.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ THERMAL = ("conductivity", "heat_capacity", "density", "expansion")
 
 
 def operator_problems(case: Case) -> Iterator[str]:
-    """Yield what does not go with bodies whose meshes are not what answers to forces, and with contact grids."""
+    """Yield the problems of bodies whose compliance is not that of a mesh, and of contact grids."""
     meshed = [name for name, body in case.bodies.items() if body.operator == CONDENSED]
     rough = [name for name, body in case.bodies.items() if body.topography]
     for name, body in case.bodies.items():
@@ -244,7 +244,7 @@ def vector_problems(case: Case) -> Iterator[str]:
 
 
 def cycle_problems(case: Case) -> Iterator[str]:
-    """Yield what of a cycle's table does not go with the model, or with heat."""
+    """Yield the problems of a cycle's table with the model and with heat."""
     if not isinstance(case.motion, Cycle):
         return
     yield from case.motion.model_problems(case.model.kind, case.model.axes)
@@ -286,7 +286,7 @@ def body_problems(case: Case) -> Iterator[str]:
 
 
 def program_problems(case: Case) -> Iterator[str]:
-    """Yield what of a program does not go with the motion and the heat."""
+    """Yield the problems of a program with the motion and the heat."""
     if not case.program:
         return
     program, motion = case.program, case.motion
@@ -310,7 +310,7 @@ def program_problems(case: Case) -> Iterator[str]:
 
 
 def step_problems(case: Case, step: Any, at: str) -> Iterator[str]:
-    """Yield what of a step of a program does not go with the motion and the heat."""
+    """Yield the problems of a program step with the motion and the heat."""
     motion = case.motion
     groups = sorted({load.on for body in case.bodies.values() for load in body.loads})
     for name in step.load_factors or {}:

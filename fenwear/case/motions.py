@@ -189,7 +189,7 @@ def _check_closed(turn: Array, shift: Array) -> None:
 
 
 class _Along(Part):
-    """What translations of the strip share."""
+    """Translations of the strip: their common part."""
 
     axis: Literal["x", "y"] = Field(
         default="x",
@@ -205,7 +205,7 @@ class _Along(Part):
 
 
 class _About(Part):
-    """What rotations of the strip share."""
+    """Rotations of the strip: their common part."""
 
     axis: Vector = Field(default=(0.0, 0.0, 1.0), description="axis of the rotation")
     centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")

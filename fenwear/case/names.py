@@ -1,9 +1,9 @@
-"""What the two bodies of a problem are called.
+"""The names of the two bodies of a problem.
 
 Punch (above) and strip (below, which slides) are their roles: tables and keys of a case, groups of the ready
 geometries, variables of results. A body may have a name besides, `punch.name = "pad"`. Its groups may then start with
 the name or with the role, pad_contact or punch_contact, which mean the same, and whatever is said of it has its name.
-So names are read where a case and where the groups of a geometry are read, and written where something is told.
+So names are read where a case and where the groups of a geometry are read, and written in messages and results.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Names:
 
     @property
     def problems(self) -> list[str]:
-        """What is wrong with them: a key and what it expects, each."""
+        """The problems of the names: a key and the expected value, each."""
         found = []
         for role, name, other in (("punch", self.punch, "strip"), ("strip", self.strip, "punch")):
             if not NAME.fullmatch(name):

@@ -1,4 +1,4 @@
-"""What `check` and `steady` say of a case with stick."""
+"""The output of `check` and `steady` for a case with stick."""
 
 from __future__ import annotations
 

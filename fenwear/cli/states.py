@@ -103,7 +103,7 @@ def steady_command(
 
 
 def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float | None, list[str]]:
-    """Return the largest share that friction heat gives back, and what is to be said of a state, and say it."""
+    """Return the thermoelastic feedback and the warnings of a state, and print the warnings."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
     from fenwear.plausibility import fineness_warnings, steady_warnings

@@ -42,7 +42,7 @@ def march(
         half_cycles: The last one at most.
         implicit: Which of the two steps.
         periodic_within, block, stops, leave, watch: As of `fenwear.cycle.driver.RunLimits`.
-        start: Where to go on from, such as the end of a block; by default the beginning.
+        start: The state to resume from, such as the end of a block; by default the beginning.
         loading: Factor of all loads; that in the middle of a half-cycle acts in it.
 
     Raises:
@@ -72,7 +72,7 @@ def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **cou
 
 
 def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
-    """Yield the blocks of jumps; say where they fail as friction heat breaks up the contact; collective."""
+    """Yield the blocks of jumps; name thermoelastic feedback where it makes them fail; collective."""
     contacts: ContactState | None = None
     try:
         for block in blocks:
@@ -107,7 +107,7 @@ def evolve(
         half_cycles: The last one at most; by default that of the case.
         integration: "explicit", "implicit" or "jump"; by default that of the case.
         tolerance: Of jumps; by default that of the case.
-        start: Where to go on from, such as the end of a block; by default the beginning.
+        start: The state to resume from, such as the end of a block; by default the beginning.
 
     Raises:
         ConvergenceError: a half-cycle did not converge; all before it are yielded.

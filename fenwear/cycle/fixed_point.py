@@ -40,13 +40,13 @@ def fixed_point(
         advance: From x returns g(x), what belongs to it, and whether it is exact already.
         start: The first x.
         close: Whether a change of x, its first argument, is small against the x that is its second.
-        failure: What is said where they do not come together.
+        failure: The message where they do not converge.
         iterations: At most so many.
         depth: Residuals that are combined.
         team: The ranks, of which one decides on the way and on the end.
 
     Raises:
-        ConvergenceError: x and g(x) do not come together.
+        ConvergenceError: x and g(x) do not converge.
     """
     x, share, best = team.lead(lambda: start), 1.0, np.inf
     points: list[Array] = []

@@ -109,7 +109,7 @@ class SteadyState:
         heat: Temperatures; None without heat.
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
         system: What it is the state of: with the properties of its own temperatures, where they depend on them.
-        passes: How often the properties were taken anew; 0 where they are constants.
+        passes: How often the properties were updated; 0 where they are constants.
         conductances: By which its temperatures have come about (phases, n), N/(mm s K), NaN where none conducts; None
             without heat.
     """
@@ -410,7 +410,7 @@ def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:
 
 @dataclass(frozen=True)
 class RunningIn:
-    """How long the pressures take to come near to those of a steady state.
+    """The number of cycles in which the pressures come near to those of a steady state.
 
     Attributes:
         cycles: From the initial shape; no whole number, so that it has derivatives.
@@ -517,7 +517,7 @@ class _Passed:
     Attributes:
         cycles: Done.
         distance: Of its pressures from those of the state, MPa.
-        end: From where the way goes on.
+        end: The state that the run continues from.
     """
 
     cycles: int

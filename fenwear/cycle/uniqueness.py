@@ -35,7 +35,7 @@ FEW = 50  # contact nodes up to which all eigenvalues are found
 
 
 def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatState | None = None) -> float | None:
-    """Return the largest share of a change of pressure that its friction heat of a half-cycle gives back; collective.
+    """Return the thermoelastic feedback: largest rise of a pressure by its heat of a half-cycle, over it; collective.
 
     The largest real part of the eigenvalues of G, in the middle phase of each half-cycle. From 1 on the contact may
     have several answers. None without heat, and where nodes stick or slip by themselves.

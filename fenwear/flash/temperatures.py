@@ -1,17 +1,17 @@
-"""How hot the contact of a finished run gets: flash temperatures of its last cycle, and what the finite bodies add.
+"""Temperatures of the contact of a finished run: flash of its last cycle, and the rise by the finite bodies.
 
-It goes one way: pressures and wear of the run make the heat, and its temperatures do not act back on them. How far that
-may be tells the share of a pressure that its own bulge would give back: heat mu v p that goes into both bodies by their
+It goes one way: pressures and wear of the run make the heat, and its temperatures do not act back on them. The
+thermoelastic feedback measures how far that holds: heat mu v p that goes into both bodies by their
 shares s_i raises waves of the number k by alpha_i (1 + nu_i) s_i / (K_i k^2), which pressures of E* k / 2 flatten,
 
     G = mu v E* sum of alpha_i (1 + nu_i) s_i / K_i / (2 k),
 
 at rest and in the end: at G = 1 waves grow by themselves (R. A. Burton, Wear 59, 1980, 1; J. R. Barber, Wear 26, 1973,
-425). It is told of the longest that fits into the contact, k = 2 pi over its length.
+425). It is reported for the longest wave that fits into the contact, k = 2 pi over its length.
 
-What temperatures need of a run's case: materials that conduct, and a table of heat, of which a grid has none.
+Temperatures need from a run's case: materials that conduct, and a table of heat, of which a grid has none.
 
-What is told of flash temperatures: numbers, a text, and maps over the cycle as a dataset.
+The output of flash temperatures: numbers, a text, and maps over the cycle as a dataset.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ class FlashTemperatures:
         peclet: Largest v a / 2 kappa of both bodies, a half the contact's length.
         quick: a^2 / kappa over the time of a half-cycle, of both; 0 of one that is steady.
         feedback: G; None without `expansion`.
-        across: Nodes across what touches along both axes.
+        across: Nodes across the contact along both axes.
         warnings: What is to be known of them.
     """
 
@@ -344,7 +344,7 @@ def _feedback(heating: Heating, both: Sequence[Conductor], powers: tuple[float, 
 def _warnings(
     heating: Heating, numbers: tuple[tuple[float, float], tuple[float, float]], feedback: float | None
 ) -> list[str]:
-    """Return what is to be known of the temperatures."""
+    """Return the warnings about the temperatures."""
     found = []
     if min(_across(heating)) < FEW:
         found.append(
@@ -413,7 +413,7 @@ def _largest(found: FlashTemperatures, flash: Array) -> dict[str, Any]:
 
 
 def _means(found: FlashTemperatures, flash: Array) -> Array:
-    """Return the means over what touches at each instant (t,), K."""
+    """Return the means over the contact at each instant (t,), K."""
     touching = found.heating.touching
     return np.asarray((flash * touching).sum(axis=(1, 2)) / np.maximum(touching.sum(axis=(1, 2)), 1))
 

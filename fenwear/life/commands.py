@@ -1,4 +1,4 @@
-"""What the commands sensitivity, calibrate and life do: compute, draw, write into a folder, say where."""
+"""The commands sensitivity, calibrate and life: compute, draw, write into a folder, print where."""
 
 from __future__ import annotations
 

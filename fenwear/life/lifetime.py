@@ -226,16 +226,16 @@ def lifetime(
     Args:
         case: The problem.
         until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3"; of several, as of each named contact
-            ("depth in left 0.2 mm"), a part lives until the first. One level of all contacts is told of each, too.
+            ("depth in left 0.2 mm"), a part lives until the first. A level of all contacts is also reported for each.
         scatter: Distribution of keys.
         samples: Size n of the sample, a run for each.
         seed: Of the sample.
         wanted: A life whose reliability is asked for, in the unit of the lives.
         limit: Cycles after which a level counts as never reached.
         folder: Where samples are kept, and samples.csv in the end; None for nowhere.
-        resume: Go on with the samples that are there.
+        resume: Continue with the samples that are there.
         comm: The ranks.
-        progress: Told of the samples done and of all.
+        progress: Called with the numbers of samples done and of all.
 
     Raises:
         CaseError: what is asked for makes no sense; the samples of the folder belong to another sampling.

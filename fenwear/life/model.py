@@ -1,4 +1,4 @@
-"""What a case gives for values of its keys: runs by cycle jumps and steady states, on one process.
+"""Results of a case for values of its keys: runs by cycle jumps and steady states, on one process.
 
 The one module of this package that knows how a system is assembled and integrated. Each rank has its
 own systems, so that samples can be shared out among ranks and no result depends on their number.
@@ -41,11 +41,11 @@ NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
 
 @dataclass(frozen=True)
 class Course:
-    """What a run follows so that its results are smooth functions of the values of keys: what another one did.
+    """The steps of an earlier run that a run repeats, so that its results are smooth functions of the keys.
 
     Attributes:
         ends: Cycles at whose ends jumps end, and nowhere else; none of a run that finds its own.
-        renewals: After which half-cycles meshes, properties or grids were made anew.
+        renewals: The half-cycles after which meshes, properties or grids were renewed.
     """
 
     ends: tuple[int, ...] = ()
@@ -117,7 +117,7 @@ class Model:
         return system_warnings(self.system())
 
     def _check_stays(self) -> None:
-        """Refuse laws that change throughout a run where a steady state is asked for.
+        """Reject laws that change throughout a run where a steady state is asked for.
 
         Raises:
             CaseError: there is one.
@@ -130,7 +130,7 @@ class Model:
             raise CaseError(InputError(key, message))
 
     def _check_constant(self, quantity: str) -> None:
-        """Refuse properties of the temperature for what is told of bodies as they are at the start.
+        """Reject properties that depend on the temperature for quantities of the bodies at the start.
 
         Raises:
             CaseError: there are some.
@@ -321,7 +321,7 @@ class Snapshot:
         end: The half-cycles of the cycle.
         rate: Depths worn in a cycle.
         phase_pressure: In each phase or time step of the cycle (m, n), MPa.
-        renewals: What a run made anew since the last one, each after a half-cycle.
+        renewals: The renewals of a run since the last snapshot, each after a half-cycle.
     """
 
     cycle: float

@@ -43,7 +43,7 @@ GONE = 0.05  # of a contact surface, that is worn through: less may be the thin 
 
 @dataclass(frozen=True)
 class Made:
-    """What rules look at of the meshes as they were made, found once for a run.
+    """Data of the meshes as they were made, which rules use, computed once for a run.
 
     Attributes:
         system: On these meshes.
@@ -77,7 +77,7 @@ class Made:
 
     @cached_property
     def thick(self) -> dict[str, Array]:
-        """How thick both bodies are below their contact nodes (n,), mm; collective."""
+        """The thickness of both bodies below their contact nodes (n,), mm; collective."""
         return {"punch": thickness(self.system.bodies.punch), "strip": thickness(self.system.bodies.strip)}
 
 
@@ -416,7 +416,7 @@ def unstable_speed(seen: Seen) -> Fields:
 
 @dataclass(frozen=True)
 class Rule:
-    """What is to be said of a state.
+    """A check of a state and its message.
 
     Attributes:
         find: Returns the fields of the message; none where all is well.

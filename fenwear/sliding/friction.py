@@ -173,7 +173,7 @@ FRICTION_TEMPERATURES: Mapping[str, Callable[[Array, Array], Array]] = {
 
 @dataclass(frozen=True)
 class ContactConditions:
-    """What coefficients may depend on, at the interface nodes in one phase.
+    """The variables that coefficients may depend on, at the interface nodes in one phase.
 
     Attributes:
         pressure: p (n,), MPa.
@@ -354,7 +354,7 @@ class Friction:
         return self._values(conditions.of("friction"), conditions, self.share(conditions))
 
     def of_asperities(self, conditions: ContactConditions) -> Array:
-        """Return mu of what touches at the nodes (n,).
+        """Return the friction coefficient of the touching asperities at the nodes (n,).
 
         Raises:
             CaseError: it is negative or not finite.

@@ -130,7 +130,7 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
     """Return a shape whose bodies have crept as far as its cycles let them.
 
     Raises:
-        ConvergenceError: something creeps without an end, or cycle and creep do not come together.
+        ConvergenceError: something creeps without an end, or cycle and creep do not converge.
     """
     creep = problem.interface.creep
     if not creep.creeps:

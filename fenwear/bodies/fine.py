@@ -231,7 +231,7 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
     if not rests.max() <= TRUSTED:
         message = (
             f"the {elastic.body.name}'s difference from a half-space is not smooth at the contact: polynomials "
-            f"through {' x '.join(map(str, counts))} points leave {100 * rests.max():.2g} % of the compliance, and "
+            f"through {' x '.join(map(str, counts))} points leave {100 * rests.max():.2g} % of the compliance. "
             f"'fine' allows at most {100 * TRUSTED:.2g} %. Set a smaller grid.size, so that the contact keeps away "
             "from edges, or use 'condensed'"
         )
@@ -240,7 +240,7 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
     if uneven > UNEVEN:
         message = (
             f"the {elastic.body.name}'s difference from a half-space violates Betti's theorem by "
-            f"{100 * uneven:.2g} % of the half-space's compliance, and 'fine' allows at most {100 * UNEVEN:g} %. "
+            f"{100 * uneven:.2g} % of the half-space's compliance. 'fine' allows at most {100 * UNEVEN:g} %. "
             "Use smaller elements, a smaller grid.size (the contact should be small against the radius of the "
             "surface), or 'condensed'"
         )

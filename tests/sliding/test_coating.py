@@ -126,7 +126,7 @@ def test_jumps_see_where_friction_ends() -> None:
     thickness, exact = system.coatings[0], marched.wear[-1]
     assert 0.1 < (exact >= thickness).mean() < 0.9
     errors = []
-    for tolerance in (0.3, 0.1):
+    for tolerance in (0.1, 0.03):  # against marches of a half and a quarter of the wear, this one is 0.003 off
         *_, last = jump(system, half_cycles, tolerance=tolerance)
         errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
         assert errors[-1] < tolerance / 10
@@ -193,8 +193,8 @@ def test_a_coating_whose_law_is_another_one(law: str, name: str) -> None:
     for tolerance in (0.3, 0.03, 0.003):
         *_, last = jump(system, 2 * cycles, tolerance=tolerance)
         errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
-        assert errors[-1] < tolerance  # that of the march, which is explicit, is about a thousandth
-    assert errors[2] <= errors[0]
+        assert errors[-1] < tolerance
+    assert errors[2] <= max(errors[0], 5e-4)  # below it lies the error of the march, which is explicit
 
 
 def test_the_end_is_that_of_the_base(assembled: Assemble) -> None:
@@ -365,10 +365,10 @@ def test_a_soft_coating_that_sticks_is_a_layer_and_wears_through() -> None:
     *_, marched = march(wears, 200)
     assert 0.1 < (marched.wear[-1] >= 1e-4).mean() < 0.9
     errors = []
-    for tolerance in (0.3, 0.003):
+    for tolerance in (0.1, 0.003):
         *_, last = jump(wears, 200, tolerance=tolerance)
         errors.append(float(np.abs(last.wear[-1] - marched.wear[-1]).max() / marched.wear[-1].max()))
-    assert errors[0] < 0.1
+    assert errors[0] < 0.03
     assert errors[1] < 5e-3
 
 

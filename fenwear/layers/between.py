@@ -308,9 +308,13 @@ class Layers:
             "pressure"
         )
 
+    def bounded(self, worn: WornDepths) -> WornDepths:
+        """Return depths with states of laws within their bounds."""
+        return self.with_held(worn, self.memory.bounded(self.held(worn)))
+
     def settled(self, worn: WornDepths) -> WornDepths:
         """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
-        found = self.with_held(worn, self.memory.bounded(self.held(worn)))
+        found = self.bounded(worn)
         if self.strip_carries:
             return replace(found, carried=_settled(found.carried, 0, 1)) if len(worn.carried) else found
         if self.debris is None or not len(worn.between):

@@ -181,11 +181,15 @@ class _Packing:
         return np.concatenate(_parts(self.problem.coatings.measured(worn)))
 
     def parted(self, y: Array) -> WornDepths:
-        """Return the depths of an array (size,)."""
+        """Return the depths of an array (size,), no thickness below zero."""
+        return self.problem.interface.layers.settled(self.on_the_way(y))
+
+    def on_the_way(self, y: Array) -> WornDepths:
+        """Return the depths (size,) that a stage begins at: they may lie below those of the jump, and debris as well."""
         punch, strip, between, carried, crept = np.split(y, self._cuts)
         shapes = self._like.between.shape, self._like.carried.shape
         found = WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
-        return self.problem.interface.layers.settled(self.problem.coatings.depths(found))
+        return self.problem.interface.layers.bounded(self.problem.coatings.depths(found))
 
     def rate(self, cycle: FrettingCycle) -> Array:
         """Return the rate of a cycle (size,).
@@ -234,7 +238,7 @@ class _Steps:
 
     def stage(self, begin: Array, cycles: float, near: ContactState) -> _Moment:
         """Return y = begin + cycles M(y)."""
-        worn, contact = self._frozen.stage(self.packing.parted(begin), cycles, near)
+        worn, contact = self._frozen.stage(self.packing.on_the_way(begin), cycles, near)
         return _Moment(self.packing.of(worn), contact, begin, cycles)
 
     def step(self, before: _Moment, cycles: float, beside: Callable[[float], Array], last: float = 0.0) -> _Moment:

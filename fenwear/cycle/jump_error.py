@@ -114,9 +114,9 @@ class Sizes:
             wrong: The error.
             step: What the jump wears.
             end: All that is worn then.
-            rest: Share of it that counts as worn in the jump.
+            rest: Share of it that counts as worn in the jump, where it wears less.
         """
-        found = self.area(wrong) / max(self.area(step) + rest * self.area(end), 1e-300)
+        found = self.area(wrong) / max(self.area(step), rest * self.area(end), 1e-300)
         for size in (self._crept, self._carried):  # along a track it is thin, and nothing beside what is worn
             found = max(found, size(wrong) / max(size(step), REST * size(end), 1e-300))
         return found

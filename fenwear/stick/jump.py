@@ -1,8 +1,10 @@
 """Cycle jumps in partial slip: many cycles in one implicit-explicit step.
 
 A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
-bodies, so that dy/dn = F(y) over the number n of cycles. With M(y) the wear of a cycle whose nodes slip as in the last
-one (`frozen`), and R = F - M what cycles do beside it, one jump of N cycles is a step of the two-stage Runge-Kutta
+bodies, so that dy/dn = F(y) over the number n of cycles. Where the strip passes it takes many cycles to forget: there
+the contact runs in at y until a cycle ends as it begins, over no more cycles than the jump has, and without heat.
+With M(y) the wear of a cycle whose nodes slip as in the last one (`frozen`), and R = F - M what
+cycles do beside it, one jump of N cycles is a step of the two-stage Runge-Kutta
 method ARS(2,2,2) of second order (U. M. Ascher et al., Applied Numerical Mathematics 25, 1997): that of gross sliding
 (`fenwear.cycle.jump_step`), where nothing is beside M, with R as it was seen last, linear in n. With g = 1 - 1/sqrt(2)
 
@@ -50,6 +52,7 @@ SHARE = 1 - np.sqrt(0.5)  # of a step, that a stage is long
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
+MOST_RUN_IN, CLOSED = 20, 1e-3  # cycles until one closes; its change of tractions, over all of them
 SHORTEST = 1 / 256  # of a cycle: the shortest part of one
 
 
@@ -133,7 +136,7 @@ def _cycle_after(
     """
     at, heat = _led_to(problem, at, worn), problem.heat
     if heat is None or before.warm is None or before.end.temperature is None:
-        return _recorded(problem, at, worn, number)
+        return _recorded(problem, at, worn, number, min(int(number - before.number), MOST_RUN_IN))
     cycles, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
     if cycles <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
         return _recorded(problem, replace(at, temperature=before.warm + cycles * rate), worn, number)
@@ -150,11 +153,20 @@ def _cycle_after(
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
 
-def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float) -> FrettingCycle:
+def _recorded(
+    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, most: int = 0
+) -> FrettingCycle:
+    """Return the cycle at a shape from a state: where the strip passes, of at most so many more the one that closes."""
     layers, creep = problem.interface.layers, problem.interface.creep
-    at = problem.shaped(at, layers.flown_as(worn, at.worn))
-    first, warm, begin = at.next_step, at.temperature, at
-    at, parts = problem.cycle(at)
+    begin = problem.shaped(at, layers.flown_as(worn, at.worn))
+    first, warm = begin.next_step, begin.temperature
+    at, parts = problem.cycle(begin)
+    for _ in range(most if problem.interface.moves else 0):
+        last = at.contact.traction
+        if np.abs(last - begin.contact.traction).sum() <= CLOSED * np.abs(last).sum():
+            break
+        begin = problem.shaped(replace(at, slid=begin.slid), layers.flown_as(worn, at.worn))
+        at, parts = problem.cycle(begin)
     rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
     bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
@@ -185,7 +197,7 @@ class _Packing:
         return self.problem.interface.layers.settled(self.on_the_way(y))
 
     def on_the_way(self, y: Array) -> WornDepths:
-        """Return the depths (size,) that a stage begins at: they may lie below those of the jump, and debris as well."""
+        """Return the depths (size,) at the begin of a stage: they may overshoot, and so may debris."""
         punch, strip, between, carried, crept = np.split(y, self._cuts)
         shapes = self._like.between.shape, self._like.carried.shape
         found = WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
@@ -318,7 +330,7 @@ def _estimate(
     interface, (begin, whole, end) = packing.problem.interface, (packing.parted(one.y) for one in found)
     pair, contacts = interface.middle.pair, [one.contact.pressure for one in found]
     sizes = Sizes(interface.layers, pair, partial(opened_by_creep, interface.middle, interface.creep))
-    parts = (whole - end).times(HALVES), end - packing.parted(found[2].y - by_simpson)
+    parts = (whole - end).times(HALVES), packing.on_the_way(found[2].y) - packing.on_the_way(found[2].y - by_simpson)
     pressure = max(force_difference(pair, one, other) for one, other in zip(*contacts[1:], strict=True))
     return Estimate(
         sum(sizes.of_depth(part, end - begin, end, REST) for part in parts),

@@ -137,8 +137,9 @@ def test_with_stick_by_hand_and_by_jumps() -> None:
                 )
             ]
         )
-    assert (np.diff(apart, axis=0) < 0).all()
-    assert max(apart[-1]) < 4e-3  # half a cycle of 200: the march wears at its shape before
+    # The march wears at its shape half a cycle of 200 before: 3e-3. The contact runs in over some 15 cycles.
+    assert np.max(apart) < 6e-3
+    assert max(apart[-1]) < 2e-3
 
 
 def test_the_end_of_stick_keeps_what_lay_there() -> None:

@@ -114,11 +114,11 @@ class Sizes:
             wrong: The error.
             step: What the jump wears.
             end: All that is worn then.
-            rest: Share of it that counts as worn in the jump, where it wears less.
+            rest: Share of it that counts as worn in the jump.
         """
-        found = self.area(wrong) / max(self.area(step), rest * self.area(end), 1e-300)
+        found = self.area(wrong) / max(self.area(step) + rest * self.area(end), 1e-300)
         for size in (self._crept, self._carried):  # along a track it is thin, and nothing beside what is worn
-            found = max(found, size(wrong) / max(size(step), REST * size(end), 1e-300))
+            found = max(found, size(wrong) / max(size(step) + rest * size(end), REST * size(end), 1e-300))
         return found
 
     def of_states(self, wrong: WornDepths, begin: WornDepths, end: WornDepths) -> float:

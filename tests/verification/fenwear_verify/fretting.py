@@ -72,7 +72,7 @@ def partial_slip_end() -> Result:
     lines += [Line("closed form", x, exact, reference=True), Line("fenwear, directly", x, found.depth)]
     system = assemble(load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=40", *FAST]))
     end = final_shape(system.law_state.problem, stick_zone(system.law_state.problem))
-    *_, last = jump(system, 4_000_000, tolerance=0.1)
+    *_, last = jump(system, 4_000_000, tolerance=0.02)  # at 0.1 the stick zone's edge is one node off
     depth = system.pair.opening(last.wear[-1], last.wear_strip[-1])
     rows.append(profile("depth after 2,000,000 cycles by jumps", end.depth, depth, 2e-3, scale=float(end.depth.max())))
     return Result(rows, [Plot("End of partial-slip wear: depth of the scar", "x (mm)", "depth (mm)", lines)])

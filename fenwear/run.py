@@ -475,18 +475,17 @@ class _Run:
         return summary
 
     def _uncertainty(self, last: Block) -> dict[str, Any]:
-        """Return the table of the uncertainty of the final numbers, and report it; collective.
+        """Return the table of the uncertainty of the final numbers; collective.
 
         The results are safe by now: what fails here is a warning.
         """
-        from fenwear.accuracy import uncertainty, uncertainty_table, uncertainty_text
+        from fenwear.accuracy import uncertainty, uncertainty_table
 
         try:
             found = uncertainty(self.case, last)
         except (FenwearError, ArithmeticError, RuntimeError, ValueError) as error:
             self.log(f"warning: the numerical uncertainty of the run could not be estimated: {error}")
             return {}
-        self.log(uncertainty_text(last.system, found))
         return {"uncertainty": uncertainty_table(last.system, found)}
 
     def _note_growth(self, last: Block) -> str:
@@ -500,8 +499,6 @@ class _Run:
         rate, reason = stationary_growth(self.system, contacts.pressure, surfaces, phase, change)
         if rate is not None:
             self.numbers["growth_rate_per_s"] = rate
-        else:
-            self.log(f"no growth rate of disturbances: {reason}")
         return reason
 
 

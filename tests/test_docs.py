@@ -32,7 +32,7 @@ forked="{sys.executable} -IS {ROOT}/tests/forked.py DOOR"
 case " $* " in *" -- "*) forked="{sys.executable}" ;; esac
 case $1 in
   run) shift && exec $forked -m fenwear run LEFT_OUT "$@" ;;
-  steady|optimum|shape|check|mesh|plot|compare|verify|validate|sensitivity|calibrate|life|sweep|export|flash|info|import|new|schema)
+  steady|optimum|shape|check|mesh|sheet|plot|compare|verify|validate|sensitivity|calibrate|life|sweep|export|flash|info|import|new|schema)
     exec $forked -m fenwear "$@" ;;
   python3) case $2 in *.py) shift && exec $forked "$@" ;; esac ;;
 esac

@@ -68,8 +68,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
-    from fenwear.results.sheet import sheet_text
-    from fenwear.results.summary import contact_text
+    from fenwear.report.key_numbers import first_screen
     from fenwear.run import run_case
 
     loaded = load(case, settings)
@@ -87,8 +86,7 @@ def run(
     if as_json:
         print_json(summary)
     elif not quiet:
-        text = "\n\n".join(text for text in (sheet_text(summary), contact_text(summary)) if text)
-        show_results(text, f"results in {directory}")
+        show_results(first_screen(summary, directory), f"results in {directory}")
 
 
 @app.command("check")

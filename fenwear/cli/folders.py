@@ -9,7 +9,21 @@ import typer
 from mpi4py import MPI
 
 from fenwear.cli.base import JsonOption, app, log, show, show_results
+from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
+
+
+@app.command("sheet")
+def sheet_command(directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")]) -> None:
+    """Print all numbers of a run: of the sliding, the wear, the heat, and each contact."""
+    from fenwear.report.key_numbers import read_summary
+    from fenwear.results.sheet import sheet_text
+    from fenwear.results.summary import contact_text
+
+    summary = on_root(MPI.COMM_WORLD, lambda: read_summary(directory))
+    if not summary:
+        raise CaseError(InputError(str(directory), "no summary.json: expected the folder of a run that has ended"))
+    show("\n\n".join(text for text in (sheet_text(summary), contact_text(summary)) if text))
 
 
 @app.command("plot")

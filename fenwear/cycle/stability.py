@@ -33,6 +33,7 @@ ROUNDING = 1e-12  # of a disturbance: what is left of it that is gone
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 MAX_ITERATIONS = 60  # of friction and the temperatures that it depends on
 CLOSE = 1e-10  # change of these temperatures over their range that ends them
+LONGER = "Run longer, or use `steady`"
 APART = 0.1  # what a nearly stationary state may be away from itself a cycle later, or from its own temperatures
 
 
@@ -172,7 +173,10 @@ def stationary_growth(
         change: Largest change of pressure in the last cycle over the pressure scale.
     """
     if not change < 1:  # the same number on all ranks
-        return None, "the last cycle is the first, or not like the one before"
+        return (
+            None,
+            f"pressures change by their scale from cycle to cycle. {LONGER}",
+        )
     system = with_reduced_heat(system)
     return system.team.lead(partial(_stationary_growth, system, pressure, surfaces, phase, change))
 
@@ -190,11 +194,12 @@ def _stationary_growth(
         away = float(np.abs(found - surfaces).max())
         scale = float(np.abs(found - heat.exchange.heat.initial).max())
         if away > APART * scale:
-            return None, f"the temperatures are still {away:.3g} K away from those that its pressures would keep up"
+            return None, f"temperatures are still {away:.2g} K from those that repeat at these pressures. {LONGER}"
     drift = change / system.motion.period
     if drift > APART * abs(rate):
         return None, (
-            f"the pressures still change by {drift:.3g} of their scale a second, and its disturbances by {rate:.3g}"
+            f"the run is not stationary yet. Pressures drift by {100 * drift:.2g} % per second, and disturbances "
+            f"{'grow' if rate > 0 else 'decay'} by {100 * abs(rate):.2g} % per second. {LONGER}"
         )
     return rate, ""
 

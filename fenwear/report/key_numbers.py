@@ -1,4 +1,4 @@
-"""The key numbers of a run and its case as flat tables, and how uncertain they are: for the report and comparisons."""
+"""The key numbers of a run with their uncertainty, and whether its end is stationary: for screen and report."""
 
 from __future__ import annotations
 
@@ -30,6 +30,10 @@ NO_NUMBERS = ("contributions", "untold", "remedies", "seconds")  # of the table 
 SMALL = 0.01  # of an uncertainty: shares that are left out
 ANSWERS = ("worn_volume_mm3", "largest_depth_", "largest_pressure_MPa", "largest_pressure_in_cycle", "mean_pressure",
            "largest_temperature_")  # fmt: skip
+SHOWN_FIRST = ("worn_volume_mm3", "largest_depth_mm", "largest_pressure_MPa", "mean_pressure_MPa",
+               "largest_temperature_")  # fmt: skip
+STATIONARY = 1e-3  # change in a cycle below which pressures repeat
+ROUNDED = 1e-5  # of a number: what its five digits leave out, the least uncertainty that is given
 # What is no line of the sheet, which has words for the others.
 LABELS = {
     "half_cycles": "half-cycles done",
@@ -123,21 +127,23 @@ def label_of(path: str) -> str:
     return ", ".join(words_of(name) for name in path.split("."))
 
 
-def number_text(value: Any) -> str:
-    """Return a value as people read it: five digits, a dash where there is no number."""
+def number_text(value: Any, digits: int = 5) -> str:
+    """Return a value as people read it: in some digits, a dash where there is no number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "–" if value is None else str(value)
     if isinstance(value, int):
         return f"{value:,}"
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}"
-    return f"{value:,.5g}".replace("-", "−")
+    return f"{value:,.{digits}g}".replace("-", "−")
 
 
 class Answer(NamedTuple):
     """A number that a run was made for: in words and in the unit in which it is read, with its uncertainty.
 
     Attributes:
+        key: Of the number in summary.json.
+        number: In the unit of its key.
         label: In words.
         unit: Of value and uncertainty.
         value: As text.
@@ -145,6 +151,8 @@ class Answer(NamedTuple):
         sources: What makes most of the uncertainty.
     """
 
+    key: str
+    number: float
     label: str
     unit: str
     value: str
@@ -165,10 +173,55 @@ def answers(summary: Mapping[str, Any]) -> list[Answer]:
         line, within = lines[key], uncertain.get(path, 0.0)
         parts = sorted(((own.get(path, 0.0), source) for source, own in sources.items()), reverse=True)
         most = [f"{s.replace('_', ' ')} {100 * part / within:.0f} %" for part, s in parts if part > SMALL * within > 0]
-        text = number_text(shown(float(f"{within:.1e}"), line)) if within else ""
-        label = f"{words_of(key)}, {of}" if of else words_of(key)
-        rows.append(Answer(label, line.unit, number_text(shown(value, line)), text, ", ".join(most)))
+        digits, text = 5, ""
+        if within and value:
+            within = max(within, ROUNDED * abs(value))
+            digits = min(max(2 + math.floor(math.log10(abs(value) / within)), 1), 5)
+            text = number_text(shown(float(f"{within:.1e}"), line))
+        label, read = f"{words_of(key)}, {of}" if of else words_of(key), number_text(shown(value, line), digits)
+        rows.append(Answer(key, value, label, line.unit, read, text, ", ".join(most)))
     return rows
+
+
+def states(summary: Mapping[str, Any]) -> list[str]:
+    """Return whether the end of a run is stationary, and whether it is stable, in sentences; none without a summary."""
+    change, rate = summary.get("periodicity", math.nan), summary.get("growth_rate_per_s", math.nan)
+    if not summary:
+        return []
+    if change is None or math.isnan(change):
+        stationary = "Stationary: not known."
+    elif change < STATIONARY:
+        stationary = f"Stationary: pressures repeat from cycle to cycle, to {100 * change:.2g} % of the pressure scale."
+    else:
+        stationary = f"Not stationary: pressures change by {100 * change:.2g} % of the pressure scale in a cycle."
+    if rate is not None and math.isfinite(rate):
+        grows = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / max(rate, 1e-300):.3g} s"
+        decays = f"Stable: small disturbances of the final contact decay, to 1/e in {1 / max(-rate, 1e-300):.3g} s"
+        return [stationary, f"{grows if rate > 0 else decays} (growth rate {number_text(rate)} 1/s)."]
+    if "heat_mJ" not in summary:
+        return [stationary]
+    return [stationary, f"Stability not assessed: {summary.get('no_growth_rate') or 'not computed for this run'}."]
+
+
+def first_screen(summary: Mapping[str, Any], directory: Path) -> str:
+    """Return the end of a run as lines for people: the largest number of each kind, its state, warnings and files."""
+    rows, given = answers(summary), summary.get(UNCERTAINTY, {})
+    kinds = [[row for row in rows if row.unit and row.key.startswith(start)] for start in SHOWN_FIRST]
+    first = [max(kind, key=lambda row: row.number) for kind in kinds if kind]
+    wide = max((len(row.label) for row in first), default=0)
+    lines = [f"{summary['half_cycles']:,} half-cycles: {summary['stop']}"]
+    for row in first:
+        within = f" ± {row.uncertainty}" if row.uncertainty else ""
+        lines.append(f"  {row.label:{wide}}  {row.value}{within} {row.unit}")
+    lines += [f"Uncertainty from the {s.replace('_', ' ')}: {why}" for s, why in given.get("untold", {}).items()]
+    if any(row.uncertainty for row in first):
+        lines += [f"To lower the uncertainty: {'; '.join(sorted(set(given['remedies'].values())))}"]
+    lines += states(summary)
+    if count := len(summary["warnings"]):
+        lines.append(f"Warnings: {count}, see above and in the report.")
+    report = directory / "report.html"
+    lines.append((f"Report: {report}. " if report.exists() else "") + f"All numbers: fenwear sheet {directory}")
+    return "\n".join(lines)
 
 
 def words_of(name: str) -> str:

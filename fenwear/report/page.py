@@ -6,7 +6,6 @@ their uncertainty, whether the run has become stationary, and a picture. Figures
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -18,7 +17,17 @@ from fenwear.errors import CaseError, OutputError
 from fenwear.report.bodies import DrawingError, draw_pictures
 from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
-from fenwear.report.key_numbers import answers, flat, label_of, names_in, number_text, read_case, read_summary, unit_of
+from fenwear.report.key_numbers import (
+    answers,
+    flat,
+    label_of,
+    names_in,
+    number_text,
+    read_case,
+    read_summary,
+    states,
+    unit_of,
+)
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
@@ -30,7 +39,6 @@ WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clo
 # The first of these that there is stands on the first screen.
 FIRST = ("bodies_temperature", "bodies_von_mises", "wear_map", "profiles", "shape")
 BODY_FIELDS = {"bodies_von_mises": "Von Mises stress", "bodies_temperature": "Temperature"}
-STATIONARY = 1e-3  # change in a cycle below which pressures repeat
 BALANCES = {
     "largest_equilibrium_error": "Force and moment balance: error at most {:.1e} of the load.",
     "largest_complementarity_error": "No pull, overlap or pressure over a gap: error at most {:.1e} of their scales.",
@@ -107,7 +115,7 @@ def page(directory: Path, look: Style = STANDARD) -> str:
         written=datetime.fromtimestamp(written).astimezone(),
         warnings=summary.get("warnings", ()),
         answers=answers(summary),
-        states=[*_states(summary, history), *_retries(summary)],
+        states=[*states(summary), *_retries(summary)],
         first=figures.get(first),
         figures=[figure for name, figure in figures.items() if name != first],
         tables=_tables(summary, history),
@@ -155,24 +163,6 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
         else:
             tables[starts.get(start, "The run")].append(_number(path, value, "", path[len(start) :].lstrip(".")))
     return {text: rows for text, rows in tables.items() if rows}
-
-
-def _states(summary: Mapping[str, Any], history: xarray.Dataset) -> list[str]:
-    """Return whether the end is stationary, and whether it is stable, in sentences."""
-    change, rate = summary.get("periodicity", math.nan), summary.get("growth_rate_per_s", math.nan)
-    if change is None or math.isnan(change):
-        stationary = "Stationary: not known."
-    elif change < STATIONARY:
-        stationary = f"Stationary: pressures repeat from cycle to cycle, to {100 * change:.3g} % of the pressure scale."
-    else:
-        stationary = f"Not stationary: pressures change by {100 * change:.3g} % of the pressure scale in a cycle."
-    if rate is not None and math.isfinite(rate):
-        grows = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / max(rate, 1e-300):.3g} s"
-        decays = f"Stable: small disturbances of the final contact decay, to 1/e in {1 / max(-rate, 1e-300):.3g} s"
-        return [stationary, f"{grows if rate > 0 else decays} (growth rate {number_text(rate)} 1/s)."]
-    if "largest_temperature" not in history:
-        return [stationary, "Stability: computed with heat only."]
-    return [stationary, f"No growth rate: {summary.get('no_growth_rate') or 'not computed for this run'}."]
 
 
 def _retries(summary: Mapping[str, Any]) -> list[str]:

@@ -414,34 +414,32 @@ def shown(value: Any, line: Line) -> Any:
 
 
 def sheet_text(summary: Mapping[str, Any]) -> str:
-    """Return the sheet of a summary as lines for people."""
-    rows, names = sheet_rows(summary), Names(**summary.get("names", {}))
+    """Return the sheet of a summary as lines for people: of the sliding, of the bodies, and of the contact each way."""
+    names = Names(**summary.get("names", {}))
     bodies = [names.by_roles[body] for body in BODIES if body in summary]
     ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "largest_pressure_MPa" in one]
     uncertain = [summary.get(UNCERTAINTY, {}).get(way, {}) for way in ways]
-    contact = []
+    rows, contact = sheet_rows(summary), list[Any]()
     for key, line in OF_CONTACT.items():
         if any(key in summary[way] for way in ways):
             contact.append((line.label, line.unit, [shown(summary[way].get(key), line) for way in ways]))
             contact += _within(key, line, uncertain)
-    labels = [names.told(f"{label} ({unit})" if unit else label) for label, unit, _ in (*rows, *contact)]
-    wide = max(map(len, labels), default=0)
-    lines = []
-    for label, (_, _, row) in zip(labels, (*rows, *contact), strict=True):
-        lines.append(f"{label:{wide}}" + "".join(f"  {_number(value):>{COLUMN}}" for value in row))
-    first = next((k for k, label in enumerate(labels) if label.startswith("worn ")), len(rows))
-    heads = [" " * wide + "".join(f"  {name:>{COLUMN}}" for name in names) for names in (bodies, ways)]
-    told = [*lines[:first], heads[0], *lines[first : len(rows)]]
-    return "\n".join([*told, heads[1], *lines[len(rows) :]] if contact else told)
+    first = next((k for k, (label, _, _) in enumerate(rows) if label.startswith("worn ")), len(rows))
+    tables = [
+        (heads, [(names.told(Line(label, unit).heading), values) for label, unit, values in table])
+        for heads, table in (([], rows[:first]), (bodies, rows[first:]), (ways, contact))
+    ]
+    wide = max((len(label) for _, table in tables for label, _ in table), default=0)
+    return "\n".join(columns_text(heads, table, wide) for heads, table in tables if table)
 
 
-def columns_text(names: Sequence[str], rows: Sequence[tuple[str, Sequence[float | None]]]) -> str:
+def columns_text(names: Sequence[str], rows: Sequence[tuple[str, Sequence[float | None]]], wide: int = 0) -> str:
     """Return rows of numbers with their labels as lines, under the names of their columns; "" without rows."""
-    wide = max((len(label) for label, _ in rows), default=0)
-    column = max((len(name) for name in names), default=0)
-    column = max(column, COLUMN)
-    told = [(" " * wide, names), *((f"{label:{wide}}", [_number(value) for value in row]) for label, row in rows)]
-    return "\n".join(label + "".join(f"  {cell:>{column}}" for cell in cells) for label, cells in told) if rows else ""
+    wide = max((wide, *(len(label) for label, _ in rows)))
+    column = max((COLUMN, *map(len, names)))
+    head = [("", names)] if names else []
+    told = [*head, *((label, [_number(value) for value in row]) for label, row in rows)] if rows else []
+    return "\n".join(f"{label:{wide}}" + "".join(f"  {cell:>{column}}" for cell in cells) for label, cells in told)
 
 
 def _number(value: float | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -186,13 +188,19 @@ def test_steady_state_within_what_is_told(assembled: Assembled) -> None:
 
 
 def test_run_tells_it(fenwear: Callable[..., Any], tmp_path: Any) -> None:
-    """In summary.json, on the sheet and in the report; not where the case does not want it."""
-    import json
-
+    """On the first screen, in summary.json, on the sheet and in the report; not where the case does not want it."""
     short = ("--set", "run.half_cycles=4", "--set", FEW, "--set", "output.fields_at=[]")
     done = fenwear("run", "example1", *short, "-o", tmp_path / "a")
     assert done.returncode == 0
-    assert "... numerical uncertainty (µm)" in done.stdout
+    screen = done.stdout.splitlines()
+    assert len(screen) <= 10
+    rows = {line.split("  ")[1]: line for line in screen if line.startswith("  ")}
+    assert re.search(r" ± \S+ µm$", rows["largest worn depth, punch"])
+    assert len(rows) == 4  # and a temperature with heat
+    assert screen[-1] == f"Report: {tmp_path}/a/report.html. All numbers: fenwear sheet {tmp_path}/a"
+    sheet = fenwear("sheet", tmp_path / "a").stdout
+    assert "... numerical uncertainty (µm)" in sheet
+    assert fenwear("sheet", tmp_path).returncode == 2
     told = json.loads((tmp_path / "a" / "summary.json").read_text())["uncertainty"]
     assert told["punch"]["largest_depth_mm"] > 0
     assert (

@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from half_space_ball import ball
 
-from fenwear import Tribosystem, march, steady
+from fenwear import Tribosystem, assemble, evolve, march, steady
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.contact.condensed import CondensedContact
+from fenwear.cycle.jump_step import FINE, LOOSEST
+from fenwear.interface import compliance
 from fenwear.plausibility import StateMonitor, steady_warnings
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
@@ -41,6 +44,19 @@ def test_of_runs_and_steady_states(assembled: Callable[..., Tribosystem]) -> Non
     state = steady(system)
     assert state.complementarity_error < 1e-8
     assert not [text for text in steady_warnings(system, state) if "p gap = 0" in text]
+
+
+def test_jumps_solve_grids_to_a_share_of_their_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The products of a grid cost by their digits, and the end of a jump has those that it needs; matrices have all."""
+
+    def error(tolerance: float) -> float:
+        blocks = evolve(assemble(ball(600.0)), 8, tolerance=tolerance)
+        return max(float(block.complementarity_error.max()) for block in blocks)
+
+    for tolerance in (0.1, 1e-4):
+        assert error(tolerance) < FINE * min(tolerance, LOOSEST)
+    monkeypatch.setattr(compliance, "on_one_grid", lambda *_: None)
+    assert error(0.1) < 1e-12
 
 
 def test_a_contact_that_lies(assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch) -> None:

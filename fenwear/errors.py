@@ -78,6 +78,10 @@ class InterruptedRunError(FenwearError):
     """A signal ended a run; its checkpoint allows to go on."""
 
 
+class TimeUpError(Exception):
+    """What was to be done within a time limit took longer."""
+
+
 class MeshQualityError(ConvergenceError):
     """A mesh that follows the wear has an element that is no longer good enough to compute on."""
 

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear.errors import CaseError, InputError, RanksError
+from fenwear.errors import CaseError, InputError, RanksError, TimeUpError
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -42,15 +42,20 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
 def all_together(comm: MPI.Comm) -> None:
     """Refuse what all ranks do together where one leads them: the others wait for its orders, and would for ever.
 
-    To be called where collective work begins.
+    To be called where collective work begins; collective.
 
     Raises:
         RanksError: this rank leads.
+        TimeUpError: by the clock of rank 0 it is too late, see `fenwear.signals.time_limit`.
     """
-    if comm.size > 1 and Team.any_leads():
+    if comm.size == 1:
+        return
+    if Team.any_leads():
         raise RanksError(
             "all ranks are asked for where one leads the others: what they make together has to be made before"
         )
+    if Team.until < np.inf and comm.bcast(time.monotonic() > Team.until):
+        raise TimeUpError
 
 
 def agreed(comm: MPI.Comm, found: T) -> T:
@@ -98,6 +103,7 @@ class Team:
     """
 
     _teams: ClassVar[list[Team]] = []
+    until: ClassVar[float] = np.inf  # when all ranks are to stop working together, on the clock of each
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm

@@ -15,18 +15,16 @@ from types import FrameType, TracebackType
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.errors import TimeUpError
+from fenwear.parallel import Team
 from fenwear.progress import LOOK, Progress
 
 BOTH = (signal.SIGINT, signal.SIGTERM)
 
 
-class TimeUpError(Exception):
-    """What was to be done within a time limit took longer."""
-
-
 @contextmanager
 def time_limit(seconds: float, comm: MPI.Comm) -> Iterator[None]:
-    """Raise where what is done within takes longer; several ranks, which would not end together, have no limit.
+    """Raise where what is done within takes longer; several ranks look at the clock where they next work together.
 
     Raises:
         TimeUpError: it does.
@@ -36,7 +34,11 @@ def time_limit(seconds: float, comm: MPI.Comm) -> Iterator[None]:
         raise TimeUpError
 
     if comm.size > 1:
-        yield
+        Team.until = time.monotonic() + seconds
+        try:
+            yield
+        finally:
+            Team.until = np.inf
         return
     before = signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, seconds)

@@ -21,14 +21,14 @@ from markupsafe import escape
 from mpi4py import MPI
 
 from fenwear import Case, Tribosystem, assemble, critical_speed, load_case, make_case, march, steady
-from fenwear.assembly import place_case, regridded, with_case
+from fenwear.assembly import place_case, regridded, with_case, with_reduced_heat
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import Isotropic, lame
 from fenwear.bodies.mesh import own_mesh
 from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Body, Support, changed_case, plausibility_warnings
 from fenwear.case.templates import write_case_of
-from fenwear.errors import MeshQualityError
+from fenwear.errors import MeshQualityError, TimeUpError
 from fenwear.plausibility import (
     RULES,
     Seen,
@@ -45,7 +45,7 @@ from fenwear.plausibility.meshes import few, heated_layer, turned
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
-from fenwear.signals import TimeUpError, time_limit
+from fenwear.signals import time_limit
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.setup import partial_slip_problem
 from fenwear_verify.solid import STEEL, describe
@@ -719,6 +719,16 @@ def test_what_takes_longer_than_its_limit_ends() -> None:
     with time_limit(0.01, MPI.COMM_SELF):
         pass
     time.sleep(0.02)
+
+
+@pytest.mark.mpi
+def test_ranks_end_together_where_time_is_up(assembled: Assembled) -> None:
+    """Each of them, in the same work; a later try is not late."""
+    system = assembled("example1-heat", *FLAT, "heat.operator=full")
+    with pytest.raises(TimeUpError), time_limit(1e-4, MPI.COMM_WORLD):
+        with_reduced_heat(system, fresh=True)
+    with time_limit(100.0, MPI.COMM_WORLD):
+        assert with_reduced_heat(system, fresh=True).exchange.reduced
 
 
 def test_check_has_a_limit_for_heat(fenwear: Callable[..., Any]) -> None:

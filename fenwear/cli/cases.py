@@ -192,14 +192,14 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     """
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
+    from fenwear.errors import TimeUpError
     from fenwear.plausibility import fineness_warnings, speed_warnings
-    from fenwear.signals import TimeUpError, time_limit
+    from fenwear.signals import time_limit
 
     if system.heat is None:
         return system, []
     nodes = sum(body.space.dofmap.index_map.size_global for body in system.bodies.heat)
-    limit = f", for at most {seconds:g} s" if system.comm.size == 1 else ""  # ranks do not end together
-    log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does{limit}")
+    log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does, for at most {seconds:g} s")
     try:
         with time_limit(seconds, system.comm):
             warm = with_reduced_heat(system, keep=True)

@@ -130,6 +130,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         CaseError: the punch would tip over.
     """
     law: ContactLaw = law_named(case.contact.law)
+    case = case.graded_as(system.case)  # so that studies are of one mesh
     made, wanted = set_up_by(system.case), set_up_by(case)
     if law is system.contact_law and made != wanted and answers_anywhere(system):
         as_before = case.model_copy(update={"motion": system.case.motion})

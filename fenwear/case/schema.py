@@ -25,6 +25,7 @@ from fenwear.case.names import Names, renamed
 from fenwear.case.quantities import Part
 from fenwear.case.thermal import Heat, diffusion_of
 
+NEAR = 2.0  # ratio of diffusion lengths below which a variant keeps the mesh of its base
 OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
 
 
@@ -202,6 +203,15 @@ class Case(Part):
             return {}
         regions = [self.initial_materials[name] for name in self.strip.regions.values()]
         return diffusion_of(self.motion, self.program.steps if self.program else (), regions)
+
+    def graded_as(self, other: Case) -> Case:
+        """Return the case with the grading of another one's strip, if they differ by less than `NEAR`."""
+        own, others = self.diffusion, other.diffusion
+        if own.keys() != others.keys() or any(not 1 / NEAR < own[key] / others[key] < NEAR for key in own):
+            return self
+        near = self.model_copy()
+        near._diffusion = others
+        return near
 
     def stage(self, changes: Mapping[str, Any]) -> Case:
         """Return the case with the motion and heat of a stage of its program, whose stages have the same meshes."""

@@ -7,7 +7,6 @@ heat and the temperature at sliding contacts, 1942).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -17,8 +16,6 @@ from fenwear.case.materials import Material
 from fenwear.case.motions import OneWay, Rotation
 from fenwear.case.quantities import CONDUCTANCE, Check, Conductance, Number, Part, Temperature, Unit, quantity
 from fenwear.case.units import convert, quantity_text, shown
-
-STEP = 2  # between the values of a / v that meshes are made for: cases of about the same speed share one
 
 
 def _perfect_or_conductance(value: object) -> float | str:
@@ -161,7 +158,7 @@ class Heat(Part):
 def diffusion_of(motion: OneWay | Rotation, steps: Iterable[Any], materials: Iterable[Material]) -> dict[str, float]:
     """Return a / v, mm, or where the strip turns a / omega, mm²/rad, by the parameter of the ready geometries.
 
-    The smallest of all materials and speeds, rounded down to a power of 2; none where the strip stands.
+    The smallest of all materials and speeds; none where the strip stands.
 
     Args:
         motion: Of the strip that conducts heat and passes.
@@ -175,7 +172,4 @@ def diffusion_of(motion: OneWay | Rotation, steps: Iterable[Any], materials: Ite
     )
     fastest = max([speed, *(one for step in steps for one in getattr(step, key) or ())])
     diffusivities = [(m.conductivity or 0.0) / ((m.density or 0.0) * (m.heat_capacity or 0.0)) for m in materials]
-    if fastest <= 0:
-        return {}
-    exact = min(diffusivities) / fastest
-    return {name: float(STEP ** math.floor(math.log(exact, STEP)))}
+    return {name: min(diffusivities) / fastest} if fastest > 0 else {}

@@ -582,17 +582,17 @@ class ContactSetup:
         wear, ratio = self.phases_wear, self.friction_ratio(direction, pressure)
         if pressure is not None:
             wear = self.wear.phases([self.conditions(k, pressure) for k in range(len(self.motion.phases))])
-        bodies = [body for body in (wear.punch, wear.strip) if body is not None]
+        bodies = wear.bodies
         rates = tuple(body.rate.sum(axis=0) / self.motion.period for body in bodies)
         laws = tuple(body.law for body in bodies)
-        if self.sliding.track is None or wear.strip is None:
+        if self.sliding.track is None or not wear.strip.wears:
             return optimum(self.rigid, ratio, WearRates.together(rates, laws), zone)
 
         def recession(pressure: Array) -> Array:
             worn = wear.worn(np.tile(pressure, (len(self.motion.phases), 1)))
             return np.asarray(self.pair.wear_interpolation @ worn.strip / self.motion.period)
 
-        if wear.punch is not None:
+        if wear.punch.wears:
             return optimum_on_track(self.rigid, ratio, WearRates(rates[:1], laws[:1]), laws[1], recession, zone)
         # The strip alone: of all pressures that wear it evenly, one that is even along it.
         law = laws[0]

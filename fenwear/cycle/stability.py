@@ -365,7 +365,7 @@ def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
     n = len(system.rigid.rigid_normal)
     uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
     wear = system.phases_wear
-    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
+    slopes = sum((body.slope(uniform) for body in wear.bodies), np.zeros_like(uniform))
     directions, most = np.array(system.motion.directions), slopes.max(axis=1)
     phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
     opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]

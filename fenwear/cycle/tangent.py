@@ -202,8 +202,7 @@ def _laws(
 
     def depths(*values: Array) -> Array:
         wear = system.wear.phases([at(*values)], [phase])
-        worn = (None if body is None else body.depth(values[0][None])[0] for body in (wear.punch, wear.strip))
-        return np.array([np.zeros(n) if depth is None else depth for depth in worn])
+        return np.array([body.depth(values[0][None])[0] for body in (wear.punch, wear.strip)])
 
     wear = system.wear.phases([at(*around)], [phase])
     mu_p, *mu_t = _slopes(friction, around)
@@ -305,11 +304,8 @@ def _picked(heat: CycleHeat, phase: int) -> Array:
 def _opened(wear: PhasesWear, slope: Array) -> Array:
     """Return the gap (n, n) that depths worn off punch and strip open, for each unit at a node `slope` (2, n)."""
     punch, strip = (
-        None if body is None else replace(body, rate=slope[k : k + 1], law=PressureLaw())
-        for k, body in enumerate((wear.punch, wear.strip))
+        replace(body, rate=slope[k : k + 1], law=PressureLaw()) for k, body in enumerate((wear.punch, wear.strip))
     )
-    if punch is None and strip is None:
-        return np.zeros((slope.shape[1],) * 2)
     left, right = replace(wear, punch=punch, strip=strip).border(slope[:1])
     return np.asarray(left[0] @ right[0])
 

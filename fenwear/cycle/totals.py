@@ -118,8 +118,8 @@ class PhaseMeter:
         self._mu, self._wear = mu, wear
         # At coefficients that stay all is linear, but for wear by a law that is not.
         bodies = list(zip((wear.punch, wear.strip), self._weigh, strict=True))
-        linear = all(own is None or own.linear for own, _ in bodies)
-        worn = [weigh * (0.0 if own is None else own.rate[0]) for own, weigh in bodies]
+        linear = all(own.linear for own, _ in bodies)
+        worn = [weigh * own.rate[0] for own, weigh in bodies]
         self._energy = mu * self._path
         self._rows = np.concatenate([self._by_pressure, self._by_friction * mu, *worn]) if linear else None
 
@@ -135,8 +135,7 @@ class PhaseMeter:
             rubbed = self._mu * pressure
             parts = [*map(float, self._by_pressure @ pressure), *map(float, self._by_friction @ rubbed)]
             for own, weigh in zip((self._wear.punch, self._wear.strip), self._weigh, strict=True):
-                # A mass that is not known is none of nothing worn, either.
-                parts += (0.0, 0.0 * weigh[1, 0]) if own is None else (weigh @ own.depth(pressure[None])[0]).tolist()
+                parts += (weigh @ own.depth(pressure[None])[0]).tolist()
             energy = self._path * rubbed
         else:
             parts, energy = (self._rows @ pressure).tolist(), self._energy * pressure

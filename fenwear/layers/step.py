@@ -223,7 +223,7 @@ class LayerStep:
     def _felt_by_border(self, left: Array, pressure: Array) -> Array:
         """Return L of `border` with what coatings that are compressed leave of it."""
         (punch, strip), n = self._felt(pressure), pressure.shape[1]
-        first = 0 if self._worn.punch is None else n
+        first = n if self._worn.punch.wears else 0
         found = left.copy()
         found[:, :, :first] *= punch[:, :, None]
         found[:, :, first:] *= strip[:, :, None]

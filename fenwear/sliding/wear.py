@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -89,54 +90,136 @@ def _added(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True)
 class BodyWear:
-    """What a body loses in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears."""
-
-    rate: Array
-    law: PressureLaw
-    coating: CoatingWear | None = None
-
-    def depth(self, pressure: Array, worn: Shares | None = None) -> Array:
-        """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes.
-
-        Args:
-            pressure: MPa.
-            worn: What of coating and base there; by default of the base alone.
-        """
-        if worn is None or self.coating is None:
-            return self.rate * self.law.value(pressure)
-        of_coating = self.coating.rate * worn.coating * self.coating.law.value(pressure)
-        return of_coating + self.rate * worn.base * self.law.value(pressure)
-
-    def slope(self, pressure: Array, worn: Shares | None = None) -> Array:
-        """Return their derivatives to the pressures (m, n), mm/MPa."""
-        if worn is None or self.coating is None:
-            return self.rate * self.law.slope(pressure)
-        of_coating = self.coating.rate * worn.by_coating * self.coating.law.slope(pressure)
-        return of_coating + self.rate * worn.by_base * self.law.slope(pressure)
-
-    @property
-    def linear(self) -> bool:
-        """Whether wear is in proportion to the pressure."""
-        return self.law.linear and (self.coating is None or self.coating.left is None)
-
-
-@dataclass(frozen=True)
-class CoatingWear:
-    """What a coating would lose in each phase: beta~ S (m, n), mm/MPa^b, as of `BodyWear`.
+    """What a body loses in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears.
 
     Attributes:
-        rate: Of the coating.
+        rate: At the interface nodes; zero where the body does not wear.
         law: What of the pressure wears it.
-        thickness: At the body's own contact nodes, mm.
-        left: Of it where a step begins; None where it is worn through everywhere.
-        cycles: Length of the step, by which what is worn in a cycle is that of the whole step over it.
+        pairs: The surfaces in each phase, where its nodes are not those of the contact.
+        wears: Whether the body does.
     """
 
     rate: Array
     law: PressureLaw
-    thickness: Array
-    left: Array | None = None
+    pairs: Sequence[ContactPair] = ()
+    wears: bool = True
+
+    @property
+    def coated(self) -> bool:
+        """Whether it has a coating."""
+        return False
+
+    @property
+    def linear(self) -> bool:
+        """Whether wear is in proportion to the pressure."""
+        return self.law.linear
+
+    def some(self, phases: list[int]) -> Self:
+        """Return the wear in some of the phases."""
+        return replace(self, rate=self.rate[phases], pairs=[self.pairs[k] for k in phases] if self.pairs else ())
+
+    def begun(self, depth: Array, cycles: float) -> BodyWear:  # noqa: ARG002
+        """Return the wear from a depth on, through the coating that is left there, in a step of so many cycles."""
+        return self
+
+    def at(self, pressure: Array) -> BodyWear:  # noqa: ARG002
+        """Return the wear at pressures (m, n), which say what of it is of the coating and of the base."""
+        return self
+
+    def depth(self, pressure: Array) -> Array:
+        """Return the depths at the interface nodes (m, n), mm."""
+        return self.rate * self.law.value(pressure)
+
+    def slope(self, pressure: Array) -> Array:
+        """Return their derivatives to the pressures (m, n), mm/MPa."""
+        return self.rate * self.law.slope(pressure)
+
+    def on_material(self, pressure: Array) -> list[Array]:
+        """Return the depths at the body's own nodes, of each phase (n_own,), mm."""
+        return self._put(self.depth(pressure))
+
+    def slopes_on_material(self, pressure: Array) -> list[csr_array]:
+        """Return the derivatives of these depths to the pressures of each phase (n_own, n), mm/MPa."""
+        pairs = zip(self.pairs, self.slope(pressure), strict=True)
+        return [csr_array(pair.wear_projection @ diags_array(slope)) for pair, slope in pairs]
+
+    def _put(self, depths: Array) -> list[Array]:
+        """Return depths at the interface nodes (m, n) at the body's own ones, of each phase."""
+        return [pair.wear_projection @ own for pair, own in zip(self.pairs, depths, strict=True)]
+
+
+OF_BASE = Shares(*map(np.asarray, (0.0, 1.0, 0.0, 1.0)))
+
+
+@dataclass(frozen=True)
+class CoatedWear(BodyWear):
+    """What a coated body loses in each phase, of its coating as long as that lasts, and of the base, `rate` and `law`.
+
+    Attributes:
+        coating: What the coating would lose if it went on.
+        thickness: Of it at the body's own contact nodes, mm.
+        left: Of it where a step begins (n_own,), mm.
+        cycles: Length of the step, by which what is worn in a cycle is that of the whole step over it.
+        shares: What is worn of coating and base at the body's own nodes.
+        here: The same at the interface nodes.
+    """
+
+    coating: BodyWear = field(kw_only=True)
+    thickness: Array = field(kw_only=True)
+    left: Array = field(default_factory=lambda: np.zeros(1), kw_only=True)
     cycles: float = 1.0
+    shares: Shares = OF_BASE
+    here: Shares = OF_BASE
+
+    @property
+    def coated(self) -> bool:
+        """Whether it has a coating."""
+        return True
+
+    @property
+    def linear(self) -> bool:
+        """Whether wear is in proportion to the pressure: where the coating is worn through."""
+        return self.law.linear and not self.left.any()
+
+    def some(self, phases: list[int]) -> Self:
+        """Return the wear in some of the phases."""
+        return replace(super().some(phases), coating=self.coating.some(phases))
+
+    def begun(self, depth: Array, cycles: float) -> BodyWear:
+        """Return the wear from a depth on."""
+        return replace(self, left=left_of(self.thickness, depth), cycles=cycles)
+
+    def at(self, pressure: Array) -> BodyWear:
+        """Return the wear at pressures (m, n)."""
+        both = (self.coating.depth(pressure), super().depth(pressure))
+        coating, base = (np.sum(self._put(own) if self.pairs else own, axis=0) for own in both)
+        found = shares(self.cycles * coating, self.cycles * base, self.left)
+        here = found.at(self.pairs[0].wear_interpolation) if self.pairs else found
+        return replace(self, shares=found, here=here)
+
+    def depth(self, pressure: Array) -> Array:
+        """Return the depths at the interface nodes (m, n), mm."""
+        return self.here.of(self.coating.depth(pressure), super().depth(pressure))
+
+    def slope(self, pressure: Array) -> Array:
+        """Return their derivatives to the pressures (m, n), mm/MPa."""
+        here = self.here
+        return here.by_coating * self.coating.slope(pressure) + here.by_base * super().slope(pressure)
+
+    def on_material(self, pressure: Array) -> list[Array]:
+        """Return the depths at the body's own nodes, of each phase (n_own,), mm."""
+        both = zip(self._put(self.coating.depth(pressure)), self._put(super().depth(pressure)), strict=True)
+        return [self.shares.of(*own) for own in both]
+
+    def slopes_on_material(self, pressure: Array) -> list[csr_array]:
+        """Return the derivatives of these depths to the pressures of each phase (n_own, n), mm/MPa."""
+        by_coating, by_base = (diags_array(one) for one in (self.shares.by_coating, self.shares.by_base))
+        both = zip(self.pairs, self.coating.slope(pressure), super().slope(pressure), strict=True)
+        return [
+            csr_array(by_coating @ pair.wear_projection @ diags_array(coating))
+            + csr_array(by_base @ pair.wear_projection @ diags_array(base))
+            for pair, coating, base in both
+        ]
 
 
 @dataclass(frozen=True)
@@ -144,37 +227,38 @@ class PhasesWear:
     """The wear of the phases of a motion, or of some of them; equations (1), (26), (27).
 
     Attributes:
-        punch, strip: beta~ S p^b at the interface nodes; None where the body does not wear.
+        punch, strip: beta~ S p^b at the interface nodes.
         pairs: The surfaces opposite each other in each phase.
     """
 
-    punch: BodyWear | None
-    strip: BodyWear | None
+    punch: BodyWear
+    strip: BodyWear
     pairs: Sequence[ContactPair]
+
+    @property
+    def bodies(self) -> tuple[BodyWear, ...]:
+        """Those that wear."""
+        return tuple(body for body in (self.punch, self.strip) if body.wears)
 
     @property
     def cap(self) -> float:
         """The lowest pressure beyond which the wear of a body grows no more, MPa; infinite without."""
-        return min((body.law.cap for body in (self.punch, self.strip) if body is not None), default=np.inf)
+        return min(self.punch.law.cap, self.strip.law.cap)
 
     def softened(self, share: float) -> PhasesWear:
         """Return the same where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
-        punch, strip = (
-            None if one is None else replace(one, law=replace(one.law, beyond=share))
-            for one in (self.punch, self.strip)
-        )
+        punch, strip = (replace(one, law=replace(one.law, beyond=share)) for one in (self.punch, self.strip))
         return replace(self, punch=punch, strip=strip)
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""
         chosen = list(phases)
-        punch, strip = (None if body is None else _some(body, chosen) for body in (self.punch, self.strip))
-        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen])
+        return PhasesWear(self.punch.some(chosen), self.strip.some(chosen), [self.pairs[k] for k in chosen])
 
     @cached_property
     def coated(self) -> bool:
         """Whether a body has a coating."""
-        return any(body is not None and body.coating is not None for body in (self.punch, self.strip))
+        return self.punch.coated or self.strip.coated
 
     def begun(self, worn: WornDepths, cycles: float | None = None) -> PhasesWear:
         """Return the wear from these depths on, through the coatings that are left there.
@@ -185,74 +269,33 @@ class PhasesWear:
         """
         if not self.coated:
             return self
-        parts = []
-        for body, depth in ((self.punch, worn.punch), (self.strip, worn.strip)):
-            if body is None or body.coating is None:
-                parts.append(body)
-                continue
-            left = left_of(body.coating.thickness, depth)
-            coating = replace(body.coating, left=left, cycles=1.0 if cycles is None else cycles)
-            parts.append(replace(body, coating=coating))
-        return replace(self, punch=parts[0], strip=parts[1])
-
-    def _shares(self, body: BodyWear | None, pressure: Array) -> Shares | None:
-        """Return what is worn of coating and base of a body, at its own nodes; None where all is of the base."""
-        if body is None or body.coating is None or body.coating.left is None:
-            return None
-        own, left = body.coating, body.coating.left
-        worn = (own.rate * own.law.value(pressure), body.rate * body.law.value(pressure))
-        if body is self.punch:
-            coating, base = (np.asarray(one.sum(axis=0)) for one in worn)
-        else:
-            coating, base = (
-                np.sum([pair.wear_projection @ part for pair, part in zip(self.pairs, one, strict=True)], axis=0)
-                for one in worn
-            )
-        return shares(own.cycles * coating, own.cycles * base, left)
-
-    def _at_contact(self, pressure: Array) -> tuple[Shares | None, Shares | None]:
-        """Return what is worn of coatings and bases, at the contact's nodes."""
-        punch, strip = self._shares(self.punch, pressure), self._shares(self.strip, pressure)
-        return punch, None if strip is None else strip.at(self.pairs[0].wear_interpolation)
+        length = 1.0 if cycles is None else cycles
+        return replace(self, punch=self.punch.begun(worn.punch, length), strip=self.strip.begun(worn.strip, length))
 
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
-        if self.punch is None:
-            return np.zeros_like(pressure)
-        return self.punch.depth(pressure, self._shares(self.punch, pressure))
+        return self.punch.at(pressure).depth(pressure)
 
     def taken(self, pressure: Array) -> Array:
         """Return the depths worn off both bodies together at the contact nodes in each phase (m, n), mm."""
-        bodies = zip((self.punch, self.strip), self._at_contact(pressure), strict=True)
-        depths = [body.depth(pressure, worn) for body, worn in bodies if body is not None]
-        if len(depths) == 1:
-            return depths[0]
-        return np.asarray(sum(depths, np.zeros_like(pressure)))
+        return np.asarray(sum((body.at(pressure).depth(pressure) for body in self.bodies), np.zeros_like(pressure)))
 
     def taken_slope(self, pressure: Array) -> Array:
         """Return the derivatives of `taken` to the pressures (m, n), mm/MPa."""
-        slopes = [slope for slope in self.by_body(pressure) if slope is not None]
-        return np.asarray(sum(slopes, np.zeros_like(pressure)))
+        return np.asarray(sum((body.at(pressure).slope(pressure) for body in self.bodies), np.zeros_like(pressure)))
 
     def worn(self, pressure: Array) -> WornDepths:
         """Return what all phases wear off both bodies at pressures (m, n)."""
-        first = self.pairs[0]
-        strip = np.zeros(len(first.strip.weights))
-        if self.strip is not None:
-            worn, coating = self._shares(self.strip, pressure), self.strip.coating
-            for k, (pair, depth) in enumerate(zip(self.pairs, self.strip.depth(pressure), strict=True)):
-                of_base = pair.wear_projection @ depth
-                if worn is not None and coating is not None:
-                    of_coating = pair.wear_projection @ (coating.rate[k] * coating.law.value(pressure[k]))
-                    of_base = worn.coating * of_coating + worn.base * of_base
-                strip += of_base
+        strip = np.zeros(len(self.pairs[0].strip.weights))
+        if self.strip.wears:
+            strip = sum(self.strip.at(pressure).on_material(pressure), strip)
         punch = self.depth(pressure)
         return WornDepths(punch[0] if len(punch) == 1 else punch.sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
         """Return the gap that the wear of all phases opens in each of them (m, n), mm."""
         worn = self.worn(pressure)
-        if self.strip is None:
+        if not self.strip.wears:
             return np.broadcast_to(worn.punch, pressure.shape)
         return np.array([pair.opening(worn.punch, worn.strip) for pair in self.pairs])
 
@@ -263,68 +306,43 @@ class PhasesWear:
         """
         m, n = pressure.shape
         right = np.zeros((m, self._left.shape[2], n))
-        strip = 0
-        if self.punch is not None:
-            nodes, strip = np.arange(n), n
-            right[:, nodes, nodes] = self.punch.slope(pressure, self._shares(self.punch, pressure))
-        if self.strip is not None:
-            for k, slope in enumerate(self._strip_slopes(pressure)):
-                right[k, strip:] = slope.toarray()
+        strip = n if self.punch.wears else 0
+        if self.punch.wears:
+            nodes = np.arange(n)
+            right[:, nodes, nodes] = self.punch.at(pressure).slope(pressure)
+        if self.strip.wears:
+            right[:, strip:] = [one.toarray() for one in self.strip.at(pressure).slopes_on_material(pressure)]
         return self._left, right
-
-    def _strip_slopes(self, pressure: Array) -> list[csr_array]:
-        """Return the depth of the strip's nodes by unit pressures of each phase (n_strip, n), mm/MPa."""
-        assert self.strip is not None
-        worn, coating, found = self._shares(self.strip, pressure), self.strip.coating, list[csr_array]()
-        for k, slope in enumerate(self.strip.slope(pressure)):
-            onto = self.pairs[k].wear_projection
-            of_base = csr_array(onto @ diags_array(slope))
-            if worn is not None and coating is not None:
-                of_coating = onto @ diags_array(coating.rate[k] * coating.law.slope(pressure)[k])
-                of_base = csr_array(diags_array(worn.by_coating) @ of_coating + diags_array(worn.by_base) @ of_base)
-            found.append(of_base)
-        return found
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return what unit pressures wear off punch and strip at pressures (m, n), mm/MPa; None where one does not."""
-        bodies = zip((self.punch, self.strip), self._at_contact(pressure), strict=True)
-        punch, strip = (None if body is None else body.slope(pressure, worn) for body, worn in bodies)
+        punch, strip = (body.at(pressure).slope(pressure) if body.wears else None for body in (self.punch, self.strip))
         return punch, strip
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
-        if self.strip is not None or self.punch is None:
+        if self.strip.wears or not self.punch.wears:
             return None
-        return self.punch.slope(pressure, self._shares(self.punch, pressure))
+        return self.punch.at(pressure).slope(pressure)
 
     def slopes(self, pressure: Array) -> list[csr_array]:
         """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
-        m, n = pressure.shape
-        found = [csr_array((n, n)) for _ in range(m)]
-        if self.punch is not None:
-            slopes = self.punch.slope(pressure, self._shares(self.punch, pressure))
-            found = [csr_array(diags_array(slope)) for slope in slopes]
-        if self.strip is not None:
+        found = [csr_array(diags_array(slope)) for slope in self.punch.at(pressure).slope(pressure)]
+        if self.strip.wears:
             material = self.pairs[0].wear_interpolation
-            for k, slope in enumerate(self._strip_slopes(pressure)):
-                found[k] = csr_array(found[k] + material @ slope)
+            below = self.strip.at(pressure).slopes_on_material(pressure)
+            found = [csr_array(one + material @ slope) for one, slope in zip(found, below, strict=True)]
         return found
 
     @cached_property
     def _left(self) -> Array:
-        parts = []
-        if self.punch is not None:
-            n = len(self.pairs[0].weights)
-            parts.append(np.broadcast_to(np.eye(n), (len(self.pairs), n, n)))
-        if self.strip is not None:
+        m, n = len(self.pairs), len(self.pairs[0].weights)
+        parts = [np.zeros((m, n, 0))]
+        if self.punch.wears:
+            parts.append(np.broadcast_to(np.eye(n), (m, n, n)))
+        if self.strip.wears:
             parts.append(np.array([pair.wear_interpolation.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
-
-
-def _some(body: BodyWear, phases: list[int]) -> BodyWear:
-    """Return the wear of a body in some of the phases."""
-    coating = None if body.coating is None else replace(body.coating, rate=body.coating.rate[phases])
-    return replace(body, rate=body.rate[phases], coating=coating)
 
 
 @dataclass(frozen=True)
@@ -411,26 +429,33 @@ class Wear:
             CaseError: a coefficient is negative or not finite there.
         """
         chosen = range(len(self.pairs)) if which is None else which
-        bodies: list[BodyWear | None] = []
-        given = zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), self.coatings, strict=True)
-        for law, sliding, key, thickness in given:
+        numbered, pairs = list(zip(chosen, conditions, strict=True)), [self.pairs[k] for k in chosen]
+        bodies: list[BodyWear] = []
+        given = zip(
+            (self.punch, self.strip),
+            self.sliding,
+            ("wear.punch", "wear.strip"),
+            self.coatings,
+            ((), pairs),
+            strict=True,
+        )
+        for law, sliding, key, thickness, own in given:
             if not law.wears:
-                bodies.append(None)
+                bodies.append(BodyWear(np.zeros((len(pairs), sliding.shape[1])), PressureLaw(), own, wears=False))
                 continue
+            rate, above = self._rate(law, sliding, key, numbered), law.of_coating
+            if above is None:
+                bodies.append(BodyWear(rate, self._of_pressure[key], own))
+                continue
+            of_pressure = PressureLaw.of(above, self.friction.contact.uniform_share)
+            coating = BodyWear(self._rate(above, sliding, key, numbered), of_pressure, own)
+            bodies.append(CoatedWear(rate, self._of_pressure[key], own, coating=coating, thickness=thickness))
+        return PhasesWear(bodies[0], bodies[1], pairs)
 
-            def rates(law: WearLaw, sliding: Array = sliding, key: str = key) -> Array:
-                numbered = zip(chosen, conditions, strict=True)
-                found = [sliding[k] * coefficient(law, self.friction, state, key) for k, state in numbered]
-                return found[0][None] if len(found) == 1 else np.array(found)
-
-            above = law.of_coating
-            coating = (
-                None
-                if above is None
-                else CoatingWear(rates(above), PressureLaw.of(above, self.friction.contact.uniform_share), thickness)
-            )
-            bodies.append(BodyWear(rates(law), self._of_pressure[key], coating))
-        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
+    def _rate(self, law: WearLaw, sliding: Array, key: str, numbered: Sequence[tuple[int, ContactConditions]]) -> Array:
+        """Return beta~ S of a law in some phases (m, n), by their numbers and conditions."""
+        found = [sliding[k] * coefficient(law, self.friction, state, key) for k, state in numbered]
+        return found[0][None] if len(found) == 1 else np.array(found)
 
 
 def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:

@@ -70,7 +70,7 @@ class PartialSlipProblem:
         self.coatings = coatings or CoatedBodies.bare(len(pair.weights), len(pair.strip.weights))
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
         self.weights, self.watch, self.heat = pair.weights, watch, heat
-        self.conditions = StepConditions(interface, program, laws, heat, wear.strip is not None)
+        self.conditions = StepConditions(interface, program, laws, heat, wear.strip.wears)
         self.losses = StepLosses(self.conditions, wear, self.coatings)
         self._pressed: PartialSlipState | None = None  # unworn, under the case's loads, where the first cycle begins
 

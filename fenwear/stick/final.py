@@ -442,7 +442,7 @@ def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array]
 
 def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
     """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
-    rates = [0.0 if law is None else float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
+    rates = [float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
     if not problem.coatings.any or not 0 < share < 1:
         return np.asarray(share * depth)

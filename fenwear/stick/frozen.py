@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
+from fenwear.interface import ContactPair
 from fenwear.layers.step import LayerEvolution, LayerStep
-from fenwear.sliding.wear import BodyWear, CoatingWear, PhasesWear, WornDepths
+from fenwear.sliding.wear import BodyWear, CoatedWear, PhasesWear, WornDepths
 from fenwear.stick.creep import CreepNear, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.losses import slips_of
+from fenwear.stick.losses import StepSlips, slips_of
 from fenwear.stick.position import Position
 from fenwear.stick.records import FrettingCycle
 from fenwear.stick.state import PartialSlipState
@@ -204,22 +205,20 @@ def _passing(problem: PartialSlipProblem, cycle: FrettingCycle, begin: PartialSl
             conditions = evolution.through(layers.held(cycle.worn))[0]
         wears = [problem.laws.wear_at(one) for one in conditions]
     bodies = []
-    coatings = (problem.coatings.punch, problem.coatings.strip)
-    for rates, coated in zip(zip(*(wear.layers for wear in wears), strict=True), coatings, strict=True):
-        above, below = zip(*rates, strict=True)
-        coating, base = _by_steps(above, slips.slid, slips.duration), _by_steps(below, slips.slid, slips.duration)
-        if base is not None and coating is not None:
-            base = replace(base, coating=CoatingWear(coating.rate, coating.law, coated.thickness))
+    pairs, coatings = problem.conditions.pairs(slips, begin), (problem.coatings.punch, problem.coatings.strip)
+    by_body = zip(*(wear.layers for wear in wears), strict=True)
+    for rates, coated, own in zip(by_body, coatings, ((), pairs), strict=True):
+        coating, base = (_by_steps(laws, slips, own) for laws in zip(*rates, strict=True))
+        if coated.thickness.any():
+            base = CoatedWear(base.rate, base.law, own, coating=coating, thickness=coated.thickness)
         bodies.append(base)
     debris = None if layers.debris is None else losses.debris_over(records, begin)
-    wear = PhasesWear(bodies[0], bodies[1], problem.conditions.pairs(slips, begin))
+    wear = PhasesWear(bodies[0], bodies[1], pairs)
     return LayerEvolution(layers, wear, debris, evolution)
 
 
-def _by_steps(rates: Sequence[BodyRate | None], slid: Array, duration: Array) -> BodyWear | None:
-    """Return what a body loses in each time step by its pressure; None where it does not wear."""
-    known = [rate for rate in rates if rate is not None]
-    if not known:
-        return None
-    lost = [rate.rate * rate.slide(slid[k], float(duration[k])) for k, rate in enumerate(known)]
-    return BodyWear(np.array(lost), known[0].law)
+def _by_steps(rates: Sequence[BodyRate], slips: StepSlips, pairs: Sequence[ContactPair]) -> BodyWear:
+    """Return what a body loses in each time step by its pressure."""
+    durations = map(float, slips.duration)
+    lost = [rate.rate * rate.slide(*own) for rate, *own in zip(rates, slips.slid, durations, strict=True)]
+    return BodyWear(np.array(lost), rates[0].law, pairs, rates[0].wears)

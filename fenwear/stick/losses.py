@@ -238,7 +238,7 @@ class StepLosses:
             (records.punch_base, records.strip_base) if of_bases else (records.punch_depth, records.strip_depth)
         )
         strip = np.zeros(len(pair.strip.weights))
-        if self.wear.strip is not None:
+        if self.wear.strip.wears:
             places = [steps[(first + k) % len(steps)].offset for k in range(len(records))]
             for place in dict.fromkeys(places):
                 depth = below[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
@@ -248,9 +248,8 @@ class StepLosses:
     @cached_property
     def one_ratio(self) -> bool:
         """Whether what bases and coatings wear has a ratio that stays; so it has where nothing is coated."""
-        laws = [pair for pair in self.wear.layers if pair[0] is not None]
-        alike = all(coating is not None and base is not None and coating.law == base.law for coating, base in laws)
-        return not laws or (self.conditions.laws is None and alike)
+        alike = all(coating.law == base.law for coating, base in self.wear.layers)
+        return not self.wear.bases or (self.conditions.laws is None and alike)
 
     def _taken(self, coatings: _Both, bases: _Both, parts: BothShares) -> Array:
         """Return what both bodies lose at the contact's nodes (..., n).

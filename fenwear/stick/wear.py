@@ -29,11 +29,12 @@ States = tuple[Mapping[str, Array], Mapping[str, Array]]
 
 @dataclass(frozen=True)
 class BodyRate:
-    """The wear law of a body: beta~ at the nodes (n,), what of the pressure wears, and a."""
+    """The wear law of a body: beta~ at the nodes (n,), what of the pressure wears, a, and whether the body wears."""
 
     rate: Array
     law: PressureLaw = field(default_factory=PressureLaw)
     speed_exponent: float = 1.0
+    wears: bool = True
 
     def depth(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
@@ -51,32 +52,26 @@ class LocalWear:
 
     Attributes:
         punch, strip: Of a coated body as if all of it were of the coating.
-        bases: Of both bodies as if all coatings were worn through; None where nothing is coated.
+        bases: Of both as if all coatings were worn through; empty where nothing is coated.
     """
 
-    punch: BodyRate | None
-    strip: BodyRate | None
-    bases: LocalWear | None = None
-
-    def depths(self, pressure: Array, slid: Array, duration: float) -> tuple[Array, Array]:
-        """Return the depths worn off punch and strip at the contact nodes (n,) each, mm, of coatings that go on."""
-        none = np.zeros_like(pressure)
-        return (
-            none if self.punch is None else self.punch.depth(pressure, slid, duration),
-            none if self.strip is None else self.strip.depth(pressure, slid, duration),
-        )
+    punch: BodyRate
+    strip: BodyRate
+    bases: tuple[BodyRate, ...] = ()
 
     @property
-    def layers(self) -> tuple[tuple[BodyRate | None, BodyRate | None], tuple[BodyRate | None, BodyRate | None]]:
-        """Of punch and strip, the laws of coating and base each; of a body without coating that of the base alone."""
-        if self.bases is None:
-            return (None, self.punch), (None, self.strip)
-        return (self.punch, self.bases.punch), (self.strip, self.bases.strip)
+    def layers(self) -> tuple[tuple[BodyRate, BodyRate], tuple[BodyRate, BodyRate]]:
+        """Of punch and strip, the laws of coating and base each; of a body without coating that of the base twice."""
+        punch, strip = self.bases or (self.punch, self.strip)
+        return (self.punch, punch), (self.strip, strip)
 
     def both(self, pressure: Array, slid: Array, duration: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Return `depths`, and those of the bases."""
-        found = self.depths(pressure, slid, duration)
-        return found, found if self.bases is None else self.bases.depths(pressure, slid, duration)
+        """Return the depths worn off punch and strip (n,), mm, of coatings that go on; and those of the bases."""
+        punch, strip = (law.depth(pressure, slid, duration) for law in (self.punch, self.strip))
+        if not self.bases:
+            return (punch, strip), (punch, strip)
+        first, second = (law.depth(pressure, slid, duration) for law in self.bases)
+        return (punch, strip), (first, second)
 
 
 @dataclass(frozen=True)
@@ -167,22 +162,18 @@ class LocalLaws:
             CaseError: a coefficient is negative or not finite there.
         """
 
-        def rate(law: WearLaw, key: str) -> BodyRate | None:
+        def rate(law: WearLaw, key: str) -> BodyRate:
             if not law.wears:
-                return None
+                return BodyRate(np.zeros(conditions.shape), wears=False)
             of_pressure = PressureLaw.of(law, self.friction.contact.uniform_share)
             return BodyRate(coefficient(law, self.friction, conditions, key), of_pressure, law.speed_exponent)
 
         punch, strip = self.wear
-        bases = LocalWear(rate(punch, "wear.punch"), rate(strip, "wear.strip"))
-        above = [law.of_coating for law in self.wear]
-        if above == [None, None]:
-            return bases
-        of_punch, of_strip = above
+        bases = rate(punch, "wear.punch"), rate(strip, "wear.strip")
+        if not any(law.coating for law in self.wear):
+            return LocalWear(*bases)
         return LocalWear(
-            bases.punch if of_punch is None else rate(of_punch, "wear.punch"),
-            bases.strip if of_strip is None else rate(of_strip, "wear.strip"),
-            bases,
+            rate(punch.of_coating or punch, "wear.punch"), rate(strip.of_coating or strip, "wear.strip"), bases
         )
 
     def coated(self, pair: ContactPair, conditions: ContactConditions) -> tuple[CoatedBody, CoatedBody]:
@@ -194,7 +185,7 @@ class LocalLaws:
         found, own = [], eye_array(len(conditions.pressure))
         onto = own, pair.wear_projection
         for thickness, laws, put in zip(self.coatings, self.wear_at(conditions).layers, onto, strict=True):
-            coating, base = (np.zeros(len(thickness)) if law is None else put @ law.rate for law in laws)
+            coating, base = (put @ law.rate for law in laws)
             ratio = np.divide(base, coating, out=np.ones_like(thickness), where=coating > 0)
             found.append(CoatedBody(thickness, ratio))
         return found[0], found[1]

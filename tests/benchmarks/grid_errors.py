@@ -83,7 +83,7 @@ def worn(nodes: int) -> None:
     count = 2 * int(WORN * nodes / 2)
     bodies = on_grid(body, body, 2 * a / nodes, (count, count), LOAD, RADIUS)
     n = len(bodies.middle.pair.weights)
-    wear = LocalWear(BodyRate(np.full(n, 1e-8)), None)
+    wear = LocalWear(BodyRate(np.full(n, 1e-8)), BodyRate(np.zeros(n), wears=False))
     problem = PartialSlipProblem(bodies, to_and_fro(AMPLITUDE, 2), wear, np.full(n, FRICTION))
     found = final_shape(problem)
     depth, volume = found.depth.max() / DEPTH - 1, problem.weights @ found.depth / VOLUME - 1

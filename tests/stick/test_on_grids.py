@@ -191,7 +191,7 @@ def test_where_partial_slip_ends() -> None:
     a, steps = 0.1866256, 2
     bodies = on_grid(sphere, sphere, a / 12, (42, 42), LOAD, RADIUS)
     n = len(bodies.middle.pair.weights)
-    wear = LocalWear(BodyRate(np.full(n, 1e-8)), None)
+    wear = LocalWear(BodyRate(np.full(n, 1e-8)), BodyRate(np.zeros(n), wears=False))
     problem = PartialSlipProblem(bodies, to_and_fro(1.58597e-3, steps), wear, np.full(n, FRICTION))
     found = final_shape(problem)
     volume = problem.weights @ found.depth

@@ -316,5 +316,5 @@ def sphere_wear_end() -> Result:
 
 def _rig(sphere: Sphere, amplitude: float, rate: float) -> PartialSlipProblem:
     n = len(sphere.weights)
-    wear = LocalWear(BodyRate(np.full(n, rate)), None)
+    wear = LocalWear(BodyRate(np.full(n, rate)), BodyRate(np.zeros(n), wears=False))
     return PartialSlipProblem(sphere.bodies, to_and_fro(amplitude, 10), wear, np.full(n, FRICTION))

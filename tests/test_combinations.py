@@ -65,7 +65,7 @@ def check(block: Block) -> None:
         volume = system.bodies.punch.thickness * float(system.pair.weights @ block.end.worn.punch)
         followed = 1e-3 if system.bodies.followed is not None else 1e-9
         assert float(block.totals.of("volume_punch")[-1]) == pytest.approx(volume, rel=followed)
-    if system.layers.debris is not None:
+    if system.layers.debris.present:
         assert between.values(block)["debris_balance_error"].max() < 1e-12
     if block.heat is not None:
         assert block.heat.balance_error.max() < 1e-8

@@ -300,7 +300,7 @@ class ContactSetup:
         wear: PhasesWear,
         phases: Sequence[int] | None = None,
         evolution: Evolution | None = None,
-        conditions: Sequence[ContactConditions] | None = None,
+        conditions: Sequence[ContactConditions] = (),
     ) -> LayerEvolution:
         """Return what phases of the motion, by default all, wear and do to what lies between.
 
@@ -311,7 +311,7 @@ class ContactSetup:
             conditions: Of the phases, which debris may be lost by; by default those of the mean pressure.
         """
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
-        if conditions is None and self.layers.varies:
+        if not conditions and self.layers.varies:
             conditions = [self.conditions(k) for k in chosen]
         return LayerEvolution.over(self.layers, wear, self.path[chosen], evolution, conditions)
 
@@ -396,9 +396,8 @@ class ContactSetup:
 
     def gap(self, phase: int, worn: WornDepths) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
-        pair, between = self.pairs[phase], self.layers.opening(worn.between)
-        if (lies := self.layers.on_strip(worn)) is not None:
-            between = between - pair.wear_interpolation @ lies
+        pair = self.pairs[phase]
+        between = self.layers.opening(pair, worn)
         if self.bodies.moved is not None:
             worn = worn - self.bodies.moved
         elif not self.strip_wears:

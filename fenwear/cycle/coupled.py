@@ -251,7 +251,7 @@ class Coupled:
         if passing is not None:
             # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
             parts += [passing.before.punch, passing.before.strip]
-        felt = system.layers.debris is not None and system.asks("debris")
+        felt = system.layers.debris.present and system.asks("debris")
         if felt:
             parts.append(self._first_debris(start.pressure, passing))
         unknowns = _Unknowns.like(parts, pressure_scale(system, start.pressure), warm=warm)
@@ -326,24 +326,19 @@ class Coupled:
     def _first_debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
         """Return the thickness of the debris that is looked for from: what there was before, or would be in the end."""
         if passing is not None:
-            return self._debris_before(passing)
+            return self.system.layers.lies(passing.before)
         resting = self.system.passing(self.system.phases_wear).resting(pressure)
-        return np.zeros(pressure.shape[1]) if resting is None or not np.isfinite(resting).all() else resting
+        return resting if np.isfinite(resting).all() else np.zeros(pressure.shape[1])
 
     def _debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
         """Return the thickness of the debris at the end of a step, or in the end, at the conditions last taken."""
         assert self._passing is not None
         if passing is None:
-            return np.asarray(self._passing.resting(pressure))
+            return self._passing.resting(pressure)
         return (
-            self._debris_before(passing)
+            self.system.layers.lies(passing.before)
             + passing.cycles * self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
         )
-
-    def _debris_before(self, passing: DepthEvolution) -> Array:
-        """Return the thickness of the debris where a step begins, where it lies: (n,), or on the strip (n_strip,)."""
-        layers = self.system.layers
-        return np.asarray((layers.on_strip if layers.strip_carries else layers.thickness)(passing.before))
 
     def _update(
         self,

@@ -104,7 +104,7 @@ class Sizes:
     def area(self, worn: WornDepths) -> float:
         """Return the integral of the size of depths over both surfaces, and of what lies between."""
         weights, on_strip = self.pair.weights, self.pair.strip.weights
-        between = float(weights @ np.broadcast_to(np.abs(self.layers.opening(worn.between)), weights.shape))
+        between = float(weights @ np.broadcast_to(np.abs(self.layers.opened(worn.between)), weights.shape))
         return float(weights @ np.abs(worn.punch) + on_strip @ np.abs(worn.strip)) + between + self._carried(worn)
 
     def of_depth(self, wrong: WornDepths, step: WornDepths, end: WornDepths, rest: float = 0.0) -> float:
@@ -133,13 +133,12 @@ class Sizes:
         return float(self.pair.weights @ np.abs(self.crept(worn.crept)))
 
     def _carried(self, worn: WornDepths) -> float:
-        lies = self.layers.on_strip(worn)
-        return 0.0 if lies is None else float(self.pair.strip.weights @ np.abs(lies))
+        return float(self.pair.strip.weights @ np.abs(self.layers.lies(worn))) if self.layers.strip_carries else 0.0
 
     def _states(self, worn: WornDepths) -> Array:
         """Return the integrals of the size of all states."""
-        held, lies = self.layers.held(worn), self.layers.thickness(worn)
-        on_contact = [float(self.pair.weights @ np.abs(one)) for one in (*held.contact, lies)]
+        held, lies = self.layers.held(worn), worn.between[:1] if self.layers.lies_here else ()
+        on_contact = [float(self.pair.weights @ np.abs(one)) for one in (*held.contact, *lies)]
         return np.array([*on_contact, *(float(self.pair.strip.weights @ np.abs(one)) for one in held.strip)])
 
 

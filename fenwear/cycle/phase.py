@@ -316,7 +316,7 @@ class PhaseStep:
     @cached_property
     def _friction_that_stays(self) -> FollowingFriction | None:
         """Friction that follows the pressure and nothing else that changes; None where something else does."""
-        if self._staying is None or self.system.layers.debris is not None:
+        if self._staying is None or self.system.layers.debris.present:
             return None
         return FollowingFriction(self.system.friction, self._staying)
 
@@ -338,12 +338,12 @@ class PhaseStep:
         ends = end if ended else None
         return LayerEvolution(system.layers, wear, self._lost(conditions), evolution, ends)
 
-    def _lost(self, conditions: ContactConditions) -> DebrisCycle | None:
+    def _lost(self, conditions: ContactConditions) -> DebrisCycle:
         """Return what the phase does to debris at conditions: as before where no more than the same edges matter."""
         layers, edge = self.system.layers, conditions.edge
-        if layers.debris is None or not layers.varies or (layers.debris.life is not None and edge is self._edge):
+        if not layers.varies or (not layers.debris.of_state and edge is self._edge):
             return self._debris
-        onto = [self.system.pairs[self.phase].wear_projection] if layers.strip_carries else None
+        onto = layers.places([self.system.pairs[self.phase]])
         self._debris, self._edge = layers.debris.over(self._slid, [conditions], onto), edge
         return self._debris
 

@@ -126,7 +126,8 @@ def _factors(
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = heat.dim + system.creep.size
-    dim += 0 if system.layers.debris is None else len(system.pair.strip.weights) if system.layers.strip_carries else n
+    if system.layers.debris.present:
+        dim += len(system.pair.strip.weights) if system.layers.strip_carries else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
@@ -255,7 +256,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
         ConvergenceError: debris has no thickness at which as much is lost as comes.
     """
     layers = system.layers
-    if not layers.memory.names and layers.debris is None:
+    if not layers.memory.names and not layers.debris.present:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if states:
@@ -264,15 +265,15 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
         system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
     ]
     rest = system.rested(conditions)
-    if layers.debris is None:
+    if not layers.debris.present:
         return rest
-    thickness = np.asarray(layers.where_it_lies(rest))
+    thickness = layers.lies(rest)
     for _ in range(MAX_ITERATIONS):
         lying = layers.with_thickness(rest, thickness)
         pairs = zip(conditions, system.pairs, strict=True)
         now = [replace(one, debris=layers.facing(pair, lying)) for one, pair in pairs]
         passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
-        thickness = np.asarray(passing.resting_where_it_lies(pressure))
+        thickness = passing.resting_where_it_lies(pressure)
         if not layers.varies and not system.asks("debris"):
             break
         if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):

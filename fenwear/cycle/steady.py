@@ -276,7 +276,7 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
     except ConvergenceError as error:
         if capped := _no_state_under_cap(problem):
             raise ConvergenceError(capped) from error
-        if system.layers.debris is not None:  # it presses most where it is thickest, and comes from where it presses
+        if system.layers.debris.present:  # it presses most where it is thickest, and comes from where it presses
             raise ConvergenceError(
                 f"{error}; where much debris lies between, there may be several states, or none that is stable. Follow "
                 "it by `run`, or give the debris a shorter life"
@@ -339,6 +339,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: He
     weights, motion, worn = system.pair.weights, system.motion, problem.wear.opening(contact.pressure)[0]
     if worn.max() <= ZERO * problem.wear_scale:
         raise ConvergenceError(NOTHING_WEARS)
+    passing = system.passing(problem.wear, conditions=problem.conditions)
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
     if (contact.pressure[:, ~touched] > 0).any():  # its shape goes away from all others
@@ -365,7 +366,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: He
         coordinates=system.pair.punch.x,
         system=system,
         conductances=solved.conductances,
-        debris=system.passing(problem.wear, conditions=problem.conditions).resting(contact.pressure),
+        debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
         crept=system.creep.depth(crept),
         states={} if held is None else system.layers.memory.by_name(held),
     )

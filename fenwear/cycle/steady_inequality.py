@@ -157,7 +157,6 @@ class SteadyInequality:
         It lies otherwise under the punch in each position, so that the shape has it not: (m n, m n), mm/MPa.
         """
         debris, taken, pairs = self._passing.debris, self.wear.taken_slope(pressure), self.wear.pairs
-        assert debris is not None
         found = np.zeros((self.m, self.n, self.m, self.n))
         for j, (own, slope) in enumerate(zip(pairs, taken, strict=True)):
             put = (own.wear_projection * slope).multiply((debris.fed[j] / debris.loss)[:, None])

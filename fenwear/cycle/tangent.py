@@ -108,12 +108,12 @@ def lies_after(
     worn: WornDepths | None,
 ) -> WornDepths | None:
     """Return what lies between after a phase, of what does at its start."""
-    if worn is None or system.layers.debris is None:
+    if worn is None or not system.layers.debris.present:
         return worn
     conditions = _conditions(system, phase, pressure, heat, state, worn)
     passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
     added, _ = passing.debris_changes(pressure[None], worn, None)
-    return system.layers.with_thickness(worn, np.asarray(system.layers.where_it_lies(worn)) + added)
+    return system.layers.with_thickness(worn, system.layers.lies(worn) + added)
 
 
 def _goes_on(
@@ -191,7 +191,7 @@ def _laws(
     worn: WornDepths | None = None,
 ) -> _Laws:
     n, conditions = len(pressure), _conditions(system, phase, pressure, heat, state, worn)
-    lies = () if system.layers.debris is None else (np.asarray(conditions.debris),)
+    lies = (np.asarray(conditions.debris),) if system.layers.debris.present else ()
     around = (pressure, *conditions.temperatures, *lies)
 
     def at(p: Array, punch: Array, strip: Array, *debris: Array) -> ContactConditions:
@@ -214,18 +214,20 @@ def _laws(
     if not lies:
         return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
     debris, pair = system.layers.debris, system.pairs[phase]
-    assert debris is not None
+    reads, puts = np.eye(n), np.eye(n)
     if system.layers.strip_carries:
-        onto, reads, puts = [pair.wear_projection], pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
-    else:
-        onto, reads, puts = None, np.eye(n), np.eye(n)
-    path, taken, thickness = system.path[phase], depths(*around).sum(axis=0), system.layers.where_it_lies(worn)
-    over = debris.over(path[None], [conditions], onto)
+        reads, puts = pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
+    path, taken, thickness = (
+        system.path[phase],
+        depths(*around).sum(axis=0),
+        system.layers.lies(worn or system.unworn()),
+    )
+    over = debris.over(path[None], [conditions], system.layers.places([pair]))
     # Of what is fed, by what is worn at the nodes of the contact, to pressure, temperatures and thickness there.
     put = over.slope(None)[0][:, None] * puts
     lies_p, *lies_t, lies_here = (put * slope.sum(axis=0) for slope in by_depths)
     if system.layers.varies:
-        by_loss = over.by_loss(np.asarray(thickness), (puts @ taken)[None])[:, None] * puts * path
+        by_loss = over.by_loss(thickness, (puts @ taken)[None])[:, None] * puts * path
         more_p, *more_t, more_here = (
             by_loss * slope for slope in _slopes(lambda *values: debris.lost(at(*values)), around)
         )

@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Case, Contact, Dependence, Material, WearLaw
@@ -37,7 +38,7 @@ from fenwear.layers.closure import (
     RoughClosure,
     SharedClosure,
 )
-from fenwear.layers.debris import LIFE, Debris
+from fenwear.layers.debris import LIFE, NO_DEBRIS, Debris
 from fenwear.layers.memory import FORGETFUL, Held, Memory
 from fenwear.sliding.coating import SoftCoating, soft_coatings
 from fenwear.sliding.friction import asperity_share
@@ -60,7 +61,7 @@ class Layers:
         nodes: n.
         closure: The law by which it gives way; None where it does not, or in proportion to the pressure.
         winkler: Closure over pressure of a linear layer (n,), mm/MPa; 0 without.
-        debris: Of the third body; None without.
+        debris: Of the third body.
         hardness: Largest pressure, MPa.
         softness: By how much surfaces give way in a solve, over the pressure beyond the hardness, mm/MPa.
         memory: States of laws of one's own.
@@ -72,7 +73,7 @@ class Layers:
     nodes: int
     closure: Law | None = None
     winkler: Array | float = 0.0
-    debris: Debris | None = None
+    debris: Debris = NO_DEBRIS
     hardness: float = np.inf
     softness: float = 0.0
     memory: Memory = FORGETFUL
@@ -85,7 +86,7 @@ class Layers:
         """Names of the rows of the state: of debris and of what has flown, mm each, and of what laws remember."""
         remembered = map(row_of_state, self.memory.contact)
         flown = (PLASTIC,) if self.hardness < np.inf else ()
-        return (*(() if self.debris_here is None else DEBRIS), *flown, *remembered)
+        return (*(DEBRIS if self.lies_here else ()), *flown, *remembered)
 
     @property
     def carried_rows(self) -> tuple[str, ...]:
@@ -97,9 +98,9 @@ class Layers:
         return self.rows.index(name)
 
     @property
-    def debris_here(self) -> Debris | None:
-        """That which lies at the contact's nodes; None without, or where the strip carries it."""
-        return None if self.strip_carries else self.debris
+    def lies_here(self) -> bool:
+        """Whether debris lies at the contact's nodes, and not on a strip that carries it."""
+        return self.debris.present and not self.strip_carries
 
     def given(self, pressure: Array, closure: Closure | None = None) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm, by default without what coatings do."""
@@ -110,7 +111,7 @@ class Layers:
     @property
     def varies(self) -> bool:
         """Whether debris is lost by a law that changes with more than the place."""
-        return self.debris is not None and self.debris.law is not None
+        return self.debris.varies
 
     @property
     def curved(self) -> bool:
@@ -156,9 +157,8 @@ class Layers:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
         state = np.zeros((len(self.rows), self.nodes))
         carried = np.zeros((len(DEBRIS), strip)) if self.strip_carries else NOTHING
-        if self.debris is not None:
-            lies = carried[0] if self.strip_carries else state[self.row(DEBRIS[0])]
-            lies[:] = self.debris.initial
+        if self.debris.present:
+            (carried if self.strip_carries else state)[0] = self.debris.initial
         found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state, carried=carried)
         return self.with_held(found, self.begun)
 
@@ -168,18 +168,17 @@ class Layers:
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)
 
-    def thickness(self, worn: WornDepths | None) -> Array:
-        """Return the thickness of the debris at the nodes (n,), mm, by default that at the start."""
-        here = self.debris_here
-        if here is None:
-            return np.zeros(self.nodes)
-        if worn is None or not len(worn.between):
-            return np.full(self.nodes, here.initial)
-        return np.asarray(worn.between[self.row(DEBRIS[0])])
+    def places(self, pairs: Sequence[ContactPair]) -> list[csr_array]:
+        """Return what puts depths at the contact's nodes on the strip that carries debris, of each phase; else none."""
+        return [pair.wear_projection for pair in pairs] if self.strip_carries else []
 
-    def on_strip(self, worn: WornDepths) -> Array | None:
-        """Return the thickness of the debris that the strip carries (n_strip,), mm; None without."""
-        return np.asarray(worn.carried[0]) if self.strip_carries and len(worn.carried) else None
+    def lies(self, worn: WornDepths) -> Array:
+        """Return the thickness of the debris at the contact's nodes (n,), or at those of a strip that carries it, mm.
+
+        Zero without, and that of the start where the depths have no states.
+        """
+        rows = worn.carried if self.strip_carries else worn.between
+        return np.asarray(rows[0]) if self.debris.present and len(rows) else np.full(self.nodes, self.debris.initial)
 
     def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array:
         """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
@@ -187,28 +186,20 @@ class Layers:
         What the strip carries is what lies opposite each node, which laws know of: where it is heaped up, quadratic
         elements fall below nothing beside it.
         """
-        if not self.strip_carries or self.debris is None:
-            return self.thickness(worn)
-        lies = None if worn is None else self.on_strip(worn)
-        if lies is None:
+        if worn is None or (self.strip_carries and not len(worn.carried)):
             return np.full(self.nodes, self.debris.initial)
-        return np.asarray(np.maximum(pair.wear_interpolation @ lies, 0.0))
-
-    def where_it_lies(self, worn: WornDepths | None) -> Array | None:
-        """Return the thickness of the debris at the contact's nodes, or at those of a strip that carries it, mm."""
-        if not self.strip_carries or self.debris is None:
-            return self.thickness(worn)
-        return None if worn is None else self.on_strip(worn)
+        lies = self.lies(worn)
+        return np.asarray(np.maximum(pair.wear_interpolation @ lies, 0.0)) if self.strip_carries else lies
 
     def with_thickness(self, worn: WornDepths, thickness: Array) -> WornDepths:
         """Return the depths with debris of another thickness, mm, at the nodes where it lies."""
-        if self.strip_carries:
-            carried = worn.carried.copy()
-            carried[0] = thickness
-            return replace(worn, carried=carried)
-        state = worn.between.copy()
-        state[self.row(DEBRIS[0])] = thickness
-        return replace(worn, between=state)
+        rows = (worn.carried if self.strip_carries else worn.between).copy()
+        rows[0] = thickness
+        return self.with_debris(worn, rows)
+
+    def with_debris(self, worn: WornDepths, rows: Array) -> WornDepths:
+        """Return the depths with other rows of states where debris lies, its own the first two of them."""
+        return replace(worn, carried=rows) if self.strip_carries else replace(worn, between=rows)
 
     def known(
         self, pair: ContactPair, worn: WornDepths | None, held: Held | None = None
@@ -248,11 +239,18 @@ class Layers:
         row = self.row(PLASTIC)
         return self.flown(worn, other.between[row] - worn.between[row])
 
-    def opening(self, state: Array) -> Array | float:
-        """Return the gap that a state opens (n,), mm."""
+    def opening(self, pair: ContactPair, worn: WornDepths) -> Array | float:
+        """Return the gap that what lies between opens at one place (n,), mm."""
+        found = self.opened(worn.between)
+        if self.strip_carries and len(worn.carried):
+            found = found - pair.wear_interpolation @ worn.carried[0]
+        return found
+
+    def opened(self, state: Array) -> Array | float:
+        """Return the gap that a state at the contact's nodes opens (n,), mm."""
         if not len(state):
             return 0.0
-        found = np.zeros(self.nodes) if self.debris_here is None else -state[self.row(DEBRIS[0])]
+        found = -state[0] if self.lies_here else np.zeros(self.nodes)
         if self.memory.filling:
             found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
@@ -315,21 +313,13 @@ class Layers:
     def settled(self, worn: WornDepths) -> WornDepths:
         """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
         found = self.bounded(worn)
-        if self.strip_carries:
-            return replace(found, carried=_settled(found.carried, 0, 1)) if len(worn.carried) else found
-        if self.debris is None or not len(worn.between):
+        rows = found.carried if self.strip_carries else found.between
+        if not self.debris.present or not len(rows) or rows[0].min(initial=0.0) >= 0:
             return found
-        return replace(found, between=_settled(found.between, *map(self.row, DEBRIS)))
-
-
-def _settled(state: Array, thickness: int, ejected: int) -> Array:
-    """Return rows of a state without a thickness below zero: nothing of it was ejected."""
-    if state[thickness].min(initial=0.0) >= 0:
-        return state
-    found = state.copy()
-    found[ejected] += np.minimum(found[thickness], 0.0)
-    found[thickness] = np.maximum(found[thickness], 0.0)
-    return found
+        rows = rows.copy()
+        rows[1] += np.minimum(rows[0], 0.0)
+        rows[0] = np.maximum(rows[0], 0.0)
+        return self.with_debris(found, rows)
 
 
 def row_of_state(name: str) -> str:
@@ -361,7 +351,7 @@ def layers_of(
     Raises:
         CaseError: a value is not positive somewhere.
     """
-    n, debris = len(pair.weights), None
+    n, debris = len(pair.weights), NO_DEBRIS
     winkler: Array | float = 0.0
     closure: Law | None = None
     x = in_space(pair.punch.x)
@@ -380,13 +370,13 @@ def layers_of(
         closure = SharedClosure(closure, _share_by_pressure(contact.lubrication, {**place, **(alike or {})}))
     third = contact.third_body
     if third is not None:
-        of_state = isinstance(third.life, Dependence) and third.life.varies
-        life = None if of_state else place_values(third.life, place, n, "mm", LIFE)
-        debris = Debris(third.share, life, third.initial, third if third.varies else None)
+        varies = isinstance(third.life, Dependence) and third.life.varies
+        life = third.life if varies else place_values(third.life, place, n, "mm", LIFE)
+        debris = Debris(third.share, life, third.initial, third.edge_life or np.inf, third.edge_length or 1.0)
     hardness = np.inf if contact.hardness is None else contact.hardness
     memory = memory_of(contact.friction, wear, temperature)
     begun = memory.beginning(pair)
-    on_strip = debris is not None and strip_carries
+    on_strip = debris.present and strip_carries
     soft = soft_coatings(pair, (wear[0], wear[1]))
     return Layers(n, closure, winkler, debris, hardness, 0.0, memory, begun, on_strip, soft)
 

@@ -33,82 +33,9 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence
-from fenwear.case.contact import ThirdBody
 from fenwear.sliding.friction import ContactConditions
 
 LIFE, LEAST = "contact.third_body.life", 1e-300
-
-
-@dataclass(frozen=True)
-class Debris:
-    """The law of the third body at the nodes.
-
-    Attributes:
-        share: Of what is worn, that stays.
-        life: Sliding distance over which 1 - 1/e is lost (n,), mm; None where it changes with the state.
-        initial: Thickness at the start, mm.
-        law: With what changes: a life that depends on the state, and what edges lose; None where nothing does.
-    """
-
-    share: float
-    life: Array | None
-    initial: float = 0.0
-    law: ThirdBody | None = None
-
-    def lost(self, conditions: ContactConditions) -> Array:
-        """Return what is lost over the sliding distance, of what is there (n,), 1/mm.
-
-        Raises:
-            CaseError: a life is not positive.
-        """
-        law, shape = self.law, conditions.shape
-        if self.life is not None:
-            found = 1 / self.life
-        else:
-            assert law is not None
-            assert isinstance(law.life, Dependence)
-            found = np.reciprocal(law.life.values(conditions.of("punch"), shape, law.life.scale("mm"), LIFE, LEAST))
-        if (
-            law is not None
-            and law.edge_life is not None
-            and law.edge_length is not None
-            and conditions.edge is not None
-        ):
-            found = found + np.exp(-conditions.edge / law.edge_length) / law.edge_life
-        return found if found.shape == shape else np.broadcast_to(found, shape)
-
-    def over(
-        self,
-        slid: Array,
-        conditions: Sequence[ContactConditions] | None = None,
-        onto: Sequence[csr_array] | None = None,
-    ) -> DebrisCycle:
-        """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
-
-        Args:
-            slid: The distances.
-            conditions: Of the phases, for a loss that changes with them.
-            onto: What puts it on the material of the body that carries it in each phase, as wear is put there; None
-                where it lies at the contact's nodes.
-        """
-        if self.law is None:
-            assert self.life is not None
-            x = slid / self.life
-        elif conditions is None:
-            raise ValueError("expected the conditions of the phases where what is lost depends on them")
-        else:
-            lost = [self.lost(one) for one in conditions]
-            x = slid * (lost[0] if len(lost) == 1 else np.array(lost))
-        if onto is not None:
-            x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
-        x = np.maximum(x, LEAST)  # where nothing slides all is kept
-        gone = -np.expm1(-x)
-        kept = gone / x
-        if len(x) == 1:
-            return DebrisCycle(self.share, kept, x[0], gone[0])
-        after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
-        loss = x.sum(axis=0)
-        return DebrisCycle(self.share, kept * np.exp(-after), loss, -np.expm1(-loss))
 
 
 @dataclass(frozen=True)
@@ -169,3 +96,78 @@ class DebrisCycle:
         """X G / (1 - E) of a unit worn in each phase (m, n)."""
         lost = self.lost
         return self._stays * np.divide(self.loss, lost, out=np.ones_like(lost), where=lost > 0)
+
+
+NO_CYCLE = DebrisCycle(0.0, *np.zeros((3, 1)))
+
+
+@dataclass(frozen=True)
+class Debris:
+    """The law of the third body at the nodes.
+
+    Attributes:
+        share: Of what is worn, that stays.
+        life: Sliding distance over which 1 - 1/e is lost (n,), mm; or what it depends on.
+        initial: Thickness at the start, mm.
+        edge_life, edge_length: Life at an edge of the contact besides, and over which distance it grows, mm.
+        present: Whether there is a third body.
+    """
+
+    share: float
+    life: Array | Dependence
+    initial: float = 0.0
+    edge_life: float = np.inf
+    edge_length: float = 1.0
+    present: bool = True
+
+    @property
+    def of_state(self) -> bool:
+        """Whether its life depends on more than the place."""
+        return isinstance(self.life, Dependence)
+
+    @property
+    def varies(self) -> bool:
+        """Whether what is lost changes with more than the place."""
+        return self.of_state or self.edge_life < np.inf
+
+    def lost(self, conditions: ContactConditions) -> Array:
+        """Return what is lost over the sliding distance, of what is there (n,), 1/mm.
+
+        Raises:
+            CaseError: a life is not positive.
+        """
+        life, shape = self.life, conditions.shape
+        if isinstance(life, Dependence):
+            life = life.values(conditions.of("punch"), shape, life.scale("mm"), LIFE, LEAST)
+        found = 1 / life
+        if self.edge_life < np.inf and conditions.edge is not None:
+            found = found + np.exp(-conditions.edge / self.edge_length) / self.edge_life
+        return found if found.shape == shape else np.broadcast_to(found, shape)
+
+    def over(
+        self, slid: Array, conditions: Sequence[ContactConditions] = (), onto: Sequence[csr_array] = ()
+    ) -> DebrisCycle:
+        """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
+
+        Args:
+            slid: The distances.
+            conditions: Of the phases, for a loss that changes with them.
+            onto: What puts it on the material of the body that carries it in each phase, as wear is put there; none
+                where it lies at the contact's nodes.
+        """
+        if not self.present:
+            return NO_CYCLE
+        x = slid * np.array([self.lost(one) for one in conditions]) if self.varies else np.asarray(slid / self.life)
+        if onto:
+            x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
+        x = np.maximum(x, LEAST)  # where nothing slides all is kept
+        gone = -np.expm1(-x)
+        kept = gone / x
+        if len(x) == 1:
+            return DebrisCycle(self.share, kept, x[0], gone[0])
+        after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
+        loss = x.sum(axis=0)
+        return DebrisCycle(self.share, kept * np.exp(-after), loss, -np.expm1(-loss))
+
+
+NO_DEBRIS = Debris(0.0, np.array(np.inf), present=False)

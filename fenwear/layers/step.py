@@ -25,14 +25,14 @@ class LayerEvolution:
     Attributes:
         layers: What lies between.
         wear: Of these phases.
-        debris: What they do to it; None without.
+        debris: What they do to it.
         evolution: What they do to the states of laws; None without.
         ended: States of laws at their end, where they are known.
     """
 
     layers: Layers
     wear: PhasesWear
-    debris: DebrisCycle | None
+    debris: DebrisCycle
     evolution: Evolution | None = None
     ended: Held | None = None
 
@@ -43,12 +43,10 @@ class LayerEvolution:
         wear: PhasesWear,
         slid: Array,
         evolution: Evolution | None = None,
-        conditions: Sequence[ContactConditions] | None = None,
+        conditions: Sequence[ContactConditions] = (),
     ) -> LayerEvolution:
         """Return what phases do that slide by these distances (m, n), mm, at conditions that debris may be lost by."""
-        onto = [pair.wear_projection for pair in wear.pairs] if layers.strip_carries else None
-        debris = None if layers.debris is None else layers.debris.over(slid, conditions, onto)
-        return cls(layers, wear, debris, evolution)
+        return cls(layers, wear, layers.debris.over(slid, conditions, layers.places(wear.pairs)), evolution)
 
     def worn(
         self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | None = None
@@ -65,11 +63,9 @@ class LayerEvolution:
         if not len(before.between) and not len(before.carried):
             return worn
         changes, carried = np.zeros(before.between.shape), np.zeros(before.carried.shape)
-        if self.layers.strip_carries:
-            carried[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
-        elif self.debris is not None:
-            first = self.layers.row(DEBRIS[0])
-            changes[first], changes[first + 1] = self.debris_changes(pressure, before, cycles)
+        if self.layers.debris.present:
+            lies = carried if self.layers.strip_carries else changes
+            lies[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
         found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
@@ -100,34 +96,26 @@ class LayerEvolution:
 
         At the contact's nodes (n,) each, or at those of a strip that carries it (n_strip,).
         """
-        if self.debris is None:
-            return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
         taken = self._where_it_lies(self.wear.begun(before, cycles).taken(pressure))
-        lies = self.layers.on_strip(before)
-        thickness = before.between[self.layers.row(DEBRIS[0])] if lies is None else lies
+        thickness = self.layers.lies(before)
         if cycles is None:
             return self.debris.change(thickness, taken)
         return self.debris.rate(thickness, taken, cycles)
 
-    def resting(self, pressure: Array) -> Array | None:
-        """Return the thickness of the debris that such cycles leave in the end (n,), mm; None without."""
+    def resting(self, pressure: Array) -> Array:
+        """Return the thickness of the debris that such cycles leave in the end (n,), mm."""
         lies = self.resting_where_it_lies(pressure)
-        if lies is None or not self.layers.strip_carries:
-            return lies
-        return np.asarray(self.wear.pairs[0].wear_interpolation @ lies)
+        return np.asarray(self.wear.pairs[0].wear_interpolation @ lies) if self.layers.strip_carries else lies
 
-    def resting_where_it_lies(self, pressure: Array) -> Array | None:
+    def resting_where_it_lies(self, pressure: Array) -> Array:
         """Return the same at the nodes where it lies: the contact's, or those of a strip that carries it (n_strip,)."""
-        if self.debris is None:
-            return None
         fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
         return np.asarray(fed / self.debris.loss)
 
     def _where_it_lies(self, depths: Array) -> Array:
         """Return depths of the phases at the contact's nodes (m, n) where debris lies: there, or on the strip."""
-        if not self.layers.strip_carries:
-            return depths
-        return np.array([pair.wear_projection @ own for pair, own in zip(self.wear.pairs, depths, strict=True)])
+        places = self.layers.places(self.wear.pairs)
+        return np.array([onto @ own for onto, own in zip(places, depths, strict=True)]) if places else depths
 
     def step(
         self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
@@ -185,7 +173,7 @@ class LayerStep:
         if not self.implicit:
             return closed
         found = self._wear.opening(pressure)
-        if passing.debris is not None:
+        if passing.layers.debris.present:
             added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
             if passing.layers.strip_carries:
                 added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
@@ -210,11 +198,9 @@ class LayerStep:
         left, right = self._wear.border(pressure)
         if self.passing.layers.softens:
             left = self._felt_by_border(left, pressure)
-        covers = self._fills or self.passing.debris is not None
         if self.passing.layers.strip_carries:
             left, right = self._with_carried(left, right, pressure)
-            covers = self._fills
-        if not covers:
+        if not self._fills and not self.passing.layers.lies_here:
             return left, right
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
@@ -232,7 +218,6 @@ class LayerStep:
     def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
         """Return both with what the strip carries between, as its wear."""
         passing, pairs = self.passing, self.passing.wear.pairs
-        assert passing.debris is not None
         slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
         reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])
         puts = np.array([pair.wear_projection.toarray() for pair in pairs]) * slopes[:, :, None] * taken[:, None, :]
@@ -248,7 +233,7 @@ class LayerStep:
             punch, strip = (None if own is None else own * share.mean(axis=0) for own, share in both)
         if self.passing.layers.strip_carries:
             return punch, self._carried_below(pressure, strip)
-        if self.passing.debris is None:
+        if not self.passing.layers.lies_here:
             return punch, strip
         covered = self._covered(pressure)
         return -covered if punch is None else punch - covered, strip
@@ -259,7 +244,6 @@ class LayerStep:
         A step to the solution, on grids, whose residual has what is put on the strip as it is.
         """
         passing = self.passing
-        assert passing.debris is not None
         pairs = zip(passing.wear.pairs, passing.debris.slope(self.cycles), strict=True)
         below = np.array([pair.wear_interpolation @ slope for pair, slope in pairs])
         put = below * self._worn.taken_slope(pressure)
@@ -306,7 +290,7 @@ class LayerStep:
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
         passing, found = self.passing, np.zeros_like(pressure)
-        if passing.debris is not None and not passing.layers.strip_carries:
+        if passing.layers.lies_here:
             found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
         filled = passing.filled(pressure, self.before, self.cycles) if self._fills else None
         if filled is None:

@@ -50,7 +50,7 @@ STATE, STATES = "state_", "states"  # how variables of states begin; where summa
 def _lying_variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of what lies between the surfaces."""
     layers = placed.layers
-    own = {**({} if layers.debris is None else OF_DEBRIS), **(OF_FLOW if PLASTIC in layers.rows else {})}
+    own = {**(OF_DEBRIS if layers.debris.present else {}), **(OF_FLOW if PLASTIC in layers.rows else {})}
     if layers.strip_carries:
         own |= ON_STRIP
     return {**own, **_of_states(placed)}
@@ -89,7 +89,7 @@ def _lying_values(block: Block) -> dict[str, Array]:
             "plastic_volume": depth @ areas,
         }
     found |= _states(block)
-    if system.layers.debris is None:
+    if not system.layers.debris.present:
         return found
     if system.layers.strip_carries:
         areas = system.bodies.punch.thickness * system.carried_areas

@@ -204,10 +204,7 @@ class PartialSlipProblem:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
         moved = self.interface.moved
         rest = worn if moved is None else worn - moved
-        layers = self.interface.layers
-        between = layers.opening(worn.between)
-        if (lies := layers.on_strip(worn)) is not None:
-            between = between - position.pair.wear_interpolation @ lies
+        between = self.interface.layers.opening(position.pair, worn)
         return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
     def imposed(self, step: TimeStep, at: PartialSlipState) -> tuple[Position, Imposed]:

@@ -422,13 +422,12 @@ def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
 def _with_debris_left(problem: PartialSlipProblem, zone: Mask) -> WornDepths:
     """Return the unworn bodies with what is left in the end of the debris there was: all where nothing slips."""
     unworn, layers, pair = problem.unworn(), problem.interface.layers, problem.interface.middle.pair
-    if layers.debris is None:
+    if not layers.debris.present:
         return unworn
+    share = zone.astype(float)
     if layers.strip_carries:
-        carried = unworn.carried.copy()
-        carried[0] *= (pair.wear_projection @ zone) / np.maximum(pair.wear_projection @ np.ones(len(zone)), 1e-300)
-        return replace(unworn, carried=carried)
-    return layers.with_thickness(unworn, np.where(zone, layers.debris.initial, 0.0))
+        share = (pair.wear_projection @ zone) / np.maximum(pair.wear_projection @ np.ones(len(zone)), 1e-300)
+    return layers.with_thickness(unworn, share * layers.debris.initial)
 
 
 def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array], size: float) -> FinalShape:

@@ -212,7 +212,7 @@ def _passing(problem: PartialSlipProblem, cycle: FrettingCycle, begin: PartialSl
         if coated.thickness.any():
             base = CoatedWear(base.rate, base.law, own, coating=coating, thickness=coated.thickness)
         bodies.append(base)
-    debris = None if layers.debris is None else losses.debris_over(records, begin)
+    debris = losses.debris_over(records, begin)
     wear = PhasesWear(bodies[0], bodies[1], pairs)
     return LayerEvolution(layers, wear, debris, evolution)
 

@@ -38,7 +38,6 @@ from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.jump_error import HALVES, Estimate, Lengths, Sizes, force_difference
 from fenwear.errors import ConvergenceError
-from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
@@ -353,17 +352,16 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
     missing of it is spread evenly.
     """
     layers, pair = problem.interface.layers, problem.interface.middle.pair
-    if layers.debris is None:
+    if not layers.debris.present:
         return after
     change = after - before
     worn = pair.weights @ change.punch + pair.strip.weights @ change.strip
     if layers.strip_carries:
-        rows, weights, changed, state = [0, 1], pair.strip.weights, change.carried, after.carried.copy()
+        weights, changed, state = pair.strip.weights, change.carried, after.carried.copy()
     else:
-        rows, weights = [layers.row(name) for name in DEBRIS], pair.weights
-        changed, state = change.between, after.between.copy()
-    state[rows[1]] += (worn - float(weights @ changed[rows].sum(axis=0))) / weights.sum()
-    return replace(after, carried=state) if layers.strip_carries else replace(after, between=state)
+        weights, changed, state = pair.weights, change.between, after.between.copy()
+    state[1] += (worn - float(weights @ changed[:2].sum(axis=0))) / weights.sum()
+    return layers.with_debris(after, state)
 
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:

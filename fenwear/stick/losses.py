@@ -274,17 +274,14 @@ class StepLosses:
         """Return what is worn with what steps do to what lies between; arguments as of `worn_in` and `_taken`."""
         layers, now, begin = self.layers, before.worn, replace(before, next_step=first)
         changes, carried = np.zeros_like(now.between), np.zeros_like(now.carried)
-        if layers.debris is not None:
-            over = self.debris_over(records, begin)
+        if layers.debris.present:
+            over, thickness = self.debris_over(records, begin), layers.lies(now)
             if layers.strip_carries:
-                state, thickness, rows = carried, now.carried[0], list(range(len(DEBRIS)))
-                taken = self._taken_onto_strip(records, parts, begin)
+                state, taken = carried, self._taken_onto_strip(records, parts, begin)
             else:
-                rows = [layers.row(name) for name in DEBRIS]
-                state, thickness = changes, now.between[rows[0]]
                 coatings, bases = (records.punch_depth, records.strip_depth), (records.punch_base, records.strip_base)
-                taken = self._taken(coatings, bases, parts)
-            state[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
+                state, taken = changes, self._taken(coatings, bases, parts)
+            state[: len(DEBRIS)] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
         if layers.hardness < np.inf and not rate:  # what flows does so as the shape wants it, however long it takes
             changes[layers.row(PLASTIC)] = records.flowed.sum(axis=0)
         found = replace(worn, between=changes, carried=carried)
@@ -311,14 +308,10 @@ class StepLosses:
 
     def debris_over(self, records: TimeStepRecords, before: PartialSlipState) -> DebrisCycle:
         """Return what the steps of a record that begin at a state do to debris."""
-        debris = self.layers.debris
-        assert debris is not None
         slips = slips_of(records)
-        conditions = self.conditions.of_steps(slips, before) if self.layers.varies else None
-        onto = None
-        if self.layers.strip_carries:
-            onto = [pair.wear_projection for pair in self.conditions.pairs(slips, before)]
-        return debris.over(slips.slid, conditions, onto)
+        conditions = self.conditions.of_steps(slips, before) if self.layers.varies else ()
+        onto = self.layers.places(self.conditions.pairs(slips, before))
+        return self.layers.debris.over(slips.slid, conditions, onto)
 
     def evolution(self, records: TimeStepRecords, before: PartialSlipState) -> Evolution | None:
         """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""

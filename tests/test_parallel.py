@@ -21,7 +21,7 @@ from fenwear.cycle import Block, critical_speed, cycles_to_reach, growth_rate, s
 from fenwear.cycle import state as cycle_state
 from fenwear.cycle.jump_error import Sizes
 from fenwear.errors import InputError, RanksError
-from fenwear.heat.fluxes import FluxMap
+from fenwear.heat.fluxes import FluxFactor
 from fenwear.parallel import Team, on_root, total
 from fenwear.sliding.friction import Friction
 from fenwear.sliding.wear import PhasesWear
@@ -91,7 +91,7 @@ def noisy(monkeypatch: pytest.MonkeyPatch) -> None:
             *((module, name) for module in (np.linalg, scipy.linalg) for name in ("lstsq", "solve", "norm")),
             (np.linalg, "eigvals"),
             (scipy.linalg, "lu_solve"),
-            (FluxMap, "of"),
+            (FluxFactor, "of"),
             (Friction, "values"),
             (PhasesWear, "opening"),
             (cycle_state, "pressure_scales"),

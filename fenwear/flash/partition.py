@@ -103,7 +103,7 @@ def shared(
     sides: tuple[float, float],
     period: float,
     *,
-    resistance: Array | None = None,
+    resistance: Array,
     given: float = 0.5,
 ) -> Array:
     """Return what of the heat of friction enters the first body (t, m, n), mW/mm².
@@ -114,7 +114,7 @@ def shared(
         touching: Where they touch (t, m, n).
         sides: Of a cell, mm.
         period: Of the cycle, s; infinite where each instant is for itself.
-        resistance: 1 / h_c (t, m, n), mm s K/N; None for none.
+        resistance: 1 / h_c (t, m, n), mm s K/N; zero for none.
         given: kappa, the first body's share of what enters by itself.
 
     Raises:
@@ -130,11 +130,9 @@ def shared(
     def multiply(x: Array) -> Array:
         own = x.reshape(heat.shape)
         found = first.response.apply(own) + second.response.apply(own) + both * mean_power(own, cell)
-        return inside(found if resistance is None else found + resistance * own)
+        return inside(found + resistance * own)
 
-    right = second.rise(heat, cell) - first.bulk.base
-    if resistance is not None:
-        right = right + given * resistance * heat
+    right = second.rise(heat, cell) - first.bulk.base + given * resistance * heat
     x, rest, *_ = flexible(
         multiply, lambda x: inside(precondition(x.reshape(heat.shape))), inside(right), ACCURACY, RESTART, RESTARTS
     )
@@ -153,7 +151,7 @@ class _Inverse:
         touching: Where they touch (t, m, n).
         sides: Of a cell, mm.
         period: s.
-        resistance: (t, m, n), mm s K/N; None for none.
+        resistance: (t, m, n), mm s K/N; zero for none.
     """
 
     def __init__(
@@ -163,7 +161,7 @@ class _Inverse:
         touching: Mask,
         sides: tuple[float, float],
         period: float,
-        resistance: Array | None,
+        resistance: Array,
     ) -> None:
         shape = self.shape = touching.shape
         x, y = scipy.fft.fftfreq(shape[1], sides[0]), scipy.fft.rfftfreq(shape[2], sides[1])
@@ -174,11 +172,9 @@ class _Inverse:
             1 / (side.conductivity * np.sqrt(square + 1j * rate[:, None, None] / side.diffusivity))
             for side in (first, second)
         )
-        self.share: Array | float = 1.0
-        if resistance is not None:
-            least, itself = float(resistance[touching].min()), float(np.mean(ease.real))
-            ease, self.share = ease + least, np.sqrt((itself + least) / (itself + resistance))
-        self.symbol = 1 / ease
+        least, itself = float(resistance[touching].min()), float(np.mean(ease.real))
+        self.share = np.sqrt((itself + least) / (itself + resistance))
+        self.symbol = 1 / (ease + least)
 
     def __call__(self, values: Array) -> Array:
         waves = scipy.fft.fft(scipy.fft.rfftn(self.share * values, axes=(1, 2)), axis=0)

@@ -282,10 +282,10 @@ class Periodic:
         return np.asarray(found / self.conductivity, dtype=np.complex128)
 
     @cached_property
-    def _phases(self) -> Complex | None:
+    def _phases(self) -> Complex:
         """What moves heat to its place on the body (t, ...): exp(i k . X), real at the shortest waves."""
         if not np.ptp(self.shifts, axis=0).any():
-            return None
+            return np.ones((1, 1, 1), dtype=complex)
         parts: list[Complex] = []
         for axis, (count, side) in enumerate(zip(self._size, self.sides, strict=True)):
             k = 2 * np.pi * (scipy.fft.fftfreq(count, side) if axis == 0 else scipy.fft.rfftfreq(count, side))
@@ -297,12 +297,8 @@ class Periodic:
 
     def apply(self, heat: Array) -> Array:
         """Return the temperatures (t, m, n), K."""
-        waves, moved = scipy.fft.rfftn(heat, self._size, axes=PLANE), self._phases
-        if moved is not None:
-            waves *= moved
-        waves = scipy.fft.ifft(scipy.fft.fft(waves, axis=0) * self._waves, axis=0)
-        if moved is not None:
-            waves *= moved.conj()
+        waves = scipy.fft.rfftn(heat, self._size, axes=PLANE) * self._phases
+        waves = scipy.fft.ifft(scipy.fft.fft(waves, axis=0) * self._waves, axis=0) * self._phases.conj()
         found = scipy.fft.irfftn(waves, self._size, axes=PLANE)
         return np.asarray(found[:, : heat.shape[1], : heat.shape[2]])
 

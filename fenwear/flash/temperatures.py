@@ -256,15 +256,15 @@ def _still(past: Past, before: Array) -> tuple[Array, Array]:
 
 def _shared(heat: Heat, heating: Heating, sides: Sequence[HeatedSide], friction: Array) -> Array:
     """Return what of the heat goes into the punch (t, m, n), mW/mm²."""
-    resistance = None
     if heat.conductance == 0 and heat.conductance_per_pressure is None:
         return heat.partition * friction
     if heat.conductance_per_pressure is not None:
         first, second = heat.conductance_per_pressure
         per_pressure = first * second / (first + second)
         resistance = 1 / (per_pressure * np.where(heating.touching, heating.pressure, 1.0))
-    elif heat.conductance != "perfect":
-        resistance = np.full(friction.shape, 1 / float(heat.conductance))
+    else:
+        conducts = np.inf if heat.conductance == "perfect" else float(heat.conductance)
+        resistance = np.full(friction.shape, 1 / conducts)
     period = np.inf if heating.pasts else heating.period
     return shared(
         sides[0],

@@ -23,25 +23,23 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import TypeVar
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.errors import HeatError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
-from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
+from fenwear.heat.fluxes import Exchanged, FluxFactor, FluxUpdate
 from fenwear.heat.side import EARLIER, Fineness, Side, StepPlan
 from fenwear.heat.stage import HeatBalance, PreparedStage, PreparedStep, Stage, StepMap
 from fenwear.parallel import Team
 
 T = TypeVar("T")
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
-AT_ONCE = 8  # columns of coordinates that are kept for the balance of heat
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 SLOPE = 1e-4  # of the pressure: half the step of differences
@@ -89,7 +87,7 @@ class HeatExchange:
             for side in sides
         ]
         self.fineness: Fineness | None = None  # of the steps, where it is known
-        self.of_layer: Callable[[Array], Array] | None = None  # conductance by pressure (n,), where a layer gives it
+        self._conductance, self.by_pressure = _given_conductance(heat)
         self._forget()
         for basis in self.bases:
             self.team.serve(basis)
@@ -111,7 +109,7 @@ class HeatExchange:
 
     def _forget(self) -> None:
         """Begin without any fluxes, which follow from friction's partition and the conductances."""
-        self._flux_maps: dict[tuple[int, int, bytes], Fluxes] = {}
+        self._flux_maps: dict[tuple[int, int, bytes], FluxFactor | FluxUpdate] = {}
         self._flux_factors: dict[tuple[int, int], FluxFactor] = {}  # the last one of each step
         self._prepared: dict[tuple[int, int], PreparedStep] = {}
         self._few: dict[tuple[int, int, bytes], Stage] = {}
@@ -130,14 +128,17 @@ class HeatExchange:
 
     def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:
         """Return the exchange whose conductance a layer gives by the pressures (n,); None where none does."""
+        if of_layer is None:
+            return self
         other = copy.copy(self)
-        other.of_layer = of_layer
+        other._conductance, other.by_pressure = of_layer, True
         return other
 
     def varied(self, heat: Heat, friction: Array) -> HeatExchange:
         """Return the exchange of another friction, partition or conductance with the same prepared bodies."""
         other = copy.copy(self)
         other.heat, other.friction = heat, friction
+        other._conductance, other.by_pressure = _given_conductance(heat)
         other._forget()
         return other
 
@@ -191,23 +192,10 @@ class HeatExchange:
 
     def conductance(self, pressure: Array) -> Array:
         """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
-        value: NDArray[Any]
-        if self.of_layer is not None:
-            value = self.of_layer(pressure)
-        elif self.heat.conductance_per_pressure is not None:
-            h1, h2 = self.heat.conductance_per_pressure
-            value = np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2))
-        else:
-            constant = np.inf if self.heat.conductance == "perfect" else float(self.heat.conductance)
-            value = np.full(len(pressure), constant)
+        value = self._conductance(pressure)
         if self.heat.conducting == "closed":
             value[pressure <= 0] = np.nan
         return value
-
-    @property
-    def by_pressure(self) -> bool:
-        """Whether h_c depends on the pressure."""
-        return self.of_layer is not None or self.heat.conductance_per_pressure is not None
 
     def conductance_slope(self, pressure: Array) -> Array:
         """Return dh_c/dp of each node (n,), N/(mm s K MPa): zero where h_c is constant or none conducts."""
@@ -291,7 +279,7 @@ class HeatExchange:
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
         heated: Array = np.zeros_like(pressure)
         entered = [np.zeros_like(pressure), np.zeros_like(pressure)]
-        surfaces, spans = None, []
+        surfaces = None
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = (self.friction[phase] * plan.speed * pressure.T).T
@@ -304,12 +292,7 @@ class HeatExchange:
                 heated += counts * plan.seconds * heat
                 entered = [one + counts * plan.seconds * q for one, q in zip(entered, fluxes, strict=True)]
                 values = values + counts * (ends - values)
-            spans.append((plan, starts, reached))
-            if len(spans) * pressure[:1].size >= AT_ONCE:
-                terms += self._kept(spans, sources=sources)
-                spans = []
-        if spans:
-            terms += self._kept(spans, sources=sources)
+            terms += self._kept(plan, starts, reached, sources=sources)
         terms += self._led(partial(self._made, heated, entered[0] + entered[1]))
         crossed = [self._crossing(conductance) @ q for q in entered]
         if sources and any(side.field.contact_responses is not None for side in self.sides):
@@ -345,8 +328,8 @@ class HeatExchange:
                 self._few.clear()
             if kinds not in self._prepared_few:
                 self._prepared_few[kinds] = self._prepared_stage(plan)
-            fluxes = cast("FluxMap", self._flux_map(kinds, conductance))  # which those of few nodes are
-            self._few[key] = self._prepared_few[kinds].at(fluxes, plan.seconds * self._crossing(conductance))
+            crossing = plan.seconds * self._crossing(conductance)
+            self._few[key] = self._prepared_few[kinds].at(self._flux_map(kinds, conductance), crossing)
         return self._few[key]
 
     def _prepared_stage(self, plan: StepPlan) -> PreparedStage:
@@ -355,10 +338,10 @@ class HeatExchange:
         motions = [one for side, kind in of_kinds if (one := side.field.propagation(kind)) is not None]
         every = np.eye(sum(len(basis) for basis in self.bases))
         none = np.zeros_like(every)
-        by_start, by_end = (self._kept([(plan, *ends)], sources=False) for ends in ((every, none), (none, every)))
+        by_start, by_end = (self._kept(plan, *ends, sources=False) for ends in ((every, none), (none, every)))
         each = plan.seconds * np.eye(len(self.weights))
         by_flux = self._made(np.zeros((len(each), 2 * len(each))), np.hstack([each, each]))
-        constant = np.asarray(self._kept([(plan, none[0], none[0])], sources=True) / sum(self._stages), dtype=float)
+        constant = np.asarray(self._kept(plan, none[0], none[0], sources=True) / sum(self._stages), dtype=float)
         ledger = HeatBalance(by_start, by_end, by_flux, constant)
         return PreparedStage(motions, [side.contacts[kind] for side, kind in of_kinds], ledger, self.heat.ambient)
 
@@ -468,52 +451,41 @@ class HeatExchange:
                 values, changes = (a + counts * (b - a) for a, b in ((values, ends), (changes, after)))
         return changes
 
-    def _kept(self, spans: Sequence[tuple[StepPlan, Array, Array]], *, sources: bool) -> Array:
-        """Return the terms of what bodies have kept or lost in steps, per thickness; of a steady state a second.
+    def _kept(self, plan: StepPlan, starts: Array, reached: Array, *, sources: bool) -> Array:
+        """Return the terms of what bodies have kept or lost in a step, per thickness; of a steady state a second.
 
         Args:
-            spans: The steps, and the coordinates at the start and at the end of their stages, summed as often as each
-                counts.
+            plan: The step.
+            starts, reached: The coordinates at the start and at the end of its stages, summed as often as each counts.
             sources: Whether there is more than changes.
         """
-        starts = self._summed([start for _, start, _ in spans], sources=sources)
-        reached = self._summed([end for _, _, end in spans], sources=sources)
-        counted = sources * sum(self._stages)
-        return self._led(partial(self._account, [span[0] for span in spans], starts, reached, counted))
+        counted, constants = sources * sum(self._stages), [side.balance.constant for side in self.sides]
 
-    def _summed(self, values: Sequence[Array], *, sources: bool) -> list[Array]:
-        """Return what enters the balance of both bodies (rows, steps) or (rows, steps, k), from sums over stages."""
-        found = []
-        for side, part in zip(self.sides, self._parts(np.stack(values, axis=1)), strict=True):
-            rows = side.balance.of_changes(part.reshape(len(part), -1))
-            rows = rows.reshape(len(rows), *part.shape[1:])
-            if sources:
-                rows = rows + sum(self._stages) * _down(rows.ndim - 1, side.balance.constant)
-            found.append(rows)
-        return found
+        def rows(values: Array) -> list[Array]:
+            found = self._balances(values, sources=False)
+            return [own + counted * _down(own.ndim - 1, one) for own, one in zip(found, constants, strict=True)]
 
-    def _account(
-        self, taken: Sequence[StepPlan], before: Sequence[Array], after: Sequence[Array], counted: float
-    ) -> Array:
+        before, after = rows(starts), rows(reached)
+        return self._led(partial(self._account, plan, before, after, counted))
+
+    def _account(self, plan: StepPlan, before: Sequence[Array], after: Sequence[Array], counted: float) -> Array:
         """Return these terms from the rows of the balances.
 
         Args:
-            taken: The steps.
-            before, after: Of both bodies, at the start and at the end of the stages, of `_summed`.
+            plan: The step.
+            before, after: Of both bodies, at the start and at the end of the stages.
             counted: How often the constant parts of a stage count in a step; 0 for changes.
         """
-        stored, convected, held, carried = (np.zeros(after[0].shape[2:]) for _ in range(4))
-        every, seconds = np.arange(len(taken)), np.array([plan.seconds for plan in taken])
-        both = np.array([[plan.punch for plan in taken], [plan.strip for plan in taken]])
-        for side, kinds, a, b in zip(self.sides, both, after, before, strict=True):
+        stored, convected, held, carried = (np.zeros(after[0].shape[1:]) for _ in range(4))
+        seconds = plan.seconds
+        for side, kind, a, b in zip(self.sides, (plan.punch, plan.strip), after, before, strict=True):
             if not self._steady:
-                stored = stored + (a[0] - b[0]).sum(axis=0)
-            convected = convected + seconds @ a[1] - counted * seconds.sum() * side.ambient_loss
-            held = held - seconds @ (a[2 + 3 * kinds, every] - b[3 + 3 * kinds, every])
-            held = held + counted * (seconds @ np.array(side.held_source)[kinds])
-            carried = carried + seconds @ a[4 + 3 * kinds, every] - counted * (seconds @ np.array(side.brought)[kinds])
+                stored = stored + a[0] - b[0]
+            convected = convected + seconds * (a[1] - counted * side.ambient_loss)
+            held = held - seconds * (a[2 + 3 * kind] - b[3 + 3 * kind] - counted * side.held_source[kind])
+            carried = carried + seconds * (a[4 + 3 * kind] - counted * side.brought[kind])
             if side.gives_back:
-                convected = convected - seconds @ a[kinds - len(side.contacts), every]
+                convected = convected - seconds * a[kind - len(side.contacts)]
         none = np.zeros_like(stored)
         return np.array([none, none, stored, convected, held, carried])
 
@@ -548,7 +520,7 @@ class HeatExchange:
         one = self._prepared[kinds].map(self._flux_map(kinds, conductance))
         return one if len(self._stages) == 1 else one.twice(EARLIER)
 
-    def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
+    def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> FluxFactor | FluxUpdate:
         """Return the map to the fluxes; kept for conductances met before."""
         key = (*kinds, conductance.tobytes())
         if key not in self._flux_maps:
@@ -557,10 +529,10 @@ class HeatExchange:
             self._flux_maps[key] = self._make_flux_map(kinds, conductance)
         return self._flux_maps[key]
 
-    def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
+    def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> FluxFactor | FluxUpdate:
         step = self._exchanged(kinds, conductance)
         if len(conductance) <= FEW:
-            return FluxMap.made(step)
+            return FluxFactor(step)
         last = self._flux_factors.get(kinds)
         found = None if last is None else last.updated(step)
         if found is None:
@@ -573,6 +545,15 @@ class HeatExchange:
         first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
         heat = self.heat
         return Exchanged((first, second), conductance, heat.convection, heat.partition, heat.debris)
+
+
+def _given_conductance(heat: Heat) -> tuple[Callable[[Array], Array], bool]:
+    """Return h_c by the pressure (n,), N/(mm s K), as a table of heat gives it, and whether it depends on that."""
+    if heat.conductance_per_pressure is None:
+        constant = np.inf if heat.conductance == "perfect" else float(heat.conductance)
+        return lambda pressure: np.full(len(pressure), constant), False
+    h1, h2 = heat.conductance_per_pressure
+    return lambda pressure: np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2)), True
 
 
 def _bases(sides: Sequence[Side]) -> tuple[Basis, ...]:

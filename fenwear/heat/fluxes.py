@@ -5,8 +5,8 @@ At a node that conducts, with the friction heat Q,
     q_1 + q_2 = (1 - gamma_d) Q,    kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2),
 
 elsewhere q_i = -h (theta_i - theta_a), and theta_i = bare_i + T_i q_i: a dense system M q = r. Of few nodes its
-solution is made into a matrix, which serves many steps; of many it is eliminated down to q_1 and what open nodes of
-the second body lose, n unknowns or a few more in place of 2 n, and kept as a factor.
+solution is made into matrices, which serve many steps. It is eliminated down to q_1 and what open nodes of the second
+body lose, n unknowns or a few more in place of 2 n, and kept as a factor.
 
 From one step to the next few nodes begin or cease to conduct: of M and r other rows c than those of the factor's M_0
 and r_0. With E the columns of the identity at these rows the factor serves on, exactly, by Woodbury's formula:
@@ -142,40 +142,6 @@ class Fluxes(Protocol):
         """Return rows (r, 2 n) of the fluxes as rows of what they come from."""
 
 
-@dataclass(frozen=True)
-class FluxMap:
-    """They as matrices.
-
-    Attributes:
-        by_temperature: From the surfaces' temperatures without flux (2 n, 2 n).
-        by_heat: From the friction heat (2 n, n).
-        by_ambient: From the temperature of the surroundings (2 n,).
-    """
-
-    by_temperature: Array
-    by_heat: Array
-    by_ambient: Array
-
-    @classmethod
-    def made(cls, step: Exchanged) -> FluxMap:
-        """Return the map of a step."""
-        made = step.sources(scipy.linalg.inv(step.matrix()))
-        return cls(np.hstack([made.first, made.second]), made.heat, made.ambient)
-
-    def of(self, bare: Array, heat: Array, ambient: float) -> Array:
-        """Return the fluxes."""
-        total = self.by_temperature @ bare
-        total += self.by_heat @ heat
-        if ambient:
-            total += _down(bare.ndim)(self.by_ambient) * ambient
-        return total
-
-    def sources(self, rows: Array) -> Sources:
-        """Return rows of the fluxes as rows of what they come from."""
-        first, second = np.hsplit(rows @ self.by_temperature, 2)
-        return Sources(first, second, rows @ self.by_heat, rows @ self.by_ambient)
-
-
 class FluxFactor:
     """They by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 follows from q_1.
 
@@ -234,7 +200,7 @@ class FluxFactor:
         second[:, apart] = z[:, n:]
         return np.hstack([z[:, :n], second])
 
-    def updated(self, step: Exchanged) -> Fluxes | None:
+    def updated(self, step: Exchanged) -> FluxFactor | FluxUpdate | None:
         """Return the fluxes of a step at other conductances by this factor; None where too many nodes differ."""
         ours, others = np.nan_to_num(self.step.conductance, nan=-1.0), np.nan_to_num(step.conductance, nan=-1.0)
         nodes = np.flatnonzero(ours != others)

@@ -27,7 +27,7 @@ import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.heat.field import Field, Functional, Propagation
-from fenwear.heat.fluxes import Fluxes, FluxFactor, FluxMap, FluxUpdate, Sources
+from fenwear.heat.fluxes import Fluxes, FluxFactor, FluxUpdate, Sources
 
 
 @dataclass(frozen=True)
@@ -86,18 +86,20 @@ class PreparedStage:
             self._decay = np.concatenate([one.decay for one in motions])
         self._source = np.concatenate([one.source for one in motions])
 
-    def at(self, fluxes: FluxMap, crossing: Array) -> Stage:
+    def at(self, fluxes: Fluxes, crossing: Array) -> Stage:
         """Return the stage with these fluxes.
 
         Args:
             fluxes: At its conductances.
             crossing: What a unit of a node's flux carries across the contact in the stage (n,), mm s.
         """
-        level = (fluxes.by_temperature.sum(axis=1) + fluxes.by_ambient) * self._ambient
-        by_contact = fluxes.by_temperature @ self._bare
+        made = fluxes.sources(np.eye(len(self.given_back)))
+        by_temperature = np.hstack([made.first, made.second])
+        level = (by_temperature.sum(axis=1) + made.ambient) * self._ambient
+        by_contact = by_temperature @ self._bare
         into = by_contact + np.diag(self.given_back)
         summed = scipy.linalg.block_diag(crossing, crossing)
-        parts = ((into, by_contact), (fluxes.by_heat, fluxes.by_heat), (level, level))
+        parts = ((into, by_contact), (made.heat, made.heat), (level, level))
         return Stage(self, *(np.concatenate([every, summed @ flux]) for every, flux in parts))
 
     def met(self, values: Array, *, sources: bool) -> tuple[Array, Array]:
@@ -218,7 +220,7 @@ class PreparedStep:
         self._responses = [field.responses[kind] for field, kind in zip(fields, kinds, strict=True)]
         self._known: tuple[FluxFactor, Array, StepMap] | None = None
 
-    def map(self, fluxes: Fluxes) -> StepMap:
+    def map(self, fluxes: FluxFactor | FluxUpdate) -> StepMap:
         """Return the map with these fluxes."""
         if isinstance(fluxes, FluxUpdate):
             _, rows, base = self._by_factor(fluxes.base)
@@ -229,22 +231,16 @@ class PreparedStep:
                 base.source + picked @ constant,
                 base.response + picked @ by_heat,
             )
-        if isinstance(fluxes, FluxFactor):
-            return self._by_factor(fluxes)[2]
-        return self._made(fluxes.sources(scipy.linalg.block_diag(*self._responses)))
+        return self._by_factor(fluxes)[2]
 
     def _by_factor(self, factor: FluxFactor) -> tuple[FluxFactor, Array, StepMap]:
         """Return the factor, R M^-1, and the map that follows."""
         if self._known is None or self._known[0] is not factor:
             self._known = None
             rows = factor.solve_rows(scipy.linalg.block_diag(*self._responses))
-            self._known = (factor, rows, self._made(factor.step.sources(rows)))
+            by_state, constant, by_heat = self._followed(factor.step.sources(rows))
+            self._known = factor, rows, StepMap(self._free + by_state, self._source + constant, by_heat)
         return self._known
-
-    def _made(self, responses: Sources) -> StepMap:
-        """Return the map from the responses to what the fluxes come from."""
-        by_state, constant, by_heat = self._followed(responses)
-        return StepMap(self._free + by_state, self._source + constant, by_heat)
 
     def _followed(self, rows: Sources) -> tuple[Array, Array, Array]:
         """Return rows of what the fluxes come from as rows of the coordinates, a constant, and rows of the heat."""

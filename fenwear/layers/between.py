@@ -30,6 +30,7 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.layers.closure import (
+    RIGID,
     Closure,
     CoatedClosure,
     ExponentialClosure,
@@ -102,11 +103,14 @@ class Layers:
         """Whether debris lies at the contact's nodes, and not on a strip that carries it."""
         return self.debris.present and not self.strip_carries
 
+    @property
+    def gives(self) -> Closure:
+        """The law by which it gives way, beside a linear layer; that of nothing where there is none."""
+        return RIGID if self.closure is None else self.closure
+
     def given(self, pressure: Array, closure: Closure | None = None) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm, by default without what coatings do."""
-        closure = closure or self.closure
-        found = self.winkler * pressure
-        return found if closure is None else found + closure.closure(pressure)
+        return self.winkler * pressure + (closure or self.gives).closure(pressure)
 
     @property
     def varies(self) -> bool:
@@ -144,14 +148,14 @@ class Layers:
     def coatings_closure(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> CoatedClosure:
         """Return by what coatings give way in each phase (m, n) at depths; arguments as of `coatings_left`."""
         left = self.coatings_left(pairs, punch, strip)
-        return CoatedClosure(None, tuple((own, soft.modulus) for own, soft in zip(left, self.soft, strict=True)))
+        return CoatedClosure(RIGID, tuple((own, soft.modulus) for own, soft in zip(left, self.soft, strict=True)))
 
     def closure_at(self, pair: ContactPair, worn: WornDepths) -> Closure | None:
         """Return the law by which all that lies between gives way where these depths are worn, at one place."""
         if not self.softens:
             return self.closure
         coats = self.coatings_closure([pair], worn.punch, worn.strip).coatings
-        return CoatedClosure(self.closure, tuple((left[0], modulus) for left, modulus in coats))
+        return CoatedClosure(self.gives, tuple((left[0], modulus) for left, modulus in coats))
 
     def unworn(self, strip: int) -> WornDepths:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
@@ -260,16 +264,13 @@ class Layers:
 
         Where pressures are `capped` at the hardness what flows is left out.
         """
-        found = np.zeros(pressure.shape) if self.closure is None else self.closure.closure(pressure)
+        found = self.gives.closure(pressure)
         return found if capped or self.hardness == np.inf else found + self.flow(pressure)
 
-    def slope(self, pressure: Array, *, capped: bool = False) -> Array | None:
-        """Return the derivative of `closing` (m, n), mm/MPa; None where nothing gives way so."""
-        found = None if self.closure is None else self.closure.slope(pressure)
-        if capped or self.hardness == np.inf:
-            return found
-        soft = np.where(pressure > self.hardness, self.softness, 0.0)
-        return soft if found is None else found + soft
+    def slope(self, pressure: Array, *, capped: bool = False) -> Array:
+        """Return the derivative of `closing` (m, n), mm/MPa."""
+        found = self.gives.slope(pressure)
+        return found if capped else found + np.where(pressure > self.hardness, self.softness, 0.0)
 
     def flowed(self, pressure: Array, gap: Array) -> Array:
         """Return what surfaces have flown (n,), mm, whose pressures were capped at the hardness, from the gap left."""

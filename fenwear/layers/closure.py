@@ -195,26 +195,41 @@ class RoughClosure:
         return found
 
 
+class Rigid:
+    """Nothing gives way."""
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm: none."""
+        return np.zeros_like(pressure)
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa: none."""
+        return np.zeros_like(pressure)
+
+
+RIGID = Rigid()
+
+
 @dataclass(frozen=True)
 class CoatedClosure:
     """A law and coatings that give way beside each other, each by what is left of it.
 
     Attributes:
-        law: What else gives way; None for nothing.
+        law: What else gives way.
         coatings: What is left of each (..., n), mm, and its modulus M, MPa.
     """
 
-    law: Closure | None
+    law: Closure
     coatings: tuple[tuple[Array, float], ...]
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        found = np.zeros_like(pressure) if self.law is None else self.law.closure(pressure)
+        found = self.law.closure(pressure)
         return sum((left * compressed(pressure, modulus) for left, modulus in self.coatings), found)
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
-        found = np.zeros_like(pressure) if self.law is None else self.law.slope(pressure)
+        found = self.law.slope(pressure)
         parts = (left / modulus * (1 - compressed(pressure, modulus)) for left, modulus in self.coatings)
         return sum(parts, found)
 

@@ -43,11 +43,10 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
     share = 1 / (resistance * modulus)  # 2 k_1 k_2 / (k_1 + k_2) over E*
 
     def conductance(pressure: Array) -> Array:
-        closure, carried = layers.closure, np.maximum(pressure, 0.0)
+        closure, carried = layers.gives, np.maximum(pressure, 0.0)
         if isinstance(closure, SharedClosure):  # the spots conduct that asperities make
             carried = closure.carried(carried)
             closure = closure.law
-        slope = layers.winkler if closure is None else layers.winkler + closure.slope(carried)
-        return np.asarray(share / slope)
+        return np.asarray(share / (layers.winkler + closure.slope(carried)))
 
     return conductance

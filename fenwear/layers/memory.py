@@ -296,7 +296,7 @@ class Evolution:
         if not self.memory.names:
             nothing = (np.zeros((rows.shape[1], 0, 0)) for rows in (start.contact, start.strip))
             return list(self.conditions), start, _Slopes(*nothing)
-        q, held, middles, slopes = len(self.memory.contact), start, [], None
+        q, held, middles, slopes = len(self.memory.contact), start, [], _Slopes(np.zeros(()), np.zeros(()))
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
             begin = held.at_contact(pair)
             middle, end, z = self._over(begin, float(tau), self._under(k))
@@ -311,9 +311,7 @@ class Evolution:
                 z_strip = under + left[:, None, None] * z_free
             held = Held(end[:q], strip)
             held = held if k == len(self.pairs) - 1 else self.memory.bounded(held)
-            own = _Slopes(z[:, :q, :q], z_strip)
-            slopes = own if slopes is None else slopes + own
-        assert slopes is not None
+            slopes += _Slopes(z[:, :q, :q], z_strip)
         return middles, held, slopes
 
     def after(self, start: Held) -> Held:

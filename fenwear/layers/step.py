@@ -84,12 +84,9 @@ class LayerEvolution:
             return evolution.after(held) - held
         return (evolution.implicit(held, cycles) - held).times(1 / cycles)
 
-    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array | None:
-        """Return the gap that the states of laws fill more (n,), mm, as `worn`; None where they fill none."""
-        memory = self.layers.memory
-        if self.evolution is None or not memory.filling:
-            return None
-        return memory.fills @ self._evolved(pressure, before, cycles).contact
+    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array:
+        """Return the gap that the states of laws fill more (n,), mm, as `worn`."""
+        return self.layers.memory.fills @ self._evolved(pressure, before, cycles).contact
 
     def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
         """Return what is added to the thickness of the debris, and what is ejected, as `worn`.
@@ -178,8 +175,8 @@ class LayerStep:
             if passing.layers.strip_carries:
                 added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
             found = found - added
-        filled = passing.filled(pressure, self.before, self.cycles)
-        found = found if filled is None else found - self._length * filled
+        if self._fills:
+            found = found - self._length * passing.filled(pressure, self.before, self.cycles)
         return found + closed
 
     def local(self, pressure: Array) -> Array | None:
@@ -256,11 +253,10 @@ class LayerStep:
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
+        if not self.curved:
+            return None
         found = self.passing.layers.slope(pressure, capped=self.capped)
-        if not self.passing.layers.softens:
-            return found
-        gives = self._coatings(pressure).slope(pressure)
-        return gives if found is None else found + gives
+        return found + self._coatings(pressure).slope(pressure) if self.passing.layers.softens else found
 
     def _depths(self, pressure: Array) -> tuple[Array, Array]:
         """Return the depths of punch and strip by which coatings give way: those at the step's end."""
@@ -292,18 +288,17 @@ class LayerStep:
         passing, found = self.passing, np.zeros_like(pressure)
         if passing.layers.lies_here:
             found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
-        filled = passing.filled(pressure, self.before, self.cycles) if self._fills else None
-        if filled is None:
+        if not self._fills:
             return found
+        filled = passing.filled(pressure, self.before, self.cycles)
         size = NUDGE * max(float(np.abs(pressure).max()), 1e-300)
         for k in range(len(pressure)):
             more = pressure.copy()
             more[k] += size
-            other = passing.filled(more, self.before, self.cycles)
-            found[k, :] += 0.0 if other is None else self._length * (other - filled) / size
+            found[k, :] += self._length * (passing.filled(more, self.before, self.cycles) - filled) / size
         return found
 
     @property
     def _fills(self) -> bool:
         """Whether states of laws fill a part of the gap."""
-        return self.passing.layers.memory.filling
+        return self.passing.evolution is not None and self.passing.layers.memory.filling

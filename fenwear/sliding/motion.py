@@ -137,7 +137,7 @@ class Motion:
     half_cycles: int
     _strokes: tuple[_Stroke, ...]
     _starts: tuple[float, ...]  # offset of the strip at the start of each stroke
-    _ends: tuple[float, ...] | None = None  # times of the phases' ends in the only stroke of a table, 0 first
+    _ends: tuple[float, ...] = ()  # times of the phases' ends in the only stroke of a table, 0 first
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -207,11 +207,11 @@ class Motion:
                     replace(part, way=way) for part, way in zip(phases[-parts:], phase.way.parts(parts), strict=True)
                 ]
         cut = replace(self, phases=tuple(phases), positions=self.positions * parts)
-        return cut if self._ends is None else replace(cut, _ends=tuple(ends))
+        return replace(cut, _ends=tuple(ends)) if self.steps else cut
 
     def _cut(self, stroke: int, parts: int) -> list[float]:
         """Return the ends of equal parts of the phases of a half-cycle, s."""
-        if self._ends is None:
+        if not self.steps:
             return _edges(self._strokes[stroke], self.positions * parts)
         shares = np.arange(parts) / parts
         inner = [a + share * (b - a) for a, b in itertools.pairwise(self._ends) for share in shares]
@@ -231,7 +231,7 @@ class Motion:
     @property
     def steps(self) -> bool:
         """Whether it is a table, whose steps have sliding fields of their own."""
-        return self._ends is not None
+        return bool(self._ends)
 
     def measured(self, amounts: Sequence[float]) -> Motion:
         """Return the same motion, a table, with the distances of its phases times these amounts (phases,).
@@ -245,7 +245,7 @@ class Motion:
             for phase, amount in zip(self.phases, amounts, strict=True)
         )
         speeds = tuple(phase.speed for phase in phases)
-        stroke = _PiecewiseLinear(self._ends or (), speeds, speeds)
+        stroke = _PiecewiseLinear(self._ends, speeds, speeds)
         return replace(self, phases=phases, _strokes=(stroke,))
 
     def time(self, half_cycle: NDArray[np.int64]) -> Array:

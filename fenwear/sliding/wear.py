@@ -46,8 +46,6 @@ class WornDepths:
     carried: Array = field(default_factory=lambda: NOTHING)
 
     def __add__(self, other: WornDepths) -> WornDepths:
-        if self.plain and other.plain:
-            return WornDepths(self.punch + other.punch, self.strip + other.strip, *self._kept)
         return WornDepths(
             self.punch + other.punch,
             self.strip + other.strip,
@@ -59,11 +57,6 @@ class WornDepths:
     def __sub__(self, other: WornDepths) -> WornDepths:
         return self + other.times(-1.0)
 
-    @property
-    def plain(self) -> bool:
-        """Whether nothing lies between, creeps or is remembered."""
-        return not (len(self.between) or len(self.crept) or len(self.carried))
-
     def same(self, other: WornDepths) -> bool:
         """Return whether all of it is equal to another's."""
         mine, theirs = ((one.punch, one.strip, *one._kept) for one in (self, other))
@@ -71,8 +64,6 @@ class WornDepths:
 
     def times(self, factor: float) -> WornDepths:
         """Return all of it times a factor."""
-        if self.plain:
-            return WornDepths(factor * self.punch, factor * self.strip, *self._kept)
         return WornDepths(factor * self.punch, factor * self.strip, *(factor * state for state in self._kept))
 
     @property

@@ -28,7 +28,7 @@ def test_at_rest_as_conductivities(other: float) -> None:
     """Bodies at rest share as their conductivities everywhere, like ones half and half."""
     sides, heat = _hertz(33)
     first, second = (_side(heat.shape, sides, k, 10.0) for k in (46.0, other))
-    own = shared(first, second, heat[None], heat[None] > 0, sides, FOREVER)
+    own = shared(first, second, heat[None], heat[None] > 0, sides, FOREVER, resistance=np.zeros((1, *heat.shape)))
     assert np.allclose(own, 46.0 / (46.0 + other) * heat, atol=1e-7)
 
 
@@ -47,7 +47,7 @@ def test_to_and_fro_shares_meet() -> None:
         for k, kappa, place, bulk in zip((46.0, 20.0), (12.8, 3.0), (0 * shifts, shifts), bulks, strict=True)
     )
     cell, touching = sides[0] * sides[1], np.broadcast_to(spot > 0, heat.shape)
-    own = shared(first, second, heat, touching, sides, period)
+    own = shared(first, second, heat, touching, sides, period, resistance=np.zeros_like(heat))
     one, two = first.rise(own, cell), second.rise(heat - own, cell)
     assert np.abs(one - two)[touching].max() < 1e-7 * one.max()
     assert not own[~touching].any()

@@ -1,4 +1,4 @@
-"""The fluxes at the contact: as a matrix of all, by a factor of what is left, and by that of other conductances."""
+"""The fluxes at the contact: by a factor, and by that of other conductances."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenwear.arrays import Array
-from fenwear.heat.fluxes import Exchanged, FluxFactor, FluxMap, FluxUpdate
+from fenwear.heat.fluxes import Exchanged, FluxFactor, FluxUpdate
 
 NODES = 12
 
@@ -36,7 +36,7 @@ def test_all_obey_the_equations_of_the_contact(kind: str, convection: float, mon
     monkeypatch.setattr("fenwear.heat.fluxes.UPDATED", 1.0)
     updated = FluxFactor(step(other, convection)).updated(one)
     assert isinstance(updated, FluxUpdate)
-    for fluxes in (FluxMap.made(one), FluxFactor(one), updated):
+    for fluxes in (FluxFactor(one), updated):
         first, second = np.split(fluxes.of(bare, heat, ambient), 2)
         hot, cold = bare[:NODES] + one.responses[0] @ first, bare[NODES:] + one.responses[1] @ second
         np.testing.assert_allclose((first + second)[conducts], generated[conducts], atol=1e-12)
@@ -67,7 +67,7 @@ def test_a_factor_serves_while_few_nodes_differ(monkeypatch: pytest.MonkeyPatch)
         updated = factor.updated(one)
         assert updated is not None
         found.append(updated.of(bare, np.zeros(len(bare) // 2), 0.3))
-        np.testing.assert_allclose(found[-1], FluxMap.made(one).of(bare, np.zeros(len(bare) // 2), 0.3), atol=1e-12)
+        np.testing.assert_allclose(found[-1], FluxFactor(one).of(bare, np.zeros(len(bare) // 2), 0.3), atol=1e-12)
     np.testing.assert_array_equal(found[0], found[-1])
     now[:4] = np.nan
     assert factor.updated(step(now, 0.7)) is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import basix.ufl
@@ -14,7 +13,6 @@ from dolfinx.graph import adjacencylist
 from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from fenwear.stack import check_numbers
 
@@ -107,21 +105,6 @@ def geometry_degree(mesh: Mesh) -> int:
     """Return the degree of the elements' shape; from 0.11 on there is one for each cell type."""
     maps = getattr(mesh.geometry, "cmaps", None)
     return int((mesh.geometry.cmap if maps is None else maps[0]).degree)
-
-
-@cache
-def least_fill() -> str:
-    """Return the ordering of least fill for PETSc's own factors: that of SuiteSparse, where PETSc is built with it."""
-    one = PETSc.Mat().createAIJ(1, nnz=1, comm=PETSc.COMM_SELF)
-    one[0, 0] = 1.0
-    one.assemble()
-    try:
-        one.getOrdering("amd")
-    except PETSc.Error:
-        return "nd"
-    finally:
-        one.destroy()
-    return "amd"
 
 
 def petsc_library() -> str | None:

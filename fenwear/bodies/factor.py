@@ -30,7 +30,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import dense, destroy
-from fenwear.compat import least_fill, petsc_library
+from fenwear.compat import petsc_library
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import all_together
 
@@ -70,7 +70,6 @@ class Factor:
         *,
         comm: MPI.Comm,
         dim: int,
-        repeated: bool = False,
         owner: int = 0,
         surface: NDArray[np.int64] | None = None,
     ) -> None:
@@ -82,7 +81,6 @@ class Factor:
             kind: Of the factor.
             comm: Its ranks: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
-            repeated: Whether it solves thousands of times.
             owner: The rank that has it, unless it is spread; a rank that has the whole matrix is the owner.
             surface: Rows whose Schur complement is kept (m,), by the owner alone.
         """
@@ -94,7 +92,6 @@ class Factor:
         self.owner = int(having[0]) if whole else owner % self.comm.size
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
         self.is_spread = self.comm.size > 1 and not whole and needed > SPREAD
-        self._repeated = repeated and not self.is_spread
         self._surface = None if self.is_spread else surface
         self.has_schur = self._surface is not None
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
@@ -119,7 +116,7 @@ class Factor:
             return
         matrix, self._matrix = self._matrix, None
         surface = self._surface
-        self._solver = _factored(matrix, self._prefix, self._kind, repeated=self._repeated, surface=surface)
+        self._solver = _factored(matrix, self._prefix, self._kind, surface)
         if surface is not None:
             self.schur = schur_complement(self._solver, len(surface))
         if self.is_moved:
@@ -202,14 +199,13 @@ def factored(
     *,
     comm: MPI.Comm,
     dim: int,
-    repeated: bool = False,
 ) -> Factor:
     """Return the factor of a matrix; collective.
 
     Raises:
         ConvergenceError: it has no factor.
     """
-    factor = Factor(matrix, prefix, kind, comm=comm, dim=dim, repeated=repeated)
+    factor = Factor(matrix, prefix, kind, comm=comm, dim=dim)
     make_together([factor])
     return factor
 
@@ -354,22 +350,16 @@ def factored_here(matrix: PETSc.Mat, prefix: str, surface: NDArray[np.int64]) ->
         ConvergenceError: it has no factor.
     """
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    return _factored(matrix, prefix, "cholesky", repeated=False, surface=surface)
+    return _factored(matrix, prefix, "cholesky", surface)
 
 
-def _factored(
-    matrix: PETSc.Mat, prefix: str, kind: str, *, repeated: bool, surface: NDArray[np.int64] | None
-) -> PETSc.Mat:
+def _factored(matrix: PETSc.Mat, prefix: str, kind: str, surface: NDArray[np.int64] | None) -> PETSc.Mat:
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(matrix)
     ksp.setType("preonly")
     ksp.pc.setType(kind)
-    if repeated:  # PETSc's own factor answers four times as fast as MUMPS
-        ksp.pc.setFactorSolverType("petsc")
-        ksp.pc.setFactorOrdering(least_fill())
-    else:
-        ksp.pc.setFactorSolverType("mumps")
+    ksp.pc.setFactorSolverType("mumps")
     ksp.setFromOptions()
     try:
         if surface is not None:

@@ -48,8 +48,6 @@ FREE = (CONVECTING, INSULATED)  # boundaries that material may move through
 END = 0.1  # mean cosine of the angle between v and n: below, an element's boundary turns in its place and is no end
 CROSSED = 1e-6  # of the speed, above which v crosses a boundary
 WARMER = 100.0  # K: the mean rise that a convection is proposed for
-CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
-LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
 
 
 @dataclass(frozen=True)
@@ -193,16 +191,13 @@ class HeatBody:
             self._flows[sliding] = _Flow(self, sliding)
         return self._flows[sliding]
 
-    def step(
-        self, speed: float, duration: float, surroundings: Surroundings = ALONE, *, at_once: bool = False
-    ) -> HeatStep:
+    def step(self, speed: float, duration: float, surroundings: Surroundings = ALONE) -> HeatStep:
         """Assemble and factor one implicit Euler step, or for an infinite duration the steady state; collective.
 
         Args:
             speed: Of the material, mm/s, or rad/s where it turns.
             duration: Of the step, s.
             surroundings: What lies beyond the mesh.
-            at_once: Whether it advances many fields at once, rather than one field thousands of times.
 
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
@@ -223,8 +218,7 @@ class HeatBody:
             loss.destroy()
         carried = speed * flow.carried + entering
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
-        repeated = duration < np.inf and not at_once
-        return HeatStep(self, a, b, f, carried, brought, entering, moves=speed != 0, repeated=repeated)
+        return HeatStep(self, a, b, f, carried, brought, entering, moves=speed != 0)
 
     def _resting(self, forms: _StepForms) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Return A and B of material at rest, M / dt + K and M / dt, without assembling them again; collective."""
@@ -492,7 +486,6 @@ class HeatStep:
         entering: Array,
         *,
         moves: bool,
-        repeated: bool,
     ) -> None:
         self.moves = moves
         self.body, self.carried, self.brought, self.entering = body, carried, brought, entering
@@ -510,13 +503,12 @@ class HeatStep:
         self.a, self.b = a, b
         self.is_held = np.zeros(body.owned, dtype=bool)
         self.is_held[body.held] = True
-        self._repeated = repeated
-        self._pivoted, self._solved = not repeated, 0
 
     @cached_property
     def _factor(self) -> Factor:
         """Made at the first solution, as reduced steps need none; collective."""
-        return self._factored(repeated=self._repeated)
+        domain = self.body.body.mesh
+        return factored(self.a, PREFIX, "lu", comm=domain.comm, dim=domain.topology.dim)
 
     def advance(self, theta: Array, *, sources: bool = True) -> Array:
         """Return the temperature at the end without any flux through the contact; collective.
@@ -525,21 +517,14 @@ class HeatStep:
             theta: At its start (owned,), or without sources several fields (owned, k).
             sources: False for what becomes of changes of temperature, A^-1 B.
         """
-        if theta.ndim == 2:
-            return self._solve_many(times(self.b, theta))
         rhs = times(self.b, theta)
         if sources:
             rhs += self.source
-        solution = self._factor.solve(rhs)
-        self._solved += 1
-        if self._solved % CHECK_EVERY == 1 and not self._is_exact(rhs, solution):
-            self._pivot()
-            solution = self._factor.solve(rhs)
-        return solution
+        return self._factor.solve(rhs)
 
     def respond(self, load: Array) -> Array:
         """Return A^-1 of several loads (owned, k), mW/mm; collective."""
-        return self._solve_many(np.where(self.is_held[:, None], 0.0, load))
+        return self._factor.solve(np.where(self.is_held[:, None], 0.0, load))
 
     def apply(self, fields: Array) -> tuple[Array, Array]:
         """Return A and B times several fields (owned, k); collective."""
@@ -550,33 +535,8 @@ class HeatStep:
         made = self.__dict__.pop("_factor", None)
         if made is not None:
             made.free()
-            self._pivoted = not self._repeated
 
     def free(self) -> None:
         """Free its matrices and its factor, after which it advances nothing; collective."""
         self.free_factor()
         destroy(self.a, self.b)
-
-    def _solve_many(self, rhs: Array) -> Array:
-        solution = self._factor.solve(rhs)
-        if not self._is_exact(rhs, solution):
-            self._pivot()
-            solution = self._factor.solve(rhs)
-        return solution
-
-    def _is_exact(self, rhs: Array, solution: Array) -> bool:
-        """Return whether solutions of the factor are those of the matrix, or no factor can be better; collective."""
-        if self._pivoted:
-            return True
-        residual = times(self.a, solution) - rhs
-        squares = total(self.body.body.mesh.comm, np.array([np.vdot(residual, residual), np.vdot(rhs, rhs)]))
-        return bool(squares[0] <= LARGEST_RESIDUAL**2 * squares[1])
-
-    def _factored(self, *, repeated: bool = False) -> Factor:
-        domain = self.body.body.mesh
-        return factored(self.a, PREFIX, "lu", comm=domain.comm, dim=domain.topology.dim, repeated=repeated)
-
-    def _pivot(self) -> None:
-        """Factor again, with pivoting; collective."""
-        self._factor.free()
-        self._factor, self._pivoted = self._factored(), True

@@ -85,7 +85,7 @@ def certificate(
     found = compare.apart(whole, reduced, last[-1])
     if body.loses_heat(velocity, surroundings):
         mean = np.mean(trial.entering, axis=0)
-        steady = body.step(velocity, np.inf, surroundings, at_once=True)
+        steady = body.step(velocity, np.inf, surroundings)
         whole = steady.respond(trial.inflow @ mean)
         steady.free()
         changes = np.eye(dim) - small.advance(0, np.eye(dim), sources=False)

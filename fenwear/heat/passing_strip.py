@@ -153,7 +153,7 @@ class PassingStrip:
     def _modes(self, shortest: float) -> tuple[ReducedBasis, Array]:
         """Return the same, and the rates of the modes (dim,), 1/s."""
         if self._known is None or self._known[0] > shortest * (1 + 1e-9):
-            step = self.body.step(0.0, shortest, self.around, at_once=True)
+            step = self.body.step(0.0, shortest, self.around)
             # Fluxes weigh by their areas, as friction makes them; a node of a triangle may have none.
             areas = self._areas[self.passage.nodes]
             loads = csc_array(self.loads @ diags_array(np.maximum(areas, LEAST_AREA * self._areas.mean())))

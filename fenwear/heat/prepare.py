@@ -106,7 +106,7 @@ def prepare_exchange(
             side, difference = _passing(heat, strip, of_places, own, plans, rows, opened, reduced=reduced)
         else:
             around = _surroundings(body, pair, sliding, renewed=one_way)
-            steps = [body.step(stage.velocity, stage.duration, around, at_once=reduced) for stage in own]
+            steps = [body.step(stage.velocity, stage.duration, around) for stage in own]
             rated = None
             if reduced:
                 cycle = [step.of(body) for row in plans for step in row]
@@ -291,7 +291,7 @@ def _passing(
     """
     body, around, passage = strip.body, strip.around, strip.passage
     transfers, kinds = [transfer for transfer, _ in of_places], [kind for _, kind in of_places]
-    steps = [body.step(0.0, stage.duration, around, at_once=reduced) for stage in stages]
+    steps = [body.step(0.0, stage.duration, around) for stage in stages]
     inner: FullField | ModalField
     difference = None
     if reduced:
@@ -345,7 +345,7 @@ def _on_track(
     fluxes, flow = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], entering.sum()]))
     away = body.bulk(track)[0] / thickness / (flow * abs(fastest))
     section = section_modes(body, around.sliding, float(np.sign(fastest)), away)
-    steady = body.step(fastest, np.inf, around, at_once=True)
+    steady = body.step(fastest, np.inf, around)
     heated = steady.respond(inflow @ (trial.entering[-1][:, :2]))  # even, and growing along the contact
     steady.free()
     rises = np.abs(total(comm, trial.contact @ heated)).max(axis=0)

@@ -69,13 +69,13 @@ def reduced_basis(
     even = csc_array(inflow @ diags_array(1 / np.sqrt(total(body.body.mesh.comm, abs(inflow).sum(axis=0)))))
     scales = [duration * RATIO**k for k in range(SCALES)]
     scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
-    later = body.step(0.0, duration, surroundings, at_once=True) if lasting else None
+    later = body.step(0.0, duration, surroundings) if lasting else None
     basis = _Growing(body, later)
     if later is None:
         fluxes = even.toarray()
     else:
         tolerance *= SHARPER
-        slowest = body.step(mean, scales[-1], surroundings, at_once=True)
+        slowest = body.step(mean, scales[-1], surroundings)
         fluxes = _lasting_fluxes(body, even, later, slowest, basis, tolerance)
         slowest.free()
     block = SOME // 4 if lasting else max(fluxes.shape[1], 1)
@@ -83,7 +83,7 @@ def reduced_basis(
     relaxed: list[Array] = []
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(v for v in moving if k < unlike and _has_scale(body, v, scale, surroundings))]:
-            step = body.step(velocity, scale, surroundings, at_once=True)
+            step = body.step(velocity, scale, surroundings)
             times = passes if velocity != 0 and k < PASSING else STAGES if k == 0 else 1
             for begin in range(0, fluxes.shape[1], block):
                 if not basis.follow(step, fluxes[:, begin : begin + block], times, tolerance):

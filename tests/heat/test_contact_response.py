@@ -22,7 +22,7 @@ def test_the_surface_alone_answers_as_the_whole_field(assembled: Callable[..., T
     system = assembled("example1-heat", *COARSE)
     for body, inflow in zip(system.bodies.heat, inflows(system.bodies.heat, system.pair), strict=True):
         rows = contact_rows(body, system.pair)
-        steps = [body.step(*one, at_once=True) for one in ((0.0, 0.05), (9.0, 0.05), (-9.0, 0.05), (0.0, np.inf))]
+        steps = [body.step(*one) for one in ((0.0, 0.05), (9.0, 0.05), (-9.0, 0.05), (0.0, np.inf))]
         found = contact_responses(steps, inflow, rows)
         for step, one in zip(steps, found, strict=True):
             expected = _by_columns(step, inflow, rows)
@@ -37,7 +37,7 @@ def test_a_step_at_rest_is_one_of_hardly_moving_material(assembled: Callable[...
     comm, load = body.body.mesh.comm, body.load(np.ones(len(body.surface.weights)))[:, None]
     theta = body.initial() + np.sin(np.arange(body.owned))
     for duration in (0.05, 20.0, np.inf):
-        resting, moving = (body.step(speed, duration, at_once=True) for speed in (0.0, 1e-200))
+        resting, moving = (body.step(speed, duration) for speed in (0.0, 1e-200))
         for one, other in (
             (resting.respond(load)[:, 0], moving.respond(load)[:, 0]),
             (resting.advance(theta), moving.advance(theta)),

@@ -198,23 +198,6 @@ def test_bare_contact_surface_convects(operator: str) -> None:
     np.testing.assert_allclose(found[1], found[0], rtol=0.01)
 
 
-def test_a_bad_factor_is_found() -> None:
-    """The residual is looked at now and then: a factor that answers wrongly is made again, with pivoting."""
-    system = pad_on_strip(500.0, heat={"operator": "full"})
-    step = system.exchange.sides[1].field.steps[0]
-    theta, good = step.body.initial() + 3.0, step._factor
-    theta[step.body.held] = 0.0
-    expected = step.advance(theta)
-    step._factor = system.bodies.heat[1].step(100.0, 0.01)._factor  # of another step
-    step._solved = 0
-    np.testing.assert_allclose(step.advance(theta), expected, atol=1e-9)
-    assert step._factor is not good
-    step._factor, step._pivoted = system.bodies.heat[1].step(100.0, 0.01)._factor, False
-    linear = step.advance(theta[:, None], sources=False)
-    step._factor = good
-    np.testing.assert_allclose(linear, step.advance(theta[:, None], sources=False), atol=1e-9)
-
-
 def test_new_material_is_a_heat_sink(assembled: Callable[..., Tribosystem]) -> None:
     """A strip that is cooled by what comes in only has a steady state: that of its velocity, by any step."""
     errors = []

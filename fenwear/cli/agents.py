@@ -34,7 +34,10 @@ INSTRUCTIONS = (
 @app.command("mcp")
 def mcp_command(
     port: Annotated[
-        int | None, typer.Option(help="Serve this port of the loopback device; by default standard input and output.")
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Serve this port of the loopback device; by default standard input and output."
+        ),
     ] = None,
 ) -> None:
     """Serve check, run, steady, shape, life, info and figures to other programs by the Model Context Protocol."""

@@ -461,7 +461,7 @@ class _Deck:
         """Return number and nodes of each element (n, 1 + count), and its lines; rows go on after a comma."""
         wide = 1 + count
         try:
-            if count < 16:
+            if data and count < 16:
                 with warnings.catch_warnings():
                     warnings.simplefilter("error", DeprecationWarning)  # 1.5 as a whole number
                     table = np.loadtxt([text for _, text in data], delimiter=",", dtype=np.int64, ndmin=2)

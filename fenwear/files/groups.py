@@ -370,12 +370,13 @@ class _Choice:
                 place = self.mesh.place(self.first_of(kinds[last].elements, last))
                 text = f"the {body} mixes {names} (such as {place}). Mesh it with elements of one kind."
                 self.wrong(self.mesh.name, text)
-            if not any(one.name.startswith(f"{body}_") for one in regions):
+            whole = any(one.name.startswith(f"{body}_") for one in regions)
+            if not whole:
                 text = f"no set of {ENTITIES[dim]} elements is named {body}_...: set geometry.groups.{body}_body"
                 self.wrong(self.mesh.name, f'{text} = "SET". It has {has}.')
             contacts = [one for one in groups if one.name.startswith(f"{body}_contact")]
             for one in contacts:
-                if one.dim != dim - 1:
+                if whole and one.dim != dim - 1:
                     text = f"{one.source} has no whole facet of the {body}; expected {ENTITIES[dim - 1]} elements"
                     self.wrong(one.name, f"{text} or all nodes of facets. Correct the set in {self.mesh.name}.")
             if not contacts:
@@ -385,7 +386,9 @@ class _Choice:
             for first, second, rows in _shared([one for one in groups if one.dim == level]):
                 kind = ENTITIES[level]
                 text = f"{first.name} (set {first.source}) and {second.name} (set {second.source}) share {rows} {kind}"
-                self.wrong(self.mesh.name, f'{text} elements. Leave one out by geometry.groups: {first.name} = "".')
+                other = second if first.name.endswith("_contact") else first
+                advice = f'Leave one out by geometry.groups: {other.name} = "", or name another set'
+                self.wrong(self.mesh.name, f"{text} elements. {advice}.")
 
 
 def _unique(rows: Ints) -> Ints:

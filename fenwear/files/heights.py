@@ -23,7 +23,10 @@ from fenwear.files.table import TableError, known_units, read_table
 
 NAMES = ("height", "heights", "z", "h")
 COLUMNS = {"x": "mm", "y": "mm", "height": "mm", "z": "mm"}
-INSTRUMENTS = (".sur", ".plu", ".al3d", ".opd", ".xyz", ".sdf", ".vk4", ".vk6", ".x3p", ".ibw", ".mi", ".nms", ".plux")
+INSTRUMENTS = (
+    ".sur", ".plu", ".al3d", ".opd", ".xyz", ".sdf", ".vk4", ".vk6", ".x3p", ".ibw", ".mi", ".nms", ".plux",
+    ".bcr", ".datx", ".gwy", ".lext", ".mnt", ".opdx", ".os3d", ".spm", ".zmg",
+)  # fmt: skip
 FAR, REPEATED = (
     20.0,
     3,
@@ -135,8 +138,9 @@ def read_heights(path: Path) -> Heights:
     if suffix not in MAPS:
         raise CaseError(InputError("", f"expected a file that ends with {', '.join(MAPS)}, got {path.name}"))
     try:
-        places, heights, notes = MAPS[suffix](path)
-        return _checked(path, places, heights, notes)
+        with np.errstate(all="ignore"):  # what is not finite afterwards is a hole
+            places, heights, notes = MAPS[suffix](path)
+            return _checked(path, places, heights, notes)
     except BROKEN as error:
         text = str(error).partition("\n")[0][:300] or "it is empty or cut short"
         text = "it is empty or cut short" if isinstance(error, EOFError | zipfile.BadZipFile) else text
@@ -346,17 +350,22 @@ def _clusters(values: Array, close: float) -> tuple[Array, NDArray[np.int64]]:
 
 def _from_instrument(path: Path) -> Raw:
     """Return the map of an instrument's file by SurfaceTopography."""
+    advice = "Export the map as .csv with columns x (mm), y (mm), height (um)"
     try:
         from SurfaceTopography import open_topography
     except ImportError:
-        message = f"{path.suffix} files need pip install SurfaceTopography. Or export the map as .csv with columns "
-        message += "x (mm), y (mm), height (um)"
-        raise ValueError(message) from None
-    found = open_topography(str(path)).topography()
-    unit = _unit(found.unit or "1", "the map")
-    heights = found.heights()  # masked where there are holes
-    z = np.array(getattr(heights, "data", heights), dtype=np.float64)
-    z[np.broadcast_to(np.asarray(getattr(heights, "mask", False)), z.shape)] = np.nan
+        raise ValueError(f"{path.suffix} files need pip install SurfaceTopography. {advice}") from None
+    try:
+        found = open_topography(str(path)).topography()
+    except Exception as error:  # each of its readers has errors of its own
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise ValueError(f"SurfaceTopography fails ({type(error).__name__}: {reason}). {advice}") from None
+    if not found.unit:
+        raise ValueError(f"has no unit of length. {advice}")
+    unit = _unit(found.unit, "the map")
+    if not found.is_uniform:
+        return [np.asarray(found.positions()) * unit], np.asarray(found.heights()) * unit, []
+    z = np.ma.filled(np.ma.asarray(found.heights(), dtype=np.float64), np.nan)  # masked where there are holes
     axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, found.physical_sizes, strict=True)]
     return [axis * unit for axis in axes], z * unit, []
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import random
+import sys
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from fenwear import CaseError
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
 from fenwear.case import Topography
-from fenwear.files.heights import raster, read_heights
+from fenwear.files.heights import Heights, raster, read_heights
 
 X, Y = np.linspace(0, 0.4, 41), np.linspace(0, 0.3, 31)
 Z = 5e-5 * np.sin(20 * X[:, None]) * np.cos(15 * Y)
@@ -122,3 +124,43 @@ def test_spoiled_maps_never_end_in_a_traceback(tmp_path: Path) -> None:
             path.write_bytes(bytes(spoiled))
             with suppress(CaseError):
                 read_heights(path)
+
+
+class Instrument:
+    """What SurfaceTopography gives of a file: heights with holes at the middles of cells, or at uneven places."""
+
+    def __init__(self, *, uniform: bool, unit: str | None) -> None:
+        self.is_uniform, self.unit, self.physical_sizes = uniform, unit, (4.0, 2.0)
+        self.grid = np.ma.masked_equal([[1.0, 2.0], [-1.0, 4.0]], -1.0)
+
+    def topography(self) -> Instrument:
+        return self
+
+    def heights(self) -> np.ndarray:
+        return self.grid if self.is_uniform else self.grid.data[0]
+
+    def positions(self) -> np.ndarray:
+        return np.array([0.0, 7.0])
+
+
+def test_files_of_instruments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By SurfaceTopography: units, holes and uneven places are kept; its errors and a missing unit are ours."""
+    path = tmp_path / "map.sur"
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    with pytest.raises(CaseError, match=r"map\.sur .*pip install SurfaceTopography"):
+        read_heights(path)
+
+    def opened(uniform: bool, unit: str | None = "um") -> Heights:
+        stub = SimpleNamespace(open_topography=lambda _: Instrument(uniform=uniform, unit=unit))
+        monkeypatch.setitem(sys.modules, "SurfaceTopography", stub)
+        return read_heights(path)
+
+    found = opened(True)
+    np.testing.assert_allclose(found.heights, [[1e-3, 2e-3], [np.nan, 4e-3]], rtol=1e-14)
+    np.testing.assert_allclose(np.concatenate(found.places), [1e-3, 3e-3, 0.5e-3, 1.5e-3], rtol=1e-14)
+    np.testing.assert_allclose(opened(False).places[0], [0.0, 7e-3], rtol=1e-14)
+    with pytest.raises(CaseError, match=r"no unit.*\.csv"):
+        opened(True, None)
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", SimpleNamespace(open_topography=float))
+    with pytest.raises(CaseError, match=r"ValueError.*\.csv"):
+        read_heights(path)

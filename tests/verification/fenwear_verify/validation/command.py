@@ -21,7 +21,7 @@ from fenwear_verify.validation.experiment import Comparison, Experiment, Finding
 
 DEFAULT, NUMBERS = Path("results") / "validation", "validation.json"
 COLUMN = Style(85 / 25.4)  # as wide as a journal's column, inches
-SHORT_NAME = 22  # letters: two names of this length fit beside each other
+TWO_COLUMNS = 30  # letters: names of a line and of points that fit beside each other
 
 
 def titles() -> dict[str, str]:
@@ -114,25 +114,28 @@ def draw(finding: Finding) -> bytes:
     from matplotlib.ticker import LogFormatter
 
     canvas, (ax,) = panels(1, 4.0, look=COLUMN)
-    points, drawn = 0, 0
-    for curve in finding.curves:
-        if curve.measured:
-            bars = curve.spread if len(curve.spread) else None
-            ax.errorbar(curve.x, curve.y, bars, fmt="os^D"[points % 4], color="0.25", markersize=4, capsize=3,
-                        markerfacecolor="none", linewidth=0.9, label=curve.name, zorder=3)  # fmt: skip
-            points += 1
-            continue
-        colour = COLOURS[drawn % len(COLOURS)]
-        ax.plot(curve.x, curve.y, color=colour, linewidth=1.3, label=curve.name)
+    points = [curve for curve in finding.curves if curve.measured]
+    lines = [curve for curve in finding.curves if not curve.measured]
+    paired = 1 < len(points) <= len(lines)
+    for k, curve in enumerate(lines):
+        ax.plot(curve.x, curve.y, color=COLOURS[k], linewidth=1.3, label=curve.name)
         if len(curve.spread):
             below, above = np.broadcast_to(curve.spread, (2, len(curve.y)))
-            ax.fill_between(curve.x, curve.y - below, curve.y + above, color=colour, alpha=0.2, linewidth=0)
-        drawn += 1
+            ax.fill_between(curve.x, curve.y - below, curve.y + above, color=COLOURS[k], alpha=0.2, linewidth=0)
+    for k, curve in enumerate(points):
+        # Single points at one place stand beside each other.
+        shift = 0.015 * (2 * k - len(points) + 1) * np.ptp(lines[0].x) if len(curve.x) == 1 else 0.0
+        ax.errorbar(curve.x + shift, curve.y, curve.spread if len(curve.spread) else None, fmt="os^D"[k],
+                    color=COLOURS[k] if paired else "0.25", markersize=4, capsize=3, markerfacecolor="none",
+                    linewidth=0.9, label=curve.name, zorder=3)  # fmt: skip
     ax.set(xlabel=finding.axes[0], ylabel=finding.axes[1], xscale=finding.scales[0], yscale=finding.scales[1])
     if finding.scales[1] == "log":
+        ax.yaxis.set_major_formatter(LogFormatter())
         ax.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 1)))
-    columns = 2 if max(len(curve.name) for curve in finding.curves) <= SHORT_NAME else 1
-    ax.legend(frameon=False, fontsize="small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns)
+    wide = sum(max(len(curve.name) for curve in some) for some in (lines, points)) > TWO_COLUMNS
+    ax.legend(
+        frameon=False, fontsize="small", loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if wide else 2
+    )  # fmt: skip
     buffer = io.BytesIO()
     canvas.savefig(buffer, format="png", dpi=220)
     return buffer.getvalue()

@@ -1,11 +1,13 @@
-"""Checks the prose of the pages for `docker/fenwear lint`: sentences that are too long, turns of phrase, proselint.
+"""Checks the prose of pages and messages for `docker/fenwear lint`: long sentences, turns of phrase, proselint.
 
-Prints file:line with the finding and what to write instead, and exits with 1 where there is one. `--count` prints the
-number of sentences of each page, and how many of them are too long. docs/prose.toml has the settings.
+Messages are the strings of the package but for docstrings; in these a semicolon ends a sentence. Prints file:line with
+the finding and what to write instead, and exits with 1 where there is one. `--count` prints the number of sentences of
+each page, and how many of them are too long. docs/prose.toml has the settings.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 import tomllib
@@ -23,6 +25,7 @@ SETTINGS = tomllib.loads((ROOT / "docs" / "prose.toml").read_text("utf-8"))
 
 # A dot behind a single capital letter ends no sentence where it is an initial, but does behind a unit, as in "3 K.".
 END = re.compile(r"(?:(?<=\d [A-Z]\.)|(?<=°C\.)|(?<!\b[A-Z]\.)(?<=[.!?]))[)\"*]*\s+(?=[\"(*$\[]*(?:[A-Z0-9]|fenwear))")
+BREAK = re.compile(r"\n|(?<=[.!?;])\s+")  # between sentences of a message
 ITEM = re.compile(r"\s*(?:[-*+]|\d+\.)\s+")
 # Code, formulas that stand by themselves, comments, lists of sources, the head of a file.
 NO_PROSE = re.compile(
@@ -92,9 +95,41 @@ def pages() -> list[Path]:
     return sorted({path for pattern in SETTINGS["pages"] for path in ROOT.glob(pattern)})
 
 
+def messages(node: ast.AST) -> Iterator[tuple[int, str]]:
+    """Yield the line and the text of each string below a node of the syntax tree, without docstrings."""
+    if isinstance(node, ast.Constant | ast.JoinedStr):
+        yield node.lineno, _text(node)
+    elif not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
+        for part in ast.iter_child_nodes(node):
+            yield from messages(part)
+
+
+def _text(node: ast.AST) -> str:
+    """Return the text of a string, with a number in place of each value that is filled in."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(map(_text, node.values))
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else "1"
+
+
 def words(sentence: str) -> int:
     """Return the number of words of a sentence."""
     return int(textstat.lexicon_count(sentence, removepunct=True))
+
+
+def of_sentence(line: int, sentence: str) -> Iterator[tuple[int, str]]:
+    """Yield the findings in a sentence: its length, and turns of phrase."""
+    if (length := words(sentence)) > SETTINGS["longest"]:
+        yield line, f"{length} words; write at most {SETTINGS['longest']} in a sentence: {sentence[:60]}..."
+    for pattern, advice in SETTINGS["banned"].items():
+        for match in re.finditer(pattern, sentence):
+            yield line, f'"{match[0]}": {advice}'
+
+
+def findings_in_messages(source: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the description of each finding in the strings of a module."""
+    for line, text in messages(ast.parse(source)):
+        for sentence in BREAK.split(text):
+            yield from of_sentence(line, sentence)
 
 
 def findings(text: str) -> Iterator[tuple[int, str]]:
@@ -102,11 +137,7 @@ def findings(text: str) -> Iterator[tuple[int, str]]:
     checks = {"max_errors": 99, "checks": dict.fromkeys(SETTINGS["proselint"], True)}
     for paragraph in paragraphs(text):
         for line, sentence in paragraph.sentences():
-            if (length := words(sentence)) > SETTINGS["longest"]:
-                yield line, f"{length} words; write at most {SETTINGS['longest']} in a sentence: {sentence[:60]}..."
-            for pattern, advice in SETTINGS["banned"].items():
-                for match in re.finditer(pattern, sentence):
-                    yield line, f'"{match[0]}": {advice}'
+            yield from of_sentence(line, sentence)
         for found in LintFile("page", paragraph.text).lint(checks):
             at = min(max(found.check_result.span[0] - 1, 0), len(paragraph.lines) - 1)
             yield paragraph.lines[at], f"{found.check_result.message} ({found.check_result.check_path})"
@@ -128,14 +159,14 @@ def count() -> None:
 
 
 def check() -> int:
-    """Print the findings on all pages, and return the exit status."""
+    """Print the findings on all pages and in all messages, and return the exit status."""
     CheckRegistry().register_many(all_checks)
-    status = 0
-    for page in pages():
-        for line, finding in findings(read(page)):
-            print(f"{page.relative_to(ROOT)}:{line}: {finding}")
-            status = 1
-    return status
+    modules = [path for pattern in SETTINGS["messages"] for path in ROOT.glob(pattern)]
+    found = [(page, *finding) for page in pages() for finding in findings(read(page))]
+    found += [(path, *finding) for path in sorted(modules) for finding in findings_in_messages(path.read_text("utf-8"))]
+    for path, line, finding in found:
+        print(f"{path.relative_to(ROOT)}:{line}: {finding}")
+    return int(bool(found))
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
-    from fenwear.cli import UsageError, app, told, typer
+    from fenwear.cli import UsageError, app, typer, with_names
     from fenwear.cli.base import check_removed
     from fenwear.signals import ignore_from_now_on
 
@@ -101,11 +101,11 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
         error.show(file=sys.stderr)
         return 2
     except CaseError as error:
-        for problem in told(str(error)).splitlines():
+        for problem in with_names(str(error)).splitlines():
             print(f"fenwear: {problem}", file=sys.stderr)
         return 2
     except ConvergenceError as error:
-        print(f"fenwear: {told(str(error))}", file=sys.stderr)
+        print(f"fenwear: {with_names(str(error))}", file=sys.stderr)
         return 3
     except (InterruptedRunError, OutputError, StackError) as error:
         print(f"fenwear: {error}", file=sys.stderr)

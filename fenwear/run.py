@@ -519,8 +519,8 @@ def position_warnings(system: Tribosystem) -> list[str]:
         return stands
     wanted = int(np.ceil(motion.positions * spacing))
     return [
-        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its track will have steps; "
-        f"set motion.positions = {wanted}, or use fewer elements along the contact"
+        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its track will have steps. "
+        f"Set motion.positions = {wanted}, or use fewer elements along the contact"
     ]
 
 
@@ -564,14 +564,14 @@ def _uneven(system: Tribosystem) -> bool:
 def _warnings(number: float, growth: float | None) -> list[str]:
     if number <= 1 and growth is not None:
         return [
-            f"with heat, explicit steps of wear let disturbances of the contact grow by {growth:.3g} 1/s, which "
-            'implicit ones let die out: the pressure will not settle; set run.integration = "implicit" or "jump"'
+            f"with heat, explicit steps of wear let disturbances of the contact grow by {growth:.3g} 1/s: the pressure "
+            'will not settle. Set run.integration = "implicit" or "jump"'
         ]
     if number <= 1:
         return []
     return [
         f"the wear of a half-cycle is {number:.3g} times the limit of explicit steps: pressure will oscillate from "
-        'node to node; set run.integration = "implicit" or "jump", or use fewer elements along the contact'
+        'node to node. Set run.integration = "implicit" or "jump", or use fewer elements along the contact'
     ]
 
 

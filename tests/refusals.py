@@ -62,7 +62,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "bodies/mesh.py": {"has physical volumes": (PHYSICS, "volumes in a plane model")},
     "bodies/supports.py": {
-        "the only direction in which a body may be free": (
+        "may be free along z alone": (
             MODEL,
             "a body that is free along the surface's normal where this is not z: turn the geometry",
         ),
@@ -128,7 +128,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "since the strip's wear": (PHYSICS, "a strip that wears in a single place: its wear spreads over the stroke"),
         "with contact.law = 'coulomb' only": (PHYSICS, "what a rig imposes on stick, in gross sliding"),
         "friction being against the slip": (PHYSICS, "stick with a given transverse friction: its direction is found"),
-        "expected a plane model or a solid": (MODEL, "stick in rings, whose model has no displacement around the axis"),
+        "allow no stick there": (MODEL, "stick in rings, whose model has no displacement around the axis"),
         "as a matrix of its tractions": (
             MODEL,
             'stick with `heat.operator = "full"`, the check of the reduced basis: the basis is that of gross sliding, '
@@ -165,7 +165,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         ),
     },
     "cycle/steady.py": {
-        "no one rigid motion wears all": (PHYSICS, "an end where loads press to either side in turn"),
+        "no single rigid motion follows the wear": (PHYSICS, "an end where loads press to either side in turn"),
         "its track deepens": (PHYSICS, "an end where the strip wears to and fro"),
         "with the worn depth or the distance slid": (PHYSICS, "an end of laws of depth or distance"),
         "the logarithm of time": (PHYSICS, "an end of creep without end"),
@@ -175,7 +175,7 @@ REFUSALS: dict[str, dict[str, tuple[str, str]]] = {
         "without plastic flow exists": (PHYSICS, "an end beyond `contact.hardness`, in gross sliding"),
     },
     "cycle/steady_inequality.py": {
-        "so that no shape stays": (
+        "no shape stays": (
             PHYSICS,
             "an end where only a strip's turning about a hinge that slides with it could follow the wear: each place "
             "wears a facet of its own, deeper for ever",

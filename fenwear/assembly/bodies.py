@@ -112,8 +112,8 @@ class Bodies:
     def last_resorts(self) -> list[str]:
         """What is to be said of elements that had better be others."""
         return [
-            f"geometry.degree: the {body.body.name} is of tetrahedra of degree 1, a last resort: they are too stiff, "
-            "and pressures of a small contact are wrong by a sixth; expected degree 2, or hexahedra"
+            f"geometry.degree: the {body.body.name} has tetrahedra of degree 1. They are too stiff: "
+            "pressures of a small contact are wrong by a sixth. Set geometry.degree = 2, or mesh with hexahedra"
             for body in (self.punch, self.strip)
             if body.surface.cell == "triangle" and body.surface.degree == 1
         ]

@@ -266,8 +266,8 @@ def make_together(factors: Sequence[Solver]) -> None:
 def without_factor(prefix: str, reason: str) -> ConvergenceError:
     """Return the error of a matrix that has no factor."""
     return ConvergenceError(
-        f"the matrix of PETSc's prefix {prefix} has no factor ({reason}): a material, a time or a "
-        "coefficient is too large or too small to compute with"
+        f"the matrix of PETSc's prefix {prefix} has no factor ({reason}). A material, a time or a "
+        "coefficient is too large or too small"
     )
 
 

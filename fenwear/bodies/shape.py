@@ -114,8 +114,8 @@ def follow_wear(movable: MovableSurface, depth: Array, into: Array, held: Sequen
     if ratio < LEAST:
         raise MeshQualityError(
             f"the wear of the {body.name} has used up the elements at its contact: one is left with "
-            f"{max(ratio, 0.0):.0%} of its size; the depth is {depth.max():.3g} mm. Expected a geometry that is higher "
-            "where it wears, a chamfer beside the contact that is part of it, or less wear"
+            f"{max(ratio, 0.0):.0%} of its size. The depth is {depth.max():.3g} mm. Make the geometry higher "
+            "where it wears, let the contact contain the chamfer beside it, or reduce the wear"
         )
     owned = space.dofmap.index_map.size_local
     moved = np.stack([trace.pick(part[:owned, None])[surface.nodes, 0, 0] for part in displaced.T], axis=1)

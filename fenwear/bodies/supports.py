@@ -382,10 +382,9 @@ def _check_facing(surface: ContactSurface, outward: NDArray[np.float64]) -> None
         mean = np.abs(outward).sum(axis=0)
         name, axis = surface.body, next(a for a, c in axes(surface.dim).items() if c == mean.argmax())
         message = (
-            f"{name}_contact looks along {axis}, and the {name} is not held: pressure would have to carry its loads "
-            f"along z, the only direction in which a body may be free to move. Expected a contact whose normal has "
-            f"a part along z somewhere (turn the geometry, and with it supports, loads and motion), or a {name} that "
-            "supports hold in all directions and press by a displacement (by)"
+            f"{name}_contact looks along {axis}, and the {name} is not held. A body may be free along z alone, and "
+            f"pressure along {axis} cannot carry its loads there. Turn geometry, supports, loads and motion, so that "
+            f"the contact looks along z. Or hold the {name} in all directions, and press it by a displacement (`by`)"
         )
         raise CaseError(InputError("geometry", message))
 
@@ -405,9 +404,9 @@ def _parts_text(name: str, boxes: NDArray[np.float64], part: int) -> str:
     """Say that a part of a body touches nothing, is joined to nothing and not held."""
     spans = [f"x = {box[0, 0]:.4g} to {box[1, 0]:.4g} mm" for box in boxes]
     return (
-        f"the {name} is of {len(boxes)} parts that share no node ({'; '.join(spans)}), and part {part + 1} neither "
-        f"touches nor is held: expected parts that are joined in the mesh (in gmsh Coherence, or BooleanFragments), or "
-        f"each with a share of {name}_contact or supports of its own"
+        f"the {name} has {len(boxes)} parts that share no node ({'; '.join(spans)}), and part {part + 1} neither "
+        f"touches nor is held. Join the parts in the mesh (in gmsh Coherence, or BooleanFragments). Or give each a "
+        f"share of {name}_contact or supports"
     )
 
 

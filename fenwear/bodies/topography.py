@@ -126,8 +126,8 @@ def _interpolated(measured: Heights, grid: RegularGrid, key: str) -> Array:
         if grid.spacing[axis] > COARSE / 2 * step:
             nodes = int(float(np.max(grid.sides)) / step) + 1
             message = (
-                f"has a height every {step:.4g} mm, the contact grid a node every {grid.spacing[axis]:.4g}, which "
-                f"leaves its roughness out: set grid.nodes = {nodes}, or average the map"
+                f"has a height every {step:.4g} mm, but the contact grid has a node every {grid.spacing[axis]:.4g} mm, "
+                f"too coarse for its roughness. Set grid.nodes = {nodes}, or average the map"
             )
             raise CaseError(InputError(key, message))
     middles = np.array([(own[0] + own[-1]) / 2 for own in measured.places])

@@ -53,9 +53,8 @@ class Geometry(Part):
     )
     groups: dict[str, str | tuple[str, ...]] = Field(
         default={},
-        description='names in the file of fenwear\'s groups: punch_contact = "Group_3", a list of names, "face 3" of a '
-        'shape from CAD, a plane "y = 0 mm" of a mesh, or "" to leave a group out; case and spaces do not '
-        "count",
+        description='names in the file of fenwear\'s groups: punch_contact = "Group_3", or a list of names; "face 3" '
+        'of a shape from CAD; a plane "y = 0 mm" of a mesh; "" leaves a group out; case and spaces do not count',
     )
     unit: str | None = Field(
         default=None, description="unit of the lengths in a mesh of another program, or a .brep: mm (default), m, in"
@@ -322,7 +321,7 @@ class Profile(Part):
     )
     along: Literal["x", "arc"] = Field(
         default="x",
-        description="meaning of the first number of points of a plane body: x, or the arc length s, which is x in the "
+        description="meaning of the first number of points of a plane body: x, or the arc length s; s is x in the "
         "middle of the curve and grows with x there; the heading of a file states it",
     )
 

@@ -125,8 +125,8 @@ AGAINST_STICK = (
     ),
     Check(
         lambda c: c.model.kind == "axisymmetric",
-        "model.kind: expected a plane model or a solid, such as fretting-sphere with motion.kind = 'oscillation': "
-        "rings slide around their axis, and their displacements in (r, z) allow no stick there,",
+        "model.kind: rings slide around their axis, and their displacements in (r, z) allow no stick there. "
+        "Expected a plane model or a solid, such as fretting-sphere with motion.kind = 'oscillation',",
     ),
     Check(
         lambda c: c.heat and c.heat.operator == "full",
@@ -296,8 +296,8 @@ def program_problems(case: Case) -> Iterator[str]:
         yield f"program.radius: expected a motion that turns, not motion.kind = '{motion.kind}', which does not turn"
     if not program.radius and case.turns and any(step.distance for step in program.steps):
         yield (
-            "program.radius: missing, but required where the strip turns and a step has a distance: the radius at "
-            "which it is slid, such as that of the middle of the wear track"
+            "program.radius: missing, but required where the strip turns and a step has a distance. Set the radius "
+            "at which the distance is slid, such as that of the middle of the wear track"
         )
     if any(step.load for step in program.steps) and any(step.load_factors for step in program.steps):
         yield "program.steps: load is the sum of the case's loads; expected load_factor with load_factors"

@@ -44,8 +44,8 @@ class ThirdBody(Part):
     )
     life: constant_or_dependence(Annotated[Length, Field(gt=0)], "mm", forms=("expression", "table", "law")) = Field(  # type: ignore[valid-type]
         description="sliding distance over which 1 - 1/e of the debris at a place is ejected; an expression, a table "
-        "or a registered law of the variables of coefficients, debris (its own thickness, mm) and edge "
-        "among them: a law of loss, t / life over sliding distance"
+        "or a registered law of the variables of coefficients, such as debris (its thickness, mm) and edge; the loss "
+        "is t / life over sliding distance"
     )
     edge_life: Annotated[Length, Field(gt=0)] | None = Field(
         default=None,

@@ -30,8 +30,8 @@ class Run(Part):
     )
     until: str = Field(
         default="",
-        description='level that ends the run: "depth 0.1 mm", "depth of both 5 um", "volume of strip 2 mm^3", "depth '
-        'in left 10 um" of a named contact, "approach 0.05 mm" of the bodies',
+        description='level that ends the run: "depth 0.1 mm", "depth of both 5 um", "volume of strip 2 mm^3"; "depth '
+        'in left 10 um" of a named contact; "approach 0.05 mm" of the bodies',
     )
 
 

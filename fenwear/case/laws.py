@@ -56,8 +56,8 @@ class _State(Part):
 
     expression: Annotated[str, AfterValidator(_parsed)] | None = Field(
         default=None,
-        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid), "
-        "debris (mm, thickness of the third body), edge (mm, distance from the edge of the contact), "
+        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid); "
+        "debris (mm, thickness of the third body), edge (mm, distance from the edge of the contact); "
         "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
     )
     table: Annotated[Pairs, rising("at least two pairs [argument, value] with rising arguments")] | None = Field(

@@ -246,7 +246,7 @@ def _tables(case: Case) -> Iterator[str]:
         if not first <= initial <= last:
             yield (
                 f"{key}: its table over T spans {first:g} to {last:g} K, which does not contain heat.initial, "
-                f"{initial:g} K: T is in kelvin, as heat.initial, and beyond its ends a table stays constant"
+                f"{initial:g} K. T is in kelvin, as heat.initial, and beyond its ends a table stays constant"
             )
         elif initial >= ABSOLUTE and first < COLD:
             yield (

@@ -133,7 +133,7 @@ class Heat(Part):
     reduction_difference: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=2e-3,
         description="largest relative difference of contact temperatures and thermal gap from those of the whole "
-        "mesh: above it the basis is enlarged, and then a run warns",
+        "mesh; above it the basis is enlarged, and then a run warns",
     )
 
     @model_validator(mode="before")

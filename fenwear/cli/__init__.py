@@ -7,6 +7,6 @@ with without("rich"):  # typer would load it to draw boxes that are drawn nowher
 
 # In the order in which the help lists their commands.
 from fenwear.cli import cases, states, folders, studies, about, agents  # noqa: I001
-from fenwear.cli.base import UsageError, app, told
+from fenwear.cli.base import UsageError, app, with_names
 
-__all__ = ["UsageError", "about", "agents", "app", "cases", "folders", "states", "studies", "told", "typer"]
+__all__ = ["UsageError", "about", "agents", "app", "cases", "folders", "states", "studies", "typer", "with_names"]

@@ -24,8 +24,8 @@ from fenwear.errors import StackError
 Tool = Callable[..., Awaitable[str]]
 LOOPBACK = "127.0.0.1"
 INSTRUCTIONS = (
-    "fenwear computes thermo-mechanical sliding wear of two bodies. A case is a TOML file: give its path, the name of "
-    "a built-in case (tool info without a subject lists them), or its text, with absolute paths of files in it. "
+    "fenwear computes thermo-mechanical sliding wear of two bodies. A case is a TOML file. Give its path, the name of "
+    "a built-in case, or its text with absolute paths of files. The tool info without a subject lists built-in cases. "
     "Settings are overrides KEY=VALUE with units, such as motion.amplitude=2 mm. Check a case before you run it. "
     "Errors name the key of the case that is wrong; `info KEY` explains it."
 )

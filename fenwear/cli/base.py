@@ -69,7 +69,7 @@ def recorded() -> Iterator[list[str]]:
         _Spoken.record = None
 
 
-def told(text: str) -> str:
+def with_names(text: str) -> str:
     """Return a text with the names of the bodies."""
     return _Spoken.names.told(text)
 
@@ -77,13 +77,13 @@ def told(text: str) -> str:
 def log(message: str) -> None:
     """Print to standard error; every rank but 0 has it closed."""
     if _Spoken.record is not None:
-        _Spoken.record.append(told(message))
-    _write(sys.stderr, told(message))
+        _Spoken.record.append(with_names(message))
+    _write(sys.stderr, with_names(message))
 
 
 def show(text: str) -> None:
     """Print what was asked for to standard output."""
-    _write(sys.stdout, told(text))
+    _write(sys.stdout, with_names(text))
 
 
 def _write(stream: TextIO, text: str) -> None:

@@ -28,7 +28,7 @@ from fenwear.cli.base import (
     recorded,
     show,
     show_results,
-    told,
+    with_names,
 )
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
@@ -110,7 +110,9 @@ def check_command(
         try:
             _check(case, settings, heat_seconds, accuracy=accuracy, full=False)
         except CaseError as error:
-            problems = [{"key": told(problem.key), "message": told(problem.message)} for problem in error.problems]
+            problems = [
+                {"key": with_names(problem.key), "message": with_names(problem.message)} for problem in error.problems
+            ]
             print_json({"valid": False, "errors": problems})
             raise
         warnings = [line.removeprefix(WARNING) for line in said if line.startswith(WARNING)]

@@ -45,7 +45,7 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
     return (
         f"{setup}\n"
-        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
+        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle\n"
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"

@@ -332,8 +332,8 @@ class GrossSliding:
         raise CaseError(
             InputError(
                 "geometry",
-                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
-                "expected a punch that its supports let come down, or that starts in contact",
+                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart. "
+                "Let the punch's supports free its motion towards the strip, or start in contact",
             )
         )
 

@@ -96,8 +96,8 @@ class Onwards:
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
 COEFFICIENTS_FAIL = (
-    "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
-    "they depend on did not converge"
+    "the coefficients of friction and wear and the pressure they depend on did not converge. Use a weaker dependence "
+    "on p, or a smoother table"
 )
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 

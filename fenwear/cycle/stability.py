@@ -245,7 +245,7 @@ def repeating_temperatures(
         before = found
     raise ConvergenceError(
         f"friction and the temperatures that it depends on did not converge in {MAX_ITERATIONS} iterations at "
-        "these pressures: there is no state whose growth rate can be computed"
+        "these pressures. No state exists whose growth rate can be computed"
     )
 
 

@@ -62,8 +62,8 @@ NOTHING_WEARS = (
     "nothing wears and any of them stays. Follow the wear by `run`"
 )
 NO_ONE_MOTION = (
-    "no cyclic steady state exists: no one rigid motion wears all that carries pressure, as where loads press a body "
-    "to either side in turn, and both wear for ever. Follow the wear by `run`"
+    "no cyclic steady state exists: no single rigid motion follows the wear of all nodes under pressure. This happens "
+    "where loads press a body to either side in turn, and both sides wear without end. Follow the wear by `run`"
 )
 
 
@@ -322,9 +322,9 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
         else "no pressures wear the contact by a rigid motion: where it lags behind they grow without end"
     )
     return (
-        f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: beyond it wear grows no more, and {why}; the "
-        f"mean pressure is {mean:.4g} MPa and the largest one of the state without the cap {found:.4g} MPa. Expected "
-        "a higher cap, or the wear followed by `run`"
+        f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: beyond it wear grows no more, and {why}. The "
+        f"mean pressure is {mean:.4g} MPa, and the largest pressure without the cap is {found:.4g} MPa. Raise the cap, "
+        "or follow the wear by `run`"
     )
 
 
@@ -333,8 +333,8 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: He
     hardness, peak = system.layers.hardness, float(contact.pressure.max())
     if peak > hardness:
         raise ConvergenceError(
-            f"no cyclic steady state without plastic flow exists: its largest pressure of {peak:.4g} MPa is beyond "
-            f"contact.hardness = {hardness:.4g} MPa, so that the surface flows in every cycle. Follow it by `run`"
+            f"no cyclic steady state without plastic flow exists: its largest pressure, {peak:.4g} MPa, is above "
+            f"contact.hardness = {hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
         )
     weights, motion, worn = system.pair.weights, system.motion, problem.wear.opening(contact.pressure)[0]
     if worn.max() <= ZERO * problem.wear_scale:

@@ -371,9 +371,9 @@ def rigid_of_phases(system: Tribosystem) -> Array:
         back = here @ np.linalg.lstsq(here, middle, rcond=None)[0]
         if max(np.abs(middle @ turned - here).max(), np.abs(back - middle).max()) > APART * np.abs(middle).max():
             raise ConvergenceError(
-                "no cyclic steady state exists: the rigid motions that follow the wear in one position of the strip "
-                "open the contact in another, as where a strip on a hinge is all that moves, so that no shape stays: "
-                "follow the wear by `run`"
+                "no cyclic steady state exists, and no shape stays. The rigid motions that follow the wear in one "
+                "position of the strip open the contact in another. This happens where only a strip on a hinge "
+                "moves. Follow the wear by `run`"
             )
         found.append(turned)
     return np.array(found)

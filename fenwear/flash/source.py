@@ -375,8 +375,8 @@ def _along(placed: ContactSetup, pressure: Array) -> Array:
     differs = np.linalg.norm(velocity[mean > 0] - middle, axis=1).max()
     if not differs <= VARIES * np.linalg.norm(middle):
         message = (
-            "turns the strip about a point so near to the contact that it slides in many ways there; the kernels are "
-            "of sources that move as a whole: expected an axis farther away"
+            "turns the strip about a point so near to the contact that it slides in many directions there. The kernels "
+            "are of sources that move as a whole. Expected an axis farther away"
         )
         raise CaseError(InputError("motion.centre", message))
     return np.asarray(middle)

@@ -319,8 +319,8 @@ def fitted_field(
         elif tolerance <= ROUNDING:
             raise HeatError(
                 f"the reduced temperatures of the {body.body.name} grow without heat, by a factor of "
-                f"{growth:.6g} a cycle, on any basis: hold the temperature where its material enters, "
-                'give heat.inflow, or set heat.operator = "full"'
+                f"{growth:.6g} a cycle, on any basis. Hold the temperature where its material enters, "
+                'set heat.inflow, or set heat.operator = "full"'
             )
         tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps
     return field, difference

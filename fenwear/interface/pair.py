@@ -279,8 +279,8 @@ def _check_covered(parts: Sequence[Patch], placement: Placement) -> None:
         InputError(
             "motion",
             f"the stroke runs off the meshed strip: {placement}, strip_contact spans x = {spans[1]} mm, "
-            f"but punch_contact {spans[0]} mm (lengths of a mesh are taken as mm): strip_contact has to reach "
-            f"{_missing(first, second):.4g} mm farther there",
+            f"but punch_contact {spans[0]} mm. Extend strip_contact by {_missing(first, second):.4g} mm there. "
+            "A mesh is read in mm",
         )
     )
 

@@ -249,8 +249,8 @@ def _begin(problem: LeastSquares, z: Array) -> bool:
     except ConvergenceError as error:
         values = ", ".join(f"{key} = {value:.4g}" for key, value in problem.values(z).items())
         raise type(error)(
-            f"{error}\nthis is at {values}, where the fit begins: expected a better start there, by --set KEY=VALUE; "
-            "worn volume over load and sliding distance is one of a wear coefficient"
+            f"{error}\nthis is at {values}, where the fit begins. Give a better start by --set KEY=VALUE. For a wear "
+            "coefficient, use worn volume over load and sliding distance"
         ) from error
 
 
@@ -276,7 +276,7 @@ def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
     remarks = [*_scatter_remarks(result, traces, free, errors), *known_together(keys, correlation, at_bound)]
     if problem.has_sigma and noise > 2:
         remarks.append(f"the residuals are {noise:.2g} times their sigma: the model does not describe the data, or "
-                       "sigma is too small; standard errors are those of the given sigma")  # fmt: skip
+                       "sigma is too small. Standard errors are those of the given sigma")  # fmt: skip
     return Calibration(
         tuple(map(partial(_fitted, problem.case), problem.unknowns, z, errors, factor * errors)),
         correlation,

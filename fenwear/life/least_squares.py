@@ -70,7 +70,7 @@ def hardly_known(keys: Sequence[str], data: Sequence[DataSet], own: Array) -> li
     correlation = inverse / np.outer(errors, errors)
     return [
         f"{keys[j]} and {keys[i]} cannot both be known from one condition: their correlation is "
-        f"{correlation[i, j]:.5f}, and errors are more than ten times those of each alone; give one of them, or data "
+        f"{correlation[i, j]:.5f}. Errors are more than ten times those of each alone. Set one of them, or add data "
         "at another load"
         for i in range(len(keys))
         for j in range(i)

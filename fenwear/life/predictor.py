@@ -96,8 +96,8 @@ def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> A
             raise CaseError(
                 InputError(
                     "geometry",
-                    f"the profile goes from x = {x.min():g} to {x.max():g} mm, and the scar reaches the end of the "
-                    f"contact surface, which goes from {low:g} to {high:g} mm; expected a wider one",
+                    f"the scar reaches the end of the contact surface, which spans {low:g} to {high:g} mm. The "
+                    f"measured profile spans x = {x.min():g} to {x.max():g} mm. Expected a wider contact surface",
                 )
             )
     return np.where(beyond, 0.0, found)

@@ -44,11 +44,11 @@ ALONG = ("profiles", "shape", "pressure", "mean_pressure", "temperature")  # the
 TEXTS = {
     "geometry": "Geometry: (a) whole, (b) near the contact, with elements, supports (red), loads (blue) and the "
     "contact (green); x along the contact, z upwards.",
-    "loops": "Fretting loops: (a) tangential force over the displacement of the strip, a loop for each cycle named, "
-    "and (b) over its part beyond full stick's at the same force.",
+    "loops": "Fretting loops, one for each cycle named. (a) Tangential force over the displacement of the strip. "
+    "(b) The same over the displacement beyond full stick's.",
     "zones": "Where the surfaces stick and slip over the time steps of the first and of the last cycle.",
     "tractions": "Tangential traction along the sliding at five times of the first and the last cycle, between "
-    "plus and minus µ p (grey: of the cycle's largest pressure).",
+    "plus and minus µ p. Grey: µ times the cycle's largest pressure.",
     "traction_map": "Size and direction of the tangential traction at four times of the first and of the last cycle.",
     "sliding": "Slip of each place in a cycle, its work of friction, and the largest stress in the strip's surface.",
     "slip_map": "Slip of each place in the first and the last cycle.",
@@ -64,31 +64,31 @@ TEXTS = {
     "over the {axis}.",
     "pressure": "Contact pressure along the contact at {chosen}: {panels}. The axis ends above the later states; "
     "the legend has the largest pressure of those beyond it.",
-    "mean_pressure": "Mean contact pressure, of all directions, over the last tenth of what is done at "
-    "{chosen}: by it material is lost, and it is well posed where the edge of the contact moves.",
-    "tracks": "Sliding over the last cycle: (a) tracks of the strip's material, dots where it begins, and (b) the "
-    "cross-shear ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
+    "mean_pressure": "Mean contact pressure of all directions over the last tenth of the half-cycles at {chosen}. Wear "
+    "follows it, and it is smooth where the edge of the contact moves.",
+    "tracks": "Sliding over the last cycle. (a) Tracks of the strip's material; dots mark their start. (b) Cross-shear "
+    "ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
     "cuts_along": "Pressure, worn depths and temperatures along the sliding at {chosen}.",
     "cuts_across": "Pressure, worn depths and temperatures across the sliding at {chosen}.",
     "between": "State between the surfaces along the contact at {chosen}: debris, plastic depth, remaining coatings, "
     "and what laws remember there, where there are any.",
     "program": "Load, sliding speed and ambient temperature over the run, where they change.",
     "peaks": "Largest contact pressure and {size} in contact{hot}, for each sliding direction, over the {axis}.",
-    "place": "The shaft in its bore: the way from the middle of the unworn bore to that of the unworn shaft, "
-    "its size and its angle from the way in which the load presses the shaft (of several bores, what each of them "
-    "carries), as the strip turns, over the {axis}.",
+    "place": "The shaft in its bore over the {axis}. Size and angle are of the vector from the middle of the unworn "
+    "bore to that of the unworn shaft. The angle counts from the load (of several bores, from the load of "
+    "each), as the strip turns.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
     "creep": "Wear and creep of each body: (a) largest depth and (b) volume, over the time.",
-    "scar": "Largest worn depth, and size of the scar at 1 % and 5 % of it, over the {axis}; of a surface its "
-    "length along the sliding and its width across.",
+    "scar": "Largest worn depth, and size of the scar at 1 % and 5 % of it, over the {axis}. Of a surface: length "
+    "along the sliding and width across.",
     "friction": "(a) Normal force and (b) friction force of each half-cycle and (c) work of friction from the start, "
     "over the {axis}.",
     "surface_stress": "Stress along the contact surface of (a) the punch and (b) the strip at half-cycle {last}: its "
     "components and von Mises' stress.",
     "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
     "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
-    "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
+    "over integral of p). (b) Share of the load that is carried elsewhere than in the optimum.",
     "heat_balance": "Heat of each half-cycle over the {axis}: friction heat is the sum of the others.",
 }
 AXES = {

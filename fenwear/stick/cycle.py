@@ -273,8 +273,8 @@ class PartialSlipProblem:
             if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
                 return after
         raise ConvergenceError(
-            "friction and the pressure that it depends on did not converge in a time step: a weaker dependence "
-            "on p, or a smoother table may help"
+            "friction and the pressure that it depends on did not converge in a time step. Use a weaker dependence "
+            "on p, or a smoother table"
         )
 
     def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:

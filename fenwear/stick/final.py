@@ -220,8 +220,8 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | Non
             found = _of_cycle(problem, problem.driven(problem.program.with_force(factor)))
         except ConvergenceError as error:
             raise ConvergenceError(
-                "no final shape exists: wear takes load off the contact, whose approach is prescribed, until friction "
-                "no longer holds the tangential force, and it slides as a whole. Follow it by `run`, or reduce "
+                "no final shape exists: the approach is prescribed, so that wear unloads the contact until friction "
+                "cannot hold the tangential force. The contact then slides as a whole. Follow it by `run`, or reduce "
                 "stick.force"
             ) from error
     return found

@@ -179,9 +179,8 @@ class CycleMap:
         """
         if np.abs(scipy.linalg.eigvals(self.through)).max() > 1 - NEUTRAL:
             message = (
-                "the bodies lose no heat: their temperature in the end depends on the way there, which `run` follows; "
-                "expected a held temperature, or convection above 0 for `steady`: "
-                "any will do, as in the end nothing slips"
+                "the bodies lose no heat: their final temperature depends on the way there, which `run` follows. "
+                "For `steady` hold a temperature or set a convection: any value will do, since in the end nothing slips"
             )
             raise CaseError(InputError("heat.convection", message))
         return np.asarray(scipy.linalg.solve(np.eye(len(self.source)) - self.through, self.source))

@@ -157,9 +157,8 @@ def _check_passing(case: Case, surface: ContactSurface) -> None:
             InputError(
                 "motion.positions",
                 f"with stick, a strip that passes under the punch is solved by factors of its contact nodes, up to "
-                f"{MOST_PASSING:,} of a grid, got {len(surface.x):,}: where all touch each Newton step factors a "
-                f"matrix of {matrix}, beside copies of it. Expected 1 (surfaces stay opposite each other, and any "
-                "number of nodes goes), or fewer nodes of the grid",
+                f"{MOST_PASSING:,} of a grid, got {len(surface.x):,}. Each Newton step would factor a matrix of "
+                f"{matrix}. Set 1 (surfaces stay opposite each other, with any number of nodes), or fewer grid nodes",
             )
         )
 
@@ -229,8 +228,8 @@ class Fineness:
         if self.enough:
             return ""
         return (
-            f"the time steps are too coarse: with {self.steps} in a half-cycle force or friction's work of the first "
-            f"cycle still change by {100 * self.change:.2g} %; expected more stick.steps"
+            f"the time steps are too coarse: halving the {self.steps} of a half-cycle changes force or friction's work "
+            f"of the first cycle by {100 * self.change:.2g} %. Increase stick.steps"
         )
 
 

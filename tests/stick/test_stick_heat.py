@@ -147,7 +147,7 @@ def test_the_end_is_without_heat_of_friction() -> None:
 
 def test_what_does_not_go_with_heat_is_told() -> None:
     """The end of bodies that lose no heat, a full operator, the split."""
-    with pytest.raises(CaseError, match=r"heat.convection: the bodies lose no heat.*any will do"):
+    with pytest.raises(CaseError, match=r"^heat\.convection: "):
         final_of(load_case("fretting-partial-slip", [*SMALL, "strip.temperatures=[]", "heat.convection=0"]))
     for setting, message in (("operator='full'", "heat.operator"), ("coupling='split'", "heat.coupling")):
         with pytest.raises(CaseError, match=f"{message}: expected"):

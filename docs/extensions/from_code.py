@@ -197,15 +197,14 @@ class Combinations(Written):
 
 
 class Refusals(Written):
-    """What does not go together, from the list that a test holds against the source."""
+    """Combinations that are rejected, from the list of inputs that a test gives to the program."""
 
     def lines(self) -> Iterable[str]:
         """Return a list for each kind of reason."""
         listed = import_module("refusals")
-        for kind, title in listed.KINDS.items():
-            reasons = [text for of in listed.REFUSALS.values() for one, text in of.values() if one == kind]
-            yield f"\n**{title}**\n"
-            yield from (f"- {reason}" for reason in dict.fromkeys(reasons))
+        for kind, reasons in listed.reasons().items():
+            yield f"\n**{listed.KINDS[kind]}**\n"
+            yield from (f"- {reason}" for reason in reasons)
 
 
 class Verification(Written):

@@ -551,7 +551,7 @@ class HeatExchange:
 def _given_conductance(heat: Heat) -> tuple[Callable[[Array], Array], bool]:
     """Return h_c by the pressure (n,), N/(mm s K), as a table of heat gives it, and whether it depends on that."""
     if heat.conductance_per_pressure is None:
-        constant = np.inf if heat.conductance == "perfect" else float(heat.conductance)
+        constant = np.inf if isinstance(heat.conductance, str) else float(heat.conductance)  # a layer's comes later
         return lambda pressure: np.full(len(pressure), constant), False
     h1, h2 = heat.conductance_per_pressure
     return lambda pressure: np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2)), True

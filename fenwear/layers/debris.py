@@ -62,8 +62,6 @@ class DebrisCycle:
             worn: Depth worn off both bodies in each phase (m, n), mm.
         """
         lost = self.lost * thickness
-        if len(worn) == 1:
-            return self._stays[0] * worn[0] - lost, self._leaves[0] * worn[0] + lost
         return (self._stays * worn).sum(axis=0) - lost, (self._leaves * worn).sum(axis=0) + lost
 
     def rate(self, thickness: Array, worn: Array, cycles: float) -> tuple[Array, Array]:
@@ -161,10 +159,7 @@ class Debris:
         if onto:
             x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept
-        gone = -np.expm1(-x)
-        kept = gone / x
-        if len(x) == 1:
-            return DebrisCycle(self.share, kept, x[0], gone[0])
+        kept = -np.expm1(-x) / x
         after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
         loss = x.sum(axis=0)
         return DebrisCycle(self.share, kept * np.exp(-after), loss, -np.expm1(-loss))

@@ -349,8 +349,6 @@ class Friction:
         Raises:
             CaseError: it is negative or not finite.
         """
-        if "mu" in conditions.derived:
-            return conditions.derived["mu"]
         return self._values(conditions.of("friction"), conditions, self.share(conditions))
 
     def of_asperities(self, conditions: ContactConditions) -> Array:
@@ -403,40 +401,16 @@ class FollowingFriction:
     """
 
     def __init__(self, friction: Friction, conditions: ContactConditions) -> None:
-        self._friction, self._conditions = friction, conditions
-        self._state, self._with_cycle = dict(conditions.of("friction")), conditions.cycle is None
-        self._lubrication = lubrication = friction.contact.lubrication
-        self._fluid = 0.0 if lubrication is None else lubrication.fluid_friction
-        alike = not friction.asks("p", "pm", of_share=False)
-        # Than the fluid, of asperities.
-        self._more = friction._of_asperities(self._state, conditions) - self._fluid if alike else None
-        self._last: tuple[Array, Array | float, Array] | None = None  # pressure, share and mu
+        self._friction, self._conditions, self._state = friction, conditions, dict(conditions.of("friction"))
+        self._follows = ("p", "pm") if conditions.cycle is None else ("p",)
 
     def __call__(self, pressure: Array) -> Array:
         """Return mu (n,) at pressures (n,), MPa, as `Friction.values`."""
-        state, lubrication, shape = self._state, self._lubrication, self._conditions.shape
-        state["p"] = pressure
-        if self._with_cycle:
-            state["pm"] = pressure
-        share = 1.0 if lubrication is None else asperity_share(lubrication, state, shape, checked=False)
-        if self._more is None:
-            mu = self._friction._values(state, self._conditions, share, checked=False)
-        else:
-            mu = share * self._more
-            mu += self._fluid
-        self._last = pressure, share, mu
-        return mu
+        state, conditions, lubrication = self._state, self._conditions, self._friction.contact.lubrication
+        state.update(dict.fromkeys(self._follows, pressure))
+        share = 1.0 if lubrication is None else asperity_share(lubrication, state, conditions.shape, checked=False)
+        return self._friction._values(state, conditions, share, checked=False)
 
     def at(self, pressure: Array) -> ContactConditions:
-        """Return the conditions under a pressure (n,), MPa; what has come out there last is not asked for again."""
-        found, last = self._conditions.pressed(pressure), self._last
-        if last is None or last[0].tobytes() != pressure.tobytes():
-            return found
-        _, share, mu = last
-        if not isinstance(share, float):
-            if not (np.minimum.reduce(share) >= 0 and np.maximum.reduce(share) <= 1):
-                return found  # it is asked for once more, which tells
-            found.derived["share"] = share
-        if self._more is not None or (np.minimum.reduce(mu) >= 0 and np.maximum.reduce(mu) < np.inf):
-            found.derived["mu"] = mu
-        return found
+        """Return the conditions under a pressure (n,), MPa."""
+        return self._conditions.pressed(pressure)

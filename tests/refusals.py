@@ -158,7 +158,8 @@ ELSEWHERE = (
     (PHYSICS, "an end beyond `contact.hardness`",
      "layers/test_layers.py::test_a_hardness_that_carries_nothing_is_refused"),
     (PHYSICS, "an end where only a strip's turning about a hinge that slides with it could follow the wear: each place "
-     "wears a facet of its own, deeper for ever", "cycle/test_free_strip.py::test_no_shape_stays_under_a_strip_on_a_hinge"),
+     "wears a facet of its own, deeper for ever",
+     "cycle/test_free_strip.py::test_no_shape_stays_under_a_strip_on_a_hinge"),
     (MODEL, "`flash` of a cycle that is a table: kernels of sources have one way to and fro", ""),
     (MODEL, "`flash` of a test program with stick, whose last cycle is done again", ""),
     (MODEL, "`flash` where the strip turns about a point near to the contact",
@@ -175,7 +176,8 @@ ELSEWHERE = (
     (PHYSICS, "an end of bodies that lose no heat",
      "stick/test_stick_heat.py::test_what_does_not_go_with_heat_is_told"),
     (MODEL, "stick with a strip that passes under a grid of over 3,000 nodes: both grids move against each other, "
-     "which no product by waves has, and factors do not fit", "stick/test_on_grids.py::test_a_strip_that_passes_under_a_fine_grid_is_refused"),
+     "which no product by waves has, and factors do not fit",
+     "stick/test_on_grids.py::test_a_strip_that_passes_under_a_fine_grid_is_refused"),
 )  # fmt: skip
 
 

@@ -136,7 +136,7 @@ def test_heat_of_bodies_made_in_python() -> None:
 
 def test_a_stress_that_is_not_linear_is_named() -> None:
     """And groups that are missing or empty."""
-    with pytest.raises(CaseError, match=r"punch\.stress: expected a stress that is linear in grad u"):
+    with pytest.raises(CaseError, match=r"punch\.stress:"):
         block(GROUPS, OwnLaw("stress", lambda u: isotropic(u) * (1 + ufl.tr(strain(u)))))
     with pytest.raises(CaseError, match="punch_contact: missing"):
         block({"top": GROUPS["top"]}, OwnLaw("stress", isotropic))

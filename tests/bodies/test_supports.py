@@ -118,5 +118,5 @@ def test_guides_that_are_none(name: str, settings: list[str], message: str) -> N
 def test_a_flat_contact_carries_nothing_along_it(tmp_path: Path) -> None:
     """A body free along its contact is refused by its key, as the part of a bore that does not wrap the shaft is."""
     narrow = ["geometry.parameters.contact_angle=20", "geometry.parameters.margin_angle=30"]
-    with pytest.raises(CaseError, match=r"punch.supports: the punch is free to slide along x"):
+    with pytest.raises(CaseError, match=r"punch.supports:"):
         floating(tmp_path, *narrow)

@@ -212,7 +212,7 @@ def test_what_makes_no_sense_is_refused_by_its_key(setting: str, text: str) -> N
 def test_material_that_leaves_the_contact_does_not_creep_there() -> None:
     """A strip that passes under the punch one way takes with it what it has crept."""
     one_way = "motion={kind='one-way', direction='rightward', speed='10 mm/s', duration='0.1 s'}"
-    with pytest.raises(CaseError, match=r"strip\.creep: expected a motion to and fro"):
+    with pytest.raises(CaseError, match=r"strip\.creep:"):
         load_case("example1", [one_way, f"strip.creep={TERMS}"])
 
 

@@ -103,5 +103,5 @@ def test_bad_cups(assembled: Callable[..., Tribosystem]) -> None:
     wears = "wear.strip.coefficient=3e-10"
     with pytest.raises(CaseError, match="runs off the meshed strip"):
         assembled("ball-in-cup", *COARSE, wears, turning([0, 60, 0]))
-    with pytest.raises(CaseError, match=r"motion\.rows: from row 1 to row 2 .* open the contact"):
+    with pytest.raises(CaseError, match=r"motion\.rows: .*1.*2"):
         assembled("ball-in-cup", *COARSE, turning([0, 20, 0], centre="[5, 0, 5]"))

@@ -74,5 +74,5 @@ def test_friction_is_of_the_chosen_temperature(of: str, share: float) -> None:
     assert state.heat is not None
     exact = 400.0 if share == 0 else (np.sqrt(1 + 0.08 * share * 400) - 1) / (0.04 * share)
     np.testing.assert_allclose(state.heat.punch[-1] - 293.15, exact, rtol=1e-6)
-    with pytest.raises(CaseError, match=r"contact\.friction_temperature: expected 'mean' or 'hotter' or 'punch'"):
+    with pytest.raises(CaseError, match=r"contact\.friction_temperature:"):
         warming_pin(friction_temperature="colder")

@@ -339,7 +339,7 @@ def test_steady_state_of_a_step(edited: Edited) -> None:
         np.testing.assert_allclose(found.wear_per_cycle, exact.wear_per_cycle, rtol=1e-9)
         assert found.system.normal_force == pytest.approx(force, rel=1e-12)
         assert chosen.optimum(1).velocity == pytest.approx(exact.system.optimum(1).velocity, rel=1e-9)
-    with pytest.raises(CaseError, match=r"program.steps: the program has 3 steps, and none of number 4"):
+    with pytest.raises(CaseError, match=r"program.steps: .*3.*4"):
         at_step(system, 3)
 
 

@@ -199,7 +199,7 @@ def test_numbers_in_expressions_are_finite(text: str) -> None:
 def test_friction_has_no_unit() -> None:
     """Of an expression or a table it was accepted, whatever it was, and had no effect."""
     for law in ({"expression": "0.2", "unit": "MPa"}, {"table": [[0, 20], [1, 20]], "unit": "percent"}):
-        with pytest.raises(CaseError, match=r"contact.friction.unit: expected none: its values are pure numbers"):
+        with pytest.raises(CaseError, match=r"contact.friction.unit:"):
             make_case(changed(contact={"friction": law}))
 
 

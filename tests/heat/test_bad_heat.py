@@ -75,9 +75,9 @@ def test_held_temperature_off_the_body(group: str, expected: str) -> None:
 def test_isolated_body_has_no_steady_state(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
     """Without any heat sink no temperature is steady; for some half-cycles there is no need of one."""
     system = assembled("example1-heat", *COARSE, *settings)
-    with pytest.raises(CaseError, match=r"heat\.convection: the punch loses heat nowhere"):
+    with pytest.raises(CaseError, match=r"heat\.convection:"):
         steady(system)
-    with pytest.raises(CaseError, match=r"heat\.convection: the punch loses heat nowhere"):
+    with pytest.raises(CaseError, match=r"heat\.convection:"):
         steady_exchange(system, [9.5])
     (block,) = march(system, 4)
     assert block.heat.largest_temperature[-1] > 0

@@ -148,7 +148,7 @@ def test_what_does_not_go_with_it(edited: Edited) -> None:
         on_track()(tables)
         tables["strip"]["temperatures"] = [{"on": "strip_ends", "temperature": 0}]
 
-    with pytest.raises(CaseError, match=r"heat\.track: expected a strip whose material enters"):
+    with pytest.raises(CaseError, match=r"heat\.track:"):
         assemble(edited("example1-heat", held, *SMALL))
 
 

@@ -205,5 +205,5 @@ def test_rings_that_oscillate() -> None:
 
 def test_out_of_the_plane() -> None:
     motion = "motion={kind='cycle',columns=['time (s)','shift_x (mm)','shift_y (mm)'],rows=[[0,1,0],[1,0,1],[2,1,0]]}"
-    with pytest.raises(CaseError, match=r"motion.columns: expected no column shift_y with heat"):
+    with pytest.raises(CaseError, match=r"motion.columns:"):
         load_case("example1-heat", [motion])

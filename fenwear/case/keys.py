@@ -33,9 +33,9 @@ class Key:
     Attributes:
         path: Its tables and its name; NAME stands for a name of yours, N for a number from 0, BODY for punch or strip.
         unit: Of a number without a unit.
-        values: What it takes.
-        default: What it is where it is not given; "required" where it has to be, "" where it then does nothing.
-        meaning: What it is.
+        values: Values that it accepts.
+        default: Its default; "required" where it has to be, "" where it then does nothing.
+        meaning: Its description.
         kind: The kind of motion that it belongs to.
         table: Whether it is a table with keys of its own.
     """
@@ -207,7 +207,7 @@ def _by_kind(node: dict[str, Any]) -> dict[str, Any]:
     """Return the schema of a table with a kind: that of its kind, so that the very key that is wrong is marked.
 
     Without a kind, which the base then has, that of any. Editors find what they complete in the first list, which
-    refuses nothing.
+    rejects nothing.
     """
     which = node["discriminator"]
     name, kinds = which["propertyName"], which["mapping"]

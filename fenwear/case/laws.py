@@ -52,7 +52,7 @@ def _registered(law: str) -> str:
 
 
 class _State(Part):
-    """What a number that depends on the state has in all of its forms."""
+    """Keys that all forms of a number that depends on the state share."""
 
     expression: Annotated[str, AfterValidator(_parsed)] | None = Field(
         default=None,
@@ -129,7 +129,7 @@ class Dependence(_State):
 
         Args:
             unit: Of the key; None where it is checked elsewhere.
-            of: What it may depend on.
+            of: Variables that it may depend on.
             forms: That it may have.
 
         Raises:
@@ -295,7 +295,7 @@ def place_values(value: Any, place: Mapping[str, Any], n: int, unit: str, key: s
 
 
 class Stick(Part):
-    """How the rig drives a contact with stick, and its time steps; with contact.law = "coulomb"."""
+    """Drive of a contact with stick by the rig, and its time steps; with contact.law = "coulomb"."""
 
     force: Annotated[Force, Field(gt=0)] | None = Field(
         default=None,
@@ -508,7 +508,7 @@ class WearLaw(Part):
 
     @property
     def gives_way(self) -> bool:
-        """Whether there is a coating that gives way beside the base."""
+        """Whether a coating has a compliance beside that of the base."""
         return self.coating is not None and self.coating.modulus is not None
 
     @property
@@ -539,13 +539,13 @@ class WearLaw(Part):
 
     @property
     def given_coefficient(self) -> float | Dependence | None:
-        """What may depend on the state: the coefficient, or k_A."""
+        """Coefficients that may depend on the state: the coefficient, or k_A."""
         found: float | Dependence | None = self.coefficient if self.per_area is None else self.per_area
         return found
 
     @property
     def scale(self) -> float:
-        """What turns values of a dependent coefficient into its internal unit."""
+        """The factor from values of a dependent coefficient to its internal unit."""
         if isinstance(self.coefficient, Dependence) and self.coefficient.unit:
             return _of_unit(self.coefficient.unit, *self.exponents)
         return 1.0
@@ -577,7 +577,7 @@ class Wear(Part):
 
     @property
     def laws(self) -> list[WearLaw]:
-        """Those that there are."""
+        """Laws of the bodies that wear."""
         return list(self.by_body.values())
 
     @property

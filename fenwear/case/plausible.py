@@ -1,7 +1,7 @@
 """Values of a case that are valid but hardly meant: far outside the range of their kind, or in another unit.
 
-Nothing here is refused: what a case says is computed. Every range is wide enough for all materials in use;
-what lies outside it is told with the range.
+Nothing here is rejected: the case is computed as it is. Every range is wide enough for all materials in use; values
+outside it are reported with the range.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ABSOLUTE = 200.0  # K: initial temperatures above it are absolute, not differenc
 
 
 class Range(NamedTuple):
-    """What is usual for a physical kind.
+    """Usual range of a physical kind.
 
     Attributes:
         keys: Of the case, with wildcards.
@@ -32,7 +32,7 @@ class Range(NamedTuple):
         low, high: In `unit`; zero is always allowed.
         unit: As people write it.
         size: Of that unit in internal units.
-        reason: What the ends stand for.
+        reason: Examples at the ends.
         bare_low: The same as `low` for a number that was written without a unit, where that may be another one.
     """
 

@@ -57,11 +57,11 @@ class Stage:
 
 @dataclass(frozen=True)
 class Held:
-    """What acts at the end of a step of a program, as if it went on for ever.
+    """Loads, motion and temperatures at the end of a step of a program, held constant.
 
     Attributes:
         step: Its number, from 0.
-        steps: How many the program has.
+        steps: Number of steps of the program.
         case: With its motion and ambient temperature, and without a program.
         load: The normal force, N; None where it is not given.
         load_factor: All loads over those of the case, where `load` is None.
@@ -128,7 +128,7 @@ def _check_order(table: CsvTable) -> None:
 
 @dataclass(frozen=True)
 class _Acting:
-    """What acts over a step, from its begin to its end: `given` of the motion and the ambient temperature."""
+    """Values over a step, from its begin to its end: `given` of the motion and the ambient temperature."""
 
     loads: tuple[float, float] | None = None
     factors: tuple[float, float] = (1.0, 1.0)
@@ -279,7 +279,7 @@ def _cycles(case: Case, step: ProgramStep, ramps: Mapping[str, tuple[float, floa
 def cycle_of(case: Case) -> tuple[float, float, int]:
     """Return the duration of a cycle in s, what it slides in mm or rad, and its number of half-cycles.
 
-    What a table of places slides is told by the contact alone: it is counted in cycles.
+    The contact alone gives the sliding of a table of places: it is counted in cycles.
     """
     motion = case.motion
     if isinstance(motion, OneWay):
@@ -310,7 +310,7 @@ def half_cycles_of(case: Case) -> int:
 
 
 def check_length(case: Case) -> None:
-    """Raise where a run is to go on behind the end of its program.
+    """Raise where a run would continue beyond the end of its program.
 
     Raises:
         CaseError: it is.

@@ -1,4 +1,4 @@
-"""What the tables of a case file are made of: numbers with units, and tables that refuse unknown keys.
+"""Parts of the tables of a case file: numbers with units, and tables that reject unknown keys.
 
 Every number is held in mm, N, s, K (see `fenwear.case.units`); a case file may give any other unit as a string.
 """
@@ -108,7 +108,7 @@ def _kinds(part: type[BaseModel], name: str) -> frozenset[object]:
 
 
 class Check(NamedTuple):
-    """What must not be so in a table.
+    """A condition that rejects a table.
 
     Attributes:
         wrong: Of the table.
@@ -120,12 +120,12 @@ class Check(NamedTuple):
 
 
 class Part(BaseModel):
-    """A table of the case file: unknown keys refused, values frozen.
+    """A table of the case file: unknown keys rejected, values frozen.
 
     Attributes:
         one_of: Keys of which exactly one is given.
         together: Keys of which all are given, or none.
-        checks: What else has to hold.
+        checks: Further conditions.
     """
 
     # Validators are built when a whole case is first read: once, and not once more for each table on the way.

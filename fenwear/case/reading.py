@@ -369,7 +369,7 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noq
 
 
 def _own_problems(key: str, message: str) -> list[InputError]:
-    """Return the problems that a check of the schema tells."""
+    """Return the problems that a check of the schema reports."""
     if not key:
         return [InputError(*line.split(": ", 1)) for line in message.splitlines()]
     name, colon, rest = message.partition(": ")
@@ -412,7 +412,7 @@ def _suggestion(location: tuple[str | int, ...]) -> str:
 
 
 def _tables(location: Sequence[str | int]) -> list[Any]:
-    """Return the tables that may stand at a place: more than one where its `kind` is not told yet."""
+    """Return the tables that may stand at a place: several where its `kind` is not known yet."""
     tables: list[Any] = [Case]
     for step in location:  # names and numbers of entries are no fields: they stay at the same table
         fields = [table.model_fields[step] for table in tables if step in getattr(table, "model_fields", {})]

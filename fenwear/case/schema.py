@@ -1,7 +1,7 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python.
 
-Nothing here knows of meshes or solvers: what only the geometry can tell (whether a group exists, whether a pin is on
-the punch) is checked where the geometry is read, and reported with the same keys.
+Nothing here knows of meshes or solvers: properties of the geometry (whether a group exists, whether a pin is on the
+punch) are checked where the geometry is read, and reported with the same keys.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", 
 
 @dataclass(frozen=True)
 class Written:
-    """How the quantities of a case were written; no part of what the case is, so that all compare as equal.
+    """Quantities of a case as they were written; no part of what the case is, so that all compare as equal.
 
     Attributes:
         bare: Keys of those that were numbers without a unit.
-        united: Those with a unit, as they were written.
+        united: Quantities with a unit, as they were written.
     """
 
     bare: frozenset[str] = field(default=frozenset(), compare=False)
@@ -117,7 +117,7 @@ class Case(Part):
 
     @property
     def loading(self) -> tuple[Any, ...]:
-        """What its loads come from: equal of cases with the same loads."""
+        """Sources of its loads: equal of cases with the same loads."""
         return self.punch.loads, self.strip.loads, self.motion if isinstance(self.motion, Cycle) else None
 
     @property
@@ -127,7 +127,7 @@ class Case(Part):
 
     @property
     def names(self) -> Names:
-        """What the bodies are called."""
+        """Names of the bodies."""
         return Names(self.punch.name or "punch", self.strip.name or "strip")
 
     @property
@@ -196,7 +196,7 @@ class Case(Part):
 
     @property
     def diffusion(self) -> dict[str, float]:
-        """What ready geometries grade the strip by, see `diffusion_of`: the same for all stages of a program."""
+        """Length by which ready geometries grade the strip (`diffusion_of`): equal in all stages of a program."""
         if self._diffusion is not None:
             return self._diffusion
         if not self.heat or not self.passes or not isinstance(self.motion, OneWay | Rotation):
@@ -231,7 +231,7 @@ class Case(Part):
 
     @property
     def against_stick(self) -> list[str]:
-        """What does not go with contact with stick: a key and what it expects, each."""
+        """Problems of contact with stick: a key and what it expects, each."""
         return [check.message.format(self) for check in AGAINST_STICK if check.wrong(self)]
 
     @property
@@ -266,7 +266,7 @@ class Case(Part):
 
     @property
     def written(self) -> Written:
-        """How its quantities were written; nothing is known of those of a case made from its parts."""
+        """Its quantities as they were written; nothing is known of those of a case made from its parts."""
         return self._written
 
     @property

@@ -36,7 +36,7 @@ class Dimension:
     Attributes:
         value: The usual one, as a case file has it; or how it follows from those above it, for jinja2.
         unit: It is converted to, and read in where it has none; "" for a pure number.
-        about: What it is, and whose value.
+        about: Its description, and the key of its value.
     """
 
     value: str | float

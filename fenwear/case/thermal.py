@@ -1,6 +1,6 @@
 """The table of heat: its sharing, its ways out, and how it is computed.
 
-How far heat gets into a strip that slides one way or turns is its diffusivity over its speed: below a contact of length
+The depth of heat in a strip that slides one way or turns is its diffusivity over its speed: below a contact of length
 L, under which material passes at v, a layer sqrt(a L / v) heats up, a = k / (rho c) (J. C. Jaeger, Moving sources of
 heat and the temperature at sliding contacts, 1942).
 """

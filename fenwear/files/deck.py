@@ -458,7 +458,7 @@ class _Deck:
                         "axisymmetric elements, shells, trusses and beams by their shape.")  # fmt: skip
 
     def rows(self, line: int, data: list[tuple[int, str]], count: int, name: str) -> tuple[Ints, Ints]:
-        """Return number and nodes of each element (n, 1 + count), and its lines; rows go on after a comma."""
+        """Return number and nodes of each element (n, 1 + count), and its lines; rows continue after a comma."""
         wide = 1 + count
         try:
             if data and count < 16:

@@ -75,7 +75,7 @@ class GroupedMesh:
         points: (n, 3), mm.
         groups: By name.
         unused: Sets that are no groups.
-        notes: What was left out or changed.
+        notes: Descriptions of parts left out or changed.
     """
 
     points: Array
@@ -127,7 +127,7 @@ def grouped(
     """Return the groups of a mesh file.
 
     Args:
-        mesh: What the file holds.
+        mesh: Contents of the file.
         wanted: Names of sets, or planes, by the groups that they become.
         scale: Millimetres in the file's unit of length; None where nobody says it.
         dim: Of the bodies.

@@ -45,7 +45,7 @@ class Heights:
         places: Rising coordinates along each axis, mm.
         heights: (m,) or (m, n), mm; no numbers where holes are.
         far: Where heights are fill values or spikes.
-        notes: What was changed.
+        notes: Descriptions of changes.
     """
 
     name: str
@@ -151,7 +151,7 @@ Raw = tuple[Sequence[Array], Array, list[str]]
 
 
 def _checked(path: Path, places: Sequence[Array], heights: Array, notes: list[str]) -> Heights:
-    """Return a map with rising coordinates, and its fill values and spikes told apart."""
+    """Return a map with rising coordinates, and with fill values and spikes marked."""
     places = [np.asarray(one, dtype=np.float64) for one in places]
     if heights.shape != tuple(len(one) for one in places) or not heights.shape or min(heights.shape) < 2:
         sizes = " by ".join(str(len(one)) for one in places)

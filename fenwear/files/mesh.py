@@ -128,7 +128,7 @@ class MeshSet:
 
     Attributes:
         name: As the file writes it.
-        of: What it holds.
+        of: Contents.
         members: Elements or points (n,); of sides each element and the number of its side (n, 2).
         line: Where the file names it; 0 where it has no lines.
     """
@@ -141,14 +141,14 @@ class MeshSet:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """What a mesh file holds.
+    """Contents of a mesh file.
 
     Attributes:
         name: Of the file.
         points: (n, 3), in the file's unit of length.
         blocks: Its elements.
         sets: Its named sets.
-        notes: What was left out or changed, for people.
+        notes: Descriptions of parts left out or changed, for people.
     """
 
     name: str

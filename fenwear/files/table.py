@@ -42,7 +42,7 @@ _VALUE = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
 
 
 class TableError(ValueError):
-    """What is wrong with a table: where, and what to do."""
+    """Problem of a table: where, and what to do."""
 
     def __init__(self, where: str, message: str) -> None:
         self.where, self.message = where, message
@@ -71,7 +71,7 @@ class Table:
         comments: Lines for people, with their numbers.
         skipped: Lines before the heading, with their numbers.
         left_out: Lines of rows without a value.
-        encoding, separator, decimal: How it is written, in words.
+        encoding, separator, decimal: Its notation, in words.
     """
 
     path: Path

@@ -1,13 +1,13 @@
-"""Where a contact surface ends: clipped where the bodies go on smoothly, beside chamfers, and worn through.
+"""Where a contact surface ends: clipped where the bodies continue smoothly, beside chamfers, and worn through.
 
-Beyond its ends a contact surface has an edge, as a flat punch, or the bodies go on smoothly, as a ball of which a part
-is tagged. strip_contact reaches at least as far as punch_contact, so the punch's rim is what a growing contact meets:
-it clips the contact wherever the punch goes on, and the strip has no edge.
+Beyond its ends a contact surface has an edge, as a flat punch, or the bodies continue smoothly, as a ball of which a
+part is tagged. strip_contact reaches at least as far as punch_contact, so the punch's rim is what a growing contact
+meets: it clips the contact wherever the punch continues, and the strip has no edge.
 
-How wide the surface should be follows from the curvatures k of the unworn gap. A parabola g = k s² / 2 below a level D
-has the area A = 4 D s / 3, a paraboloid the volume V = pi D² / sqrt(k_1 k_2). Both reach as far as s = sqrt(2 D / k). D
-is at least what Hertz closes under the load F: 2 F / (pi E*) over the thickness, or a² / (2 R) with a³ = 3 F R / (4 E*)
-and R = 1 / sqrt(k_1 k_2).
+The width that the surface needs follows from the curvatures k of the unworn gap. A parabola g = k s² / 2 below a level
+D has the area A = 4 D s / 3, a paraboloid the volume V = pi D² / sqrt(k_1 k_2). Both reach as far as s = sqrt(2 D / k).
+D is at least what Hertz closes under the load F: 2 F / (pi E*) over the thickness, or a² / (2 R) with a³ = 3 F R / (4
+E*) and R = 1 / sqrt(k_1 k_2).
 
 A surface worn by a depth w beside a chamfer at the angle phi becomes wider by w cot phi there.
 """
@@ -85,7 +85,7 @@ class Rim:
 
     Attributes:
         x: Where they lie (k, d), mm.
-        smooth: Where the boundary goes on smoothly (k,).
+        smooth: Mask of ends where the boundary continues smoothly (k,).
         cotangent: Of the angle of a chamfer there (k,); zero for none.
     """
 
@@ -149,7 +149,7 @@ class Limits:
     """Where a contact is clipped, of the meshes as they were made.
 
     Attributes:
-        clips: Contact nodes where both bodies go on beyond the surface (n,).
+        clips: Contact nodes where both bodies continue beyond the surface (n,).
         x: Contact nodes (n, d), mm.
         width: Of the surface along the direction in which it is widest, mm.
         curvatures: Of the unworn gap, descending, 1/mm; none where it is no paraboloid.
@@ -234,7 +234,7 @@ def contact_limits(system: Tribosystem) -> Limits:
 def _clipped_by_grid(punch: ElasticBody, grid: RegularGrid, rim: Rim) -> tuple[Mask, bool]:
     """Return which nodes of a contact grid clip the contact (n,), and whether some do within the surface; collective.
 
-    A side may lie within the surface, or reach over it: there the surface's own end clips, where the body goes on. A
+    A side may lie within the surface, or reach over it: there the surface's own end clips, where the body continues. A
     grid that grows clips where it is at its end.
     """
     surface = punch.meshed.trace[:, grid.axes]

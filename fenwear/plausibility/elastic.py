@@ -1,4 +1,4 @@
-"""What the model leaves out of elastic bodies: large displacements, and the way that they follow friction.
+"""Effects that the model of elastic bodies leaves out: large displacements, and the way that they follow friction.
 
 The theory takes the gradient G of the displacement to be small against 1: it leaves out terms of the relative size of
 the strain e (symmetric part of G) and the rotation w (the other one). Both are taken as means over the elements,

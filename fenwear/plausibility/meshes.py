@@ -277,9 +277,9 @@ class Measure:
 
     Attributes:
         value: With the mesh in mm.
-        power: Of the unit of length that it goes with.
+        power: The unit of length that it belongs to.
         low, high: Ends of what is usual, wide.
-        text: What it is, in words.
+        text: Its description.
     """
 
     value: float
@@ -311,7 +311,7 @@ def other_unit(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> Fields:
 
 
 def _measures(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> list[Measure]:
-    """Return what is told by the smaller body, and by the load on the whole contact surface."""
+    """Return the estimates from the smaller body, and from the load on the whole contact surface."""
     sizes = {"punch": _size(bodies.punch), "strip": _size(bodies.strip)}
     body = min(sizes, key=lambda name: sizes[name])
     size = sizes[body]

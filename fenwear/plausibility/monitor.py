@@ -1,4 +1,4 @@
-"""What runs, checks and steady states warn of: the table of rules, applied to what they see."""
+"""Warnings of runs, checks and steady states: the table of rules, applied to what they see."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class HeatMonitor:
     """
 
     def __init__(self, numbers: Mapping[str, float]) -> None:
-        """Begin anew, or where a run goes on with the numbers of all stages before."""
+        """Begin, or continue with the numbers of all earlier stages of a resumed run."""
         self.numbers = {name: numbers[name] for name in (STEPS, CHANGE, DIFFERENCE, GAIN) if name in numbers}
         self._texts: dict[str, str] = {}
 

@@ -1,9 +1,9 @@
-"""What is computed of one variant, and by whom: this process, local processes, or the ranks of an MPI job.
+"""Computation of one variant, and its processes: this process, local processes, or the ranks of an MPI job.
 
 Ranks use mpi4py's MPICommExecutor, which needs no process to be started by another one and so runs under
-every launcher and in every container. Local processes are joblib's loky: they are started anew, as
-MPI and PETSc do not survive a fork, and need no guard in the script that starts them. Either way rank 0, or the
-process that began, shares out pieces and gathers; each worker has a system of its own.
+every launcher and in every container. Local processes are joblib's loky: they are started as new processes, as MPI and
+PETSc do not survive a fork, and need no guard in the script that starts them. Either way rank 0, or the process that
+began, shares out pieces and gathers; each worker has a system of its own.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def outcomes(
 
     Args:
         left: The variants; of the other ranks' nothing is asked.
-        of: What is computed of each.
+        of: Computation for each variant.
         folder: Where each is kept as it is done; None for nowhere.
         processes: Local processes; None for as many as there are cores, where that is worth their start. On
             several ranks these are the workers instead.

@@ -253,7 +253,7 @@ class Variant:
 
     Attributes:
         place: Its indices in the dimensions of the sweep.
-        settings: What it changes, as `key.path=value`.
+        settings: Its changes, as `key.path=value`.
         case: The case; that which is varied where the values do not go together.
         error: Why they do not; None where they do.
         name: Of its kept results: the same for the same case, whatever it is swept with.
@@ -276,7 +276,7 @@ class Plan:
     """A sweep.
 
     Attributes:
-        of: What is computed of each variant.
+        of: Computation for each variant.
         axes: Keys and their values.
         zipped: Whether all axes go together, one variant for each place in them, or each value with each.
         coordinates: Values of each axis as the cases have them, and their unit.
@@ -303,7 +303,7 @@ def make_plan(case: Case, axes: Sequence[Axis], of: str, *, zipped: bool = False
     Args:
         case: The case that is varied.
         axes: Keys and their values.
-        of: What is computed of each variant.
+        of: Computation for each variant.
         zipped: Whether the first values go together, the second ones, and so on.
 
     Raises:

@@ -69,7 +69,7 @@ def meaning(name: str, of: Of, case: Case) -> Quantity:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a variant.
+    """Outcome of a variant.
 
     Attributes:
         place: Of the variant in the sweep.
@@ -211,7 +211,7 @@ def table(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def _way(dataset: xarray.Dataset, k: int) -> str:
-    """Return the name of a half-cycle: by its direction where that tells them apart."""
+    """Return the name of a half-cycle: by its direction where the directions differ."""
     directions = dataset.coords.get("direction")
     if directions is None or len(set(directions.values)) < directions.size:
         return str(k + 1)

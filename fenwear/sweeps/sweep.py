@@ -1,4 +1,4 @@
-"""A sweep from the case and its keys to the dataset, and what the command does with it: writes it, tells of it."""
+"""A sweep from the case and its keys to the dataset, and what the command does with it: writes it, reports it."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _compute(
 
 
 def _told(error: BaseException, plan: Plan, folder: Path | None) -> Exception:
-    """Return what ended the sweep, with how to go on."""
+    """Return the reason that ended the sweep, with the way to resume it."""
     if isinstance(error, Exception) and not isinstance(error, InterruptedRunError):
         return error
     what = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -180,7 +180,7 @@ def run_sweep(
         name: Names the folder results/sweep-NAME where `output` is None.
         over: Texts KEY=VALUES.
         rows: A table of variants, instead of `over`.
-        of: What is computed of each variant.
+        of: Computation for each variant.
         output: The folder.
         log: Called with each message.
         zipped, resume, processes: As of `sweep`.

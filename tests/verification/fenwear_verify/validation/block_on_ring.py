@@ -8,7 +8,7 @@ import numpy as np
 
 from fenwear.life import measured_folder
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, root_mean_square
-from fenwear_verify.validation.runs import area_below, depth_uncertainty, history_of, widths
+from fenwear_verify.validation.runs import area_below, history_of, uncertainty, widths
 
 DISTANCE, LINE_LOAD = 3.6e6, 65 / 6  # mm, N/mm
 OUTSIDE = 1.5  # beyond it the block is not worn, mm: the trace's zero is its mean there
@@ -39,7 +39,7 @@ def compare(scope: Scope) -> Finding:
         settings = [f"wear.punch.coefficient={coefficient}"]
         history, summary = history_of(folder / "block_on_ring.toml", settings, SHORT, scope)
         x, height = history["x"].values, -1e3 * history["wear"].isel(half_cycle=-1).values
-        u_num = depth_uncertainty(summary, "punch")
+        u_num = 1e3 * uncertainty(summary, "punch", "largest_depth_mm")
         predicted = Curve(f"k = {1e9 * coefficient:.2f}e-9 mm²/N", x, height, np.full(len(x), u_num))
         middle = np.abs(measured.x) <= MIDDLE
         bottom = -measured.y[middle]

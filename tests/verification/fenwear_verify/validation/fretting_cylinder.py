@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
-from fenwear_verify.validation.runs import area_below, depth_uncertainty, history_of, widths
+from fenwear_verify.validation.runs import area_below, history_of, uncertainty, widths
 
 LEVELS = (0.5, 1.0, 1.5, 2.0, 2.5)  # depths at which the scar's width is compared, um
 SHORT = (
@@ -59,7 +59,7 @@ def _profile(name: str, scale: float, scope: Scope) -> Curve:
     history, summary = history_of("fretting", settings, SHORT, scope)
     x = history["x_strip"].values
     height = -1e3 * history["wear_strip"].isel(half_cycle=-1).values
-    return Curve(name, x, height, np.full(len(x), depth_uncertainty(summary, "strip")))
+    return Curve(name, x, height, np.full(len(x), 1e3 * uncertainty(summary, "strip", "largest_depth_mm")))
 
 
 def _placed(profile: Curve, measured: Curve) -> Curve:

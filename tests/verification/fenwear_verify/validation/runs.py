@@ -40,9 +40,12 @@ def history_of(
         return read_history(place).load(), summary
 
 
-def depth_uncertainty(summary: dict[str, Any], body: str) -> float:
-    """Return the numerical uncertainty of a body's largest depth, µm; 0 where the run was not asked for it."""
-    return 1e3 * float(summary.get("uncertainty", {}).get(body, {}).get("largest_depth_mm", 0.0))
+def uncertainty(summary: dict[str, Any], *path: str) -> float:
+    """Return the numerical uncertainty of a quantity in its unit; 0 where the run was not asked for it."""
+    found: Any = summary.get("uncertainty", {})
+    for name in path:
+        found = found.get(name, {})
+    return float(found or 0.0)
 
 
 def area_below(profile: Curve) -> float:

@@ -42,7 +42,7 @@ def info_command(
         else:
             show(geometries[key].text())
         return
-    if key and Path(key).is_file():
+    if key and (Path(key).is_file() or "/" in key):
         _list_file(Path(key), as_json=as_json)
         return
     if key:

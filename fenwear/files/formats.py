@@ -91,7 +91,7 @@ def listed_file(path: Path) -> tuple[str, dict[str, Any]]:
             "file": path.name, "kind": "table", "columns": columns, "rows": len(table.rows),
             "encoding": table.encoding, "separator": table.separator, "decimal": table.decimal,
             "directives": [{"line": n, "name": name, "value": value} for n, name, value in table.directives],
-            "left_out": list(table.left_out),
+            "comments": [{"line": n, "text": text} for n, text in table.comments], "left_out": list(table.left_out),
         }  # fmt: skip
         return table.listing(), found
     if suffix in MAPS:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, assemble, jump, make_case, march, steady
+from fenwear import Case, assemble, jump, load_case, make_case, march, steady
 from fenwear.errors import CaseError
 
 
@@ -76,3 +76,28 @@ def test_friction_is_of_the_chosen_temperature(of: str, share: float) -> None:
     np.testing.assert_allclose(state.heat.punch[-1] - 293.15, exact, rtol=1e-6)
     with pytest.raises(CaseError, match=r"contact\.friction_temperature:"):
         warming_pin(friction_temperature="colder")
+
+
+def test_a_moving_band_whose_first_stages_are_colder_than_its_surroundings() -> None:
+    """Material enters faster than heat spreads: a stage before the begin of a jump would let cold material leave.
+
+    The jumps come to the march, and the way to the steady state is found.
+    """
+    metal = {"conductivity": 50, "density": 7.8e-9, "heat_capacity": 4.487e8}
+    sizes = {"punch_width": 20, "punch_height": 40, "layer_height": 10, "pin_height_1": 15, "pin_height_2": 30}
+    around = {"strip_length": 400, "strip_height": 60, "overlap": 0, "elements_along_contact": 8}
+    case = load_case("example2-heat").resolved()
+    for table, keys in (
+        (case["geometry"], {"degree": 2, "parameters": sizes | around}),
+        *((case["materials"][name], metal) for name in ("steel", "composite")),
+        (case["contact"], {"friction": {"expression": "0.12 - 0.0004 * T"}}),
+        (case["heat"], {"partition": 0.0}),
+        (case["punch"]["loads"][0], {"force": [0, -2000]}),
+    ):
+        table.update(keys)
+    case["motion"] = {"kind": "one-way", "direction": "rightward", "speed": 28.57, "duration": 1}
+    system = assemble(make_case(case))
+    *_, jumped = jump(system, 6, tolerance=3e-3)
+    *_, marched = march(system, 6, implicit=True)
+    np.testing.assert_allclose(jumped.pressure[-1], marched.pressure[-1], rtol=0, atol=0.02 * marched.pressure.max())
+    np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=0, atol=0.02 * marched.wear.max())  # at its edge

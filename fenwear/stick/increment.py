@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -151,6 +152,11 @@ def _newton(step: Step) -> StickState:
             return replace(found, unique=found.unique and not isinstance(failure, ManyAnswersError))
         except ConvergenceError as error:
             failure = failure if isinstance(failure, ManyAnswersError) else error
+    if step.hardness < np.inf:  # a curved layer, linearised where it hardly presses, would have all nodes flow
+        harder = copy(step)
+        harder.hardness = np.inf
+        pressed = _newton(harder)
+        return _from(step, _status(pressed.pressure, pressed.trial, step.mu, step.hardness))
     if step.imposed.force is not None:
         held = _by_displacement(step, starts[1], step.imposed.force)
         if held is not None:

@@ -51,7 +51,7 @@ IMAGE = 1e-7  # of a mirror image
 CURVED = 1e-4  # of the image of a ball: gmsh places its curved elements to 1e-5
 REDUCED = 1e-6  # of the image where heat is on a basis, of a tolerance of 1e-7
 SOLVED = 1e-7  # of the contact's conditions
-SCALED = 2e-6  # of a problem in other sizes: gmsh places nodes to 6e-8 of the length
+SCALED = 5e-6  # of a problem in other sizes: gmsh places nodes to 6e-8 of the length, a basis of heat leaves 3e-6
 Tables = dict[str, Any]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from combinations import SMALL, STICK
 
 from fenwear import assemble, load_case, march
 from fenwear.cycle import Block, evolve
@@ -130,3 +131,18 @@ def test_a_step_of_a_program_is_no_heavier_than_the_hardness_carries() -> None:
         case = load_case("example2", [*settings, f"program={{steps=[{{cycles=1, {step}}}]}}", "run.half_cycles=2"])
         with pytest.raises(CaseError, match=r"contact.hardness.*33\.33"):
             list(evolve(assemble(case)))
+
+
+def test_a_curved_layer_with_stick() -> None:
+    """Beside a rough layer a hardness that nothing reaches changes nothing; one that is reached bounds the pressure."""
+    rough = "contact.layer={kind='rough', roughness='0.54 um', asperity_radius='54 um', asperity_density='1700 1/mm^2'}"
+    given = [*SMALL, *STICK, "contact.law='coulomb'", rough, "run.half_cycles=2"]
+    free, far, near = (
+        last("fretting-partial-slip", [*given, *more], "explicit")
+        for more in ((), ("contact.hardness='2 GPa'",), ("contact.hardness='500 MPa'",))
+    )
+    largest = free.pressure.max()
+    assert 600 < largest < 1000
+    np.testing.assert_allclose(far.pressure, free.pressure, rtol=0, atol=1e-9 * largest)
+    assert near.pressure.max() == pytest.approx(500, rel=1e-12)
+    assert max(block.equilibrium_error.max() for block in (far, near)) < 1e-12

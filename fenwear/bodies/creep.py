@@ -100,10 +100,15 @@ class Retardation:
         """Return the y (terms,) that v = 1 at loads of a course, at even times (k + 1,), gives to y = 0."""
         step = duration / (len(course) - 1) / self.times
         kept, grown = np.exp(-step), -np.expm1(-step)
+        mean = np.divide(grown, step, out=np.ones_like(step), where=step > 0)
         found = np.zeros(len(self.times))
         for first, last in pairwise(course):
-            found = kept * found + last - first * kept - (last - first) * grown / step
+            found = kept * found + last - first * kept - (last - first) * mean
         return found
+
+    def shares(self, duration: float) -> tuple[Array, Array]:
+        """Return the shares (terms,) of v at the begin and at the end of a step that y takes up, v changing evenly."""
+        return self.taken(duration, np.array([1.0, 0.0])), self.taken(duration, np.array([0.0, 1.0]))
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """Creep with stick: what bodies and layer have crept, from time step to time step, and over whole cycles.
 
-As in gross sliding (`fenwear.bodies.creep`), with displacements along all axes: at the end of a time step a body is
-displaced by (1 + sum of c (1 - e)) v + sum of c e y, v by the forces of that time. So its compliance is grown, and its
-state y moves the surfaces against each other along the normal and along the tangents. Where they stick, what they were
-moved by when they stuck stays; tractions relax.
+As in gross sliding (`fenwear.bodies.creep`), with displacements along all axes. Over a time step v, that of the forces
+of a time, changes evenly from u to v: y takes up shares a of u and b of v, and at its end a body is displaced by
+(1 + sum of c b) v + sum of c (e y + a u). So its compliance is grown, and its state y and u move the surfaces against
+each other along the normal and along the tangents. Where they stick, what they were moved by when they stuck stays;
+tractions relax.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.creep import Retardation
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
-from fenwear.stick.position import Position
+from fenwear.stick.position import LoadEffect, Position
 from fenwear.stick.state import StickState
 
 PARTS, BODIES = ("punch", "strip", "layer"), 2
@@ -62,6 +62,10 @@ class StickCreep:
         """Return the state at the start: nothing has crept."""
         return np.zeros(sum(self._sizes()))
 
+    def unloaded(self) -> Array:
+        """Return v of all parts where nothing presses (size,)."""
+        return np.zeros(sum(self._numbers))
+
     @property
     def _numbers(self) -> list[int]:
         """Of each y."""
@@ -84,6 +88,20 @@ class StickCreep:
         forces, by_loads = y.reshape(2, *shape)
         return np.asarray(self.behind[part].apply(forces) + by_loads)
 
+    def of_contact(self, position: Position, f: Array, moved: tuple[Array, Array], loaded: LoadEffect) -> Array:
+        """Return v of all parts (size,).
+
+        Args:
+            position: Of the strip.
+            f: Tractions in the frame (d n,), MPa.
+            moved: Displacements of punch and strip by them at once, mm.
+            loaded: The loads.
+        """
+        push, back = position.forces(f)
+        punch = self.elastic(push, moved[0], loaded.forced_punch)
+        strip = self.elastic(-back, moved[1], loaded.forced_strip)
+        return np.concatenate([punch, strip, self.closure * f[: len(self.closure)]])
+
     def elastic(self, forces: Array, moved: Array, by_loads: Array | float) -> Array:
         """Return v of a body (size,), as its states are.
 
@@ -96,25 +114,26 @@ class StickCreep:
             return np.asarray(moved + by_loads).ravel()
         return np.concatenate([forces.ravel(), np.broadcast_to(by_loads, forces.shape).ravel()])
 
-    def displaced(self, state: Array, duration: float = 0.0) -> Displaced:
-        """Return what a state moves, at the end of a step of this duration that it is the beginning of."""
+    def displaced(self, state: Array, elastic: Array | None = None, duration: float = 0.0) -> Displaced:
+        """Return what a state, and v at the begin of a step of this duration, move at its end; now without a step."""
         found = []
-        for part, (law, y) in enumerate(zip(self.laws, self.parted(state), strict=True)):
-            left = law.compliances * np.exp(-duration / law.times)
-            found.append(self.displacement(part, left @ y) if law.creeps else np.zeros(self.shapes[part]))
+        ends = self.after(state, self.unloaded() if elastic is None else elastic, self.unloaded(), duration)
+        for part, (law, y) in enumerate(zip(self.laws, self.parted(ends), strict=True)):
+            found.append(self.displacement(part, law.compliances @ y) if law.creeps else np.zeros(self.shapes[part]))
         return found[0], found[1], found[2]
 
-    def after(self, state: Array, elastic: Sequence[Array], duration: float) -> Array:
-        """Return the state after a step, in which each part has v (size,)."""
-        found = []
-        for law, y, v in zip(self.laws, self.parted(state), elastic, strict=True):
-            taken = -np.expm1(-duration / law.times)
-            found.append((y + taken[:, None] * (v - y)).ravel())
+    def after(self, state: Array, begin: Array, end: Array, duration: float) -> Array:
+        """Return the state after a step over which v of all parts (size,) changes evenly."""
+        found, cuts = [], np.cumsum(self._numbers)[:-1]
+        for law, y, u, v in zip(self.laws, self.parted(state), np.split(begin, cuts), np.split(end, cuts), strict=True):
+            at_begin, at_end = law.shares(duration)
+            left = np.exp(-duration / law.times)[:, None] * y
+            found.append((left + at_begin[:, None] * u + at_end[:, None] * v).ravel())
         return np.concatenate(found)
 
     def factors(self, duration: float) -> list[float]:
         """Return the compliance of each part in a step, over that at once; in the end for an infinite duration."""
-        return [float(law.growth(duration)) for law in self.laws]
+        return [1.0 + float(law.shares(duration)[1] @ law.compliances) for law in self.laws]
 
     def grown(self, position: Position, duration: float) -> Position:
         """Return a place of the strip with compliances as they are at the end of a step; the last ones are kept."""

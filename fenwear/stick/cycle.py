@@ -365,7 +365,9 @@ def on_other_grid(
     loaded = after.expanded(interface.loaded(step.fraction).times(at.load), step.offset)
     opening, pressure = after.opening(position, worn), _at(contact.pressure, nodes)
     traction = _along(contact.traction, nodes)
-    force, back = position.forces(np.concatenate([pressure, traction.T.ravel()]))
+    f = np.concatenate([pressure, traction.T.ravel()])
+    force, back = position.forces(f)
+    moved = interface.punch.apply(force), -interface.strip.apply(back)
     beside = None
     if contact.beside is not None:
         old = before.interface.position(before.program.steps[at.next_step - 1].offset)
@@ -377,10 +379,11 @@ def on_other_grid(
         gap=on_nodes(contact.gap, nodes, opening),
         slip=_along(contact.slip, nodes),
         approach=_at(contact.approach, nodes),
-        on_punch=loaded.on_punch + interface.punch.apply(force),
-        on_strip=loaded.on_strip + at.imposed.strain * interface.bulk - interface.strip.apply(back),
+        on_punch=loaded.on_punch + moved[0],
+        on_strip=loaded.on_strip + at.imposed.strain * interface.bulk + moved[1],
         trial=_along(contact.trial, nodes),
         crept=worn.crept,
+        elastic=interface.creep.of_contact(position, f, moved, loaded),
         beside=beside,
         flowed=None if contact.flowed is None else _at(contact.flowed, nodes),
     )

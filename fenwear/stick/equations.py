@@ -181,7 +181,7 @@ class Step:
         Of punch, strip and layer: what was there before, and what the loads add in the step.
         """
         duration, state = self.imposed.duration, self.before.crept
-        punch, strip, layer = creep.displaced(state, duration)
+        punch, strip, layer = creep.displaced(state, self.before.elastic, duration)
         loaded, factors = self.imposed.loaded, creep.factors(duration)
         punch, strip = punch + (factors[0] - 1) * loaded.forced_punch, strip + (factors[1] - 1) * loaded.forced_strip
         return (punch, strip, layer), creep.displaced(state)
@@ -301,15 +301,10 @@ class Step:
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
         moved = found.moved or self._moved(f, found.jump)
-        crept = self.before.crept
+        crept, elastic = self.before.crept, self.before.elastic
         if self.creep.creeps:
-            loaded, (push, back) = self.imposed.loaded, self.position.forces(f)
-            elastic = (
-                self.creep.elastic(push, moved.on_punch, loaded.forced_punch),
-                self.creep.elastic(-back, moved.on_strip, loaded.forced_strip),
-                self.creep.closure * pressure,
-            )
-            crept = self.creep.after(crept, elastic, self.imposed.duration)
+            elastic = self.creep.of_contact(self.position, f, (moved.on_punch, moved.on_strip), self.imposed.loaded)
+            crept = self.creep.after(crept, self.before.elastic, elastic, self.imposed.duration)
         return StickState(
             pressure,
             traction,
@@ -325,6 +320,7 @@ class Step:
             iterations,
             unique,
             crept=crept,
+            elastic=elastic,
             beside=self.imposed.beside,
             flowed=flowed if self.hardness < np.inf else None,
         )

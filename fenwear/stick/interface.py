@@ -258,4 +258,5 @@ def untouched(interface: OppositeBodies) -> StickState:
         np.zeros(interface.strip.by_load.shape),
         none,
         crept=interface.creep.beginning(),
+        elastic=interface.creep.unloaded(),
     )

@@ -85,6 +85,8 @@ class StickState:
         unique: Whether Newton's method met pieces of one orientation only; else there may be other answers.
         parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
         crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
+        elastic: Displacements by the forces of now of all that may creep, from which it creeps on; empty where nothing
+            does.
         beside: What the strip's supports are moved by beside the displacement (n, d), mm; None for nothing.
         flowed: Depth that the surfaces have flown in the step (n,), mm; None without a hardness.
     """
@@ -104,6 +106,7 @@ class StickState:
     unique: bool = True
     parts: int = 1
     crept: Array = field(default_factory=lambda: STIFF)
+    elastic: Array = field(default_factory=lambda: STIFF)
     beside: Array | None = None
     flowed: Array | None = None
 

@@ -59,7 +59,8 @@ def test_marches_and_jumps_agree(who: str) -> None:
 def test_a_force_relaxes_where_it_sticks() -> None:
     """Held by a tangential displacement, bodies that creep alike let go of its force as their modulus relaxes.
 
-    By the relaxation function that belongs to J, while the load goes on pressing; errors fall with the time steps.
+    By the relaxation function that belongs to J, while the load goes on pressing; errors fall with the time steps'
+    square, as forces change evenly within them.
     """
     creep, wrong = {"terms": [{"compliance": 1.5, "time": 1.0}]}, []
     bars = ({"young": 1000.0, "poisson": 0.2}, {"young": 500.0, "poisson": 0.2})
@@ -79,8 +80,8 @@ def test_a_force_relaxes_where_it_sticks() -> None:
         time = 2 / steps * np.arange(steps + 1)
         exact = forces[0] * (1 + 1.5 * np.exp(-2.5 * time)) / 2.5
         wrong.append(float(np.abs(forces - exact).max() / forces[0]))
-    assert wrong[1] < 0.02
-    assert wrong[0] / wrong[1] == pytest.approx(2, abs=0.2)
+    assert wrong[1] < 3e-4
+    assert wrong[0] / wrong[1] == pytest.approx(4, abs=0.4)
 
 
 def test_a_shape_has_an_end() -> None:

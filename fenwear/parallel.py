@@ -295,9 +295,9 @@ GIB = 2**30  # bytes
 SMALL = GIB  # below which nothing is rejected
 
 
-def free_memory() -> float | None:
-    """Return the memory that this process may still take, bytes; None where the system does not say."""
-    found: list[float] = []
+def free_memory() -> float:
+    """Return the memory that this process may still take, bytes; infinite where the system does not say."""
+    found = [np.inf]
     try:
         lines = Path("/proc/meminfo").read_text("ascii").splitlines()
         found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
@@ -308,7 +308,7 @@ def free_memory() -> float | None:
         found += [] if limit == "max" else [float(limit) - float(used)]
     except (OSError, ValueError):
         pass
-    return min(found) if found else None
+    return min(found)
 
 
 def memory_size(memory: float) -> str:
@@ -331,14 +331,14 @@ def check_memory(comm: MPI.Comm, taken: float, key: str, what: str, advice: str,
         CaseError: it does not fit.
     """
     free = free_on_ranks(comm) if spread else agreed(comm, free_memory())
-    if free is not None and taken > max(free, SMALL):
+    if taken > max(free, SMALL):
         sizes = f"{memory_size(taken)}, but {memory_size(free)} are free"
         raise CaseError(InputError(key, f"{what} takes about {sizes}. {advice}"))
 
 
-def free_on_ranks(comm: MPI.Comm) -> float | None:
-    """Return the memory that all ranks together may still take, bytes; None where a system does not say; collective."""
+def free_on_ranks(comm: MPI.Comm) -> float:
+    """Return the memory that all ranks together may still take, bytes; collective."""
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    found = comm.allgather(free_memory() if node.rank == 0 else 0.0)
+    free = free_memory() if node.rank == 0 else 0.0
     node.Free()
-    return None if None in found else float(sum(one or 0.0 for one in found))
+    return float(comm.allreduce(free))

@@ -145,27 +145,21 @@ def _run(
     resume: bool,
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
-    failure: Exception | None = None
-    begin = time.perf_counter()
-
-    def finish() -> dict[str, Any]:
-        warnings = [*run.all_warnings(), *run.watch.warnings(), *run.told_at_the_end()]
-        seconds = time.perf_counter() - begin
-        ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
-        said = [system.names.told(text) for text in warnings]
-        return run.finish({**ended, "warnings": said, "retries": run.remedies})
-
+    failure: FenwearError | None = None
+    begin, summary = time.perf_counter(), dict[str, Any]()
     with noted as signals:
         try:
             run.march(progress, signals)
-        except ConvergenceError as error:
+        except (ConvergenceError, InterruptedRunError) as error:
             failure = error
-        except InterruptedRunError as error:
-            failure = error
-        summary = finish()  # only a second signal does not wait for it
+        run.close()  # only a second signal does not wait for it
+        if run.last is not None:
+            ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": time.perf_counter() - begin}
+            summary = run.finish(run.last, ended)
     # Who interrupts a run is in a hurry: its figures can be drawn later.
-    if not (isinstance(failure, InterruptedRunError) or agreed(system.comm, signals.received)):
-        summary = run.tell_more(summary, uncertain=failure is None)
+    if run.last is not None and not isinstance(failure, InterruptedRunError):
+        if not agreed(system.comm, signals.received):
+            summary |= run.tell_more(run.last, summary, uncertain=failure is None)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -218,8 +212,7 @@ class _Run:
         start: RunState | None = None
         self.extremes: dict[str, float] = {}  # of all half-cycles so far
         if resume:
-            system, start = checkpoint.load(directory, system)
-            self.extremes = checkpoint.extremes(directory, self.comm)
+            system, start, self.extremes = checkpoint.load(directory, system)
             laid = on_root(self.comm, lambda: grid_of(directory, system))
             if laid is not None and laid != system.pair.punch.grid:  # killed just after it had grown
                 before, system = system, regridded(system, laid)
@@ -263,12 +256,6 @@ class _Run:
         for warning in self._heat_watch.see(system, *known):
             self.log(f"warning: {warning}")
         self.extremes.update(self._heat_watch.numbers)
-
-    def all_warnings(self) -> list[str]:
-        """Return what is to be said of the case, of all stages and of the contact at the end; collective."""
-        if self.last is not None and joined(self.state.contacts) is not None:  # a first half-cycle is no cycle
-            self._see_heat(self.system, self.state)
-        return [*self.warnings, *self._heat_watch.warnings()]
 
     def _open_history(self, after: int | None) -> None:
         if after is not None and not (self.directory / HISTORY).exists():
@@ -418,15 +405,15 @@ class _Run:
             self._on_history(HistoryWriter.flush)
             checkpoint.save(self.directory, self.system, self.state, self.extremes)
 
-    def told_at_the_end(self) -> list[str]:
-        """Return what is to be said of all time steps, and log it."""
-        if self.last is None:
-            return []
-        texts = unique_text(np.concatenate(self.unique)), sliding_text(self.last), passing_text(self.last)
+    def _warnings_at_the_end(self, last: Block) -> list[str]:
+        """Return the warnings of the case, of all stages and half-cycles; log those of all time steps; collective."""
+        if joined(self.state.contacts) is not None:  # a first half-cycle is no cycle
+            self._see_heat(self.system, self.state)
+        texts = unique_text(np.concatenate(self.unique)), sliding_text(last), passing_text(last)
         found = [*(text for text in texts if text), *self._level.missed(self.state.half_cycle)]
         for warning in found:
             self.log(f"warning: {warning}")
-        return found
+        return [*self.warnings, *self._heat_watch.warnings(), *self.watch.warnings(), *found]
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
@@ -446,27 +433,28 @@ class _Run:
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
         return f"{reached}, to resume: --resume{how}"
 
-    def finish(self, how: dict[str, Any]) -> dict[str, Any]:
-        """Write the checkpoint first, then the results of a run, and return the summary; collective."""
+    def close(self) -> None:
+        """Write the rest of the history; collective."""
         self._on_history(HistoryWriter.close)
-        if self.last is None:
-            return {}
+
+    def finish(self, last: Block, how: dict[str, Any]) -> dict[str, Any]:
+        """Write the checkpoint first, then fields and summary of a run, and return the summary; collective."""
+        said = [self.system.names.told(text) for text in self._warnings_at_the_end(last)]
         self._save()
+        how |= {"warnings": said, "retries": self.remedies}
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
-            self._write_fields(self.last)
+            self._write_fields(last)
         how |= self._level.summary(self.system, self.state, self.log)
-        if reason := self._note_growth(self.last):
+        if reason := self._note_growth(last):
             how["no_growth_rate"] = reason
-        summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
+        summary = summarise(self.system, last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         return summary
 
-    def tell_more(self, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
-        """Tell the uncertainty of what is written, draw it, and return the summary with it; collective."""
-        if self.last is None:
-            return summary
+    def tell_more(self, last: Block, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
+        """Estimate the uncertainty of what is written, draw it, and return the summary with it; collective."""
         if uncertain and self.case.output.uncertainty:
-            summary |= self._uncertainty(self.last)
+            summary |= self._uncertainty(last)
             on_root(self.comm, lambda: write_summary(self.directory, summary))
         if self.case.output.report:
             from fenwear.report.page import try_report  # plotting libraries, which few runs of many need

@@ -80,7 +80,7 @@ def test_of_both_bodies() -> None:
     np.testing.assert_allclose(contact.pressure[0], pressure, rtol=1e-9)
     fields = body_fields(system, contact.pressure[0], contact.rigid[0], 0, None)
     for field, far, moved in zip(fields, (2.0, -3.0), (-APPROACH / 4, 3 * APPROACH / 4), strict=True):
-        displacement = field.displacement
+        displacement = field["displacement"]
         z = displacement.function_space.tabulate_dof_coordinates()[:, 1]
         exact = moved + pressure / E * (far - z)
         np.testing.assert_allclose(displacement.x.array[1::2], exact, atol=1e-9 * APPROACH)

@@ -133,24 +133,18 @@ class Results(Written):
             "Solids and rings, in place of the plane variables": others,
             "Coatings; names of the strip's variables end in _strip": between.of_coated("punch"),
             "Creep; names of the strip's variables end in _strip": between.of_creeping("punch"),
-            "Cycles as tables, in solids": steps.TABLE_VARIABLES,
+            "Cycles as tables, in solids": steps.OF_TABLE,
             "Rough surfaces; names of the strip's variables end in _strip": roughness.of_body("punch"),
-            "With contact.law = coulomb": steps.VARIABLES,
-            "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,
+            "With contact.law = coulomb": steps.IN_STEPS,
+            "With contact.law = coulomb and heat": steps.OF_HEAT,
             "With contact.law = coulomb in solids, further or in place of these": steps.of_solids(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"
             yield from _table(
                 ("variable", "over", "unit", "meaning"),
-                ((_code(n), ", ".join(d), u, _plain(text)) for n, d, u, text in self._rows(variables)),
+                ((_code(one.name), ", ".join(one.dims), one.unit, _plain(one.long_name)) for one in variables),
             )
-
-    @staticmethod
-    def _rows(variables: Any) -> Iterable[tuple[str, tuple[str, ...], str, str]]:
-        if isinstance(variables, dict):
-            return [(name, *one) for name, one in variables.items()]
-        return [(one.name, one.dims, one.unit, one.long_name) for one in variables]
 
 
 class Cases(Written):

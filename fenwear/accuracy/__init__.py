@@ -29,7 +29,7 @@ limit may be a singularity or a step that wear has left, 1. What the coarser run
 friction and wear coefficients, is no part of it.
 """
 
-from fenwear.accuracy.told import (
+from fenwear.accuracy.contributions import (
     Uncertainty,
     foreseen,
     uncertainty,

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from mpi4py import MPI
 
 from fenwear.case import builtin_cases
 from fenwear.cli import suggestions
-from fenwear.cli.base import JsonOption, app, print_json, show
+from fenwear.cli.base import JsonOption, answer, app, print_json
 from fenwear.parallel import on_root
 
 
@@ -37,45 +37,34 @@ def info_command(
 
     geometries = ready_geometries()
     if key in geometries:
-        if as_json:
-            print_json({"geometry": asdict(geometries[key])})
-        else:
-            show(geometries[key].text())
-        return
-    if key and (Path(key).is_file() or "/" in key):
-        _list_file(Path(key), as_json=as_json)
-        return
-    if key:
+        answer({"geometry": asdict(geometries[key])}, geometries[key].text, as_json=as_json)
+    elif Path(key).is_file() or "/" in key:
+        from fenwear.files.formats import listed_file
+
+        text, content = on_root(MPI.COMM_WORLD, lambda: listed_file(Path(key)))
+        answer(content, lambda: text, as_json=as_json)
+    elif key:
         found = find_keys(key)
-        if as_json:
-            print_json({"keys": [asdict(k) for k in found]})
-        else:
-            show("\n".join(k.text() for k in found))
-            if key == "geometry.file":
-                ready = (f"  {name:22} {geometry.title}" for name, geometry in geometries.items())
-                show("\n".join(("ready ones (fenwear info NAME lists their parameters):", *ready)))
-        return
-    if as_json:
-        print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
-        return
-    for name, version in versions().items():
-        show(f"{name:14} {version}")
-    state = kept.summary()
-    show(f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}")
-    show("\nbuilt-in cases:")
-    for name, title in builtin_cases().items():
-        show(f"  {name:26} {title}")
-
-
-def _list_file(path: Path, *, as_json: bool) -> None:
-    """Print what a file of another program has."""
-    from fenwear.files.formats import listed_file
-
-    text, content = on_root(MPI.COMM_WORLD, lambda: listed_file(path))
-    if as_json:
-        print_json(content)
+        texts = [k.text() for k in found]
+        if key == "geometry.file":
+            texts.append("ready ones (fenwear info NAME lists their parameters):")
+            texts += [f"  {name:22} {geometry.title}" for name, geometry in geometries.items()]
+        answer({"keys": [asdict(k) for k in found]}, lambda: "\n".join(texts), as_json=as_json)
     else:
-        show(text)
+        stack = {"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()}
+        answer(stack, lambda: _stack_text(**stack), as_json=as_json)
+
+
+def _stack_text(versions: dict[str, str], cases: dict[str, str], kept: dict[str, Any]) -> str:
+    """Return the versions of the stack, the kept set-ups and the built-in cases for people."""
+    return "\n".join(
+        (
+            *(f"{name:14} {version}" for name, version in versions.items()),
+            f"\nkept set-ups: {kept['files']} files, {kept['MiB']:g} of {kept['limit_MiB']:g} MiB in {kept['folder']}",
+            "\nbuilt-in cases:",
+            *(f"  {name:26} {title}" for name, title in cases.items()),
+        )
+    )
 
 
 @app.command("schema")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TextIO
@@ -127,6 +127,14 @@ def show_results(found: str | dict[str, Any], where: str) -> None:
         print_json(found)
     if not first:
         log(where)
+
+
+def answer(data: dict[str, Any], text: Callable[[], str], *, as_json: bool) -> None:
+    """Print what was asked for: as one JSON object, or its text."""
+    if as_json:
+        print_json(data)
+    else:
+        show(text())
 
 
 def print_json(data: dict[str, Any]) -> None:

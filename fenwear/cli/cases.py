@@ -10,7 +10,7 @@ import typer
 from mpi4py import MPI
 
 import fenwear
-from fenwear.case import Case, plausibility_warnings
+from fenwear.case import plausibility_warnings
 from fenwear.cli import suggestions
 from fenwear.cli.base import (
     DEFAULT_CASE,
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from fenwear.progress import How
 
 HEAT_SECONDS = 60.0  # that `check` looks at the heat
-
-
 WARNING = "warning: "
 
 
@@ -122,13 +120,13 @@ def check_command(
 
 def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: bool, full: bool) -> None:
     """Validate a case and say what it comes to."""
-    from fenwear.assembly import elastic, law_named, place_case, resources_of
+    from fenwear.assembly import assemble, elastic, law_named, place_case, resources_of
     from fenwear.law_choice import choose_law, with_law
     from fenwear.run import level_of
 
     loaded = load(case, settings)
     if loaded.sticks:
-        _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy, full=full)
+        _check_stick(assemble(with_law(loaded, "coulomb")), accuracy=accuracy, full=full)
         return
     level_of(loaded)
     placed = place_case(loaded)
@@ -140,7 +138,7 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
         loaded = with_law(loaded, choice.law)
         if choice.law == "coulomb":
             stuck = law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False)
-            _check_stick(loaded, stuck, accuracy=accuracy, full=full)
+            _check_stick(stuck, accuracy=accuracy, full=full)
             return
         system = replace(system, case=loaded)
     _check_sliding(system, heat_seconds, accuracy=accuracy, full=full)
@@ -224,20 +222,49 @@ def _foresee(system: Tribosystem) -> None:
     log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {uncertainty_text(system, found)}")
 
 
-def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: bool, full: bool) -> None:
-    """Tell what the first cycle of a case with stick comes to."""
-    from fenwear.assembly import assemble
-    from fenwear.cli.partial_slip import check_text
-
-    system = system or assemble(case)
-    text = check_text(case, system)
-    for warning in plausibility_warnings(case):
+def _check_stick(system: Tribosystem, *, accuracy: bool, full: bool) -> None:
+    """Say what the first cycle of a case with stick comes to."""
+    text, warnings = check_text(system)
+    for warning in plausibility_warnings(system.case):
         log(f"{WARNING}{warning}")
     if full:
-        print_case(case)
+        print_case(system.case)
     log(text)
+    for warning in warnings:
+        log(f"{WARNING}{warning}")
     if accuracy:
         _foresee(system)
+
+
+def check_text(system: Tribosystem) -> tuple[str, list[str]]:
+    """Return what a system with stick comes to in its first cycle, and the warnings; collective.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        ConvergenceError: a time step did not converge.
+    """
+    from fenwear.plausibility import RULES, Seen, law_warnings, unique_text
+    from fenwear.results.steps import REGIMES, regime_of
+    from fenwear.stick.interface import meshed
+    from fenwear.stick.records import TimeStepRecords
+
+    system.check_touching()
+    problem = system.law_state.problem
+    setup = meshed(problem.interface).needs.text()
+    records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
+    thick, weights = system.case.model.thickness, problem.weights
+    stuck = float(weights @ records.sticking.all(axis=0)) / float(weights @ (records.pressure > 0).any(axis=0))
+    seen = Seen.of_pressure(system, records.pressure, "in the first cycle")
+    texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown", "large")]
+    warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
+    text = (
+        f"{setup}\n"
+        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
+        f"first cycle: {REGIMES[regime_of(records, stuck)]}, "
+        f"tangential force up to {thick * abs(records.force).max():.4g} N, of the contact "
+        f"{100 * stuck:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
+    )
+    return text, [warning for warning in warnings if warning]
 
 
 @app.command("new")

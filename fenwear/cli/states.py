@@ -9,17 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+import numpy as np
 import typer
 
 from fenwear.case import plausibility_warnings
 from fenwear.case.program import held_at
-from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, answer, app, load, log, show
 from fenwear.errors import CaseError, ConvergenceError, InputError
 
 if TYPE_CHECKING:
-    from fenwear.assembly import Tribosystem
+    from fenwear.assembly import ContactSetup, Tribosystem
     from fenwear.cycle import RunningIn, SteadyState
     from fenwear.initial_shape import InitialShape
+    from fenwear.optimum import Optimum
+    from fenwear.stick.final import FinalShape
 
 T = TypeVar("T")
 StepOption = Annotated[
@@ -31,8 +34,8 @@ StepOption = Annotated[
     ),
 ]
 
-CARRIED = {"normal_force": "load", "friction_force": "friction force", "friction_torque": "torque of friction"}
-SIZES = ("contact_width", "contact_area", "mean_pressure")
+SIZES = ("largest_pressure", "mean_pressure", "contact_width", "contact_area")
+CARRIED = ("normal_force", "friction_force", "friction_torque")
 FOLLOWED = 16  # phases a cycle, up to which the way to the steady state is sought: with many it takes minutes
 
 
@@ -62,48 +65,37 @@ def steady_command(
     if of_step:
         system = with_case(system, held_case)
     if system.sticks:
-        _print_final(case, system, as_json=as_json)
+        _show_final(case, system, as_json=as_json)
         return
     if of_step:
         system = with_reduced_heat(system, keep=True, fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    forces, gain, warnings = _forces(state), *_gain_and_warnings(system, state)
-    if not as_json:
-        _print_steady(case, state, forces, of_step)
-    uncertain: dict[str, Any] = {}
+    found = {**({"of": of_step} if of_step else {}), **_state_json(state), **_forces(state), **_gain(system, state)}
+    if not as_json:  # the way to it may take longer
+        show(_steady_text(case, state, found))
+        sys.stdout.flush()
     if accuracy:
-        uncertain = _unless_failed("its uncertainty", lambda: _uncertain(state), uncertain)
+        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), {})
     way = time.perf_counter()
     rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
-    short = len(state.system.motion.phases) <= FOLLOWED
-    cycles = None
+    short, cycles = len(state.system.motion.phases) <= FOLLOWED, None
     if rate < 0 and short:
         cycles = _unless_failed("the way there", lambda: running_in(state.system, state, 0.01), cycles)
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
-    in_all = time.perf_counter() - begin
-    if not as_json:
-        _print_way(rate, short, cycles, seconds, in_all)
-        return
-    print_json(
-        {
-            **({"of": of_step} if of_step else {}),
-            **_state_json(state),
-            "growth_rate_per_s": rate,
-            "heat_gain": gain,
-            **{name: values for name, (_, values) in forces.items()},
-            "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
-            "cycles_to_1_percent_uncertainty": None if cycles is None else round(cycles.uncertainty),
-            **uncertain,
-            "seconds": state.seconds,
-            "all_seconds": {**seconds, "in_all": in_all},
-            "warnings": warnings,
-        }
-    )
+    seconds["in_all"] = time.perf_counter() - begin
+    found |= {
+        "growth_rate_per_s": rate,
+        "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
+        "cycles_to_1_percent_uncertainty": None if cycles is None else round(cycles.uncertainty),
+        "seconds": state.seconds,
+        "all_seconds": seconds,
+    }
+    answer(found, lambda: _way_text(rate, short, cycles, seconds), as_json=as_json)
 
 
-def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float | None, list[str]]:
-    """Return the thermoelastic feedback and the warnings of a state, and print the warnings."""
+def _gain(system: Tribosystem, state: SteadyState) -> dict[str, Any]:
+    """Return the thermoelastic feedback and the warnings of a state, and log the warnings."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
     from fenwear.plausibility import fineness_warnings, steady_warnings
@@ -119,7 +111,7 @@ def _gain_and_warnings(system: Tribosystem, state: SteadyState) -> tuple[float |
     ]
     for warning in warnings:
         log(f"warning: {warning}")
-    return gain, warnings
+    return {"heat_gain": gain, "warnings": warnings}
 
 
 def _state_json(state: SteadyState) -> dict[str, Any]:
@@ -163,19 +155,78 @@ def _uncertain(state: SteadyState) -> dict[str, Any]:
     return {"uncertainty": uncertainty_table(state.system, found)}
 
 
-def _print_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
-    """Print the shape to which partial slip wears."""
-    from fenwear.cli.partial_slip import final_of, final_text
+def _show_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
+    """Show the shape to which partial slip wears."""
     from fenwear.plausibility import final_warnings
 
-    found, numbers = final_of(system.case, system)
+    found, numbers = final_of(system)
     numbers["warnings"] = final_warnings(found)
     for warning in numbers["warnings"]:
         log(f"warning: {warning}")
-    if as_json:
-        print_json(numbers)
-    else:
-        show(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
+    answer(numbers, lambda: f"end of the wear of {name} in partial slip\n{final_text(numbers)}", as_json=as_json)
+
+
+def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
+    """Return the final shape of partial slip, and its key numbers; collective.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        ConvergenceError: nothing sticks.
+    """
+    from fenwear.cycle.totals import approach
+    from fenwear.results.quantity import degrees_of
+    from fenwear.sliding.chart import sliding_chart
+
+    system.check_touching()
+    found, case = system.contact_law.end(system), system.case
+    problem = found.system.law_state.problem
+    solid = case.model.kind == "solid"
+    pair, weights = problem.interface.middle.pair, problem.weights
+    x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
+    scar, seen = x[found.depth > 0], np.einsum("id,id->i", pair.normal, approach(problem.interface.middle.rigid))
+    size, worn, unit = ("stick_area", "worn_volume", "mm3") if solid else ("stick_width", "worn_area", "mm2")
+    of_size = "mm2" if solid else "mm"
+    numbers = {
+        f"{size}_{of_size}": found.size,
+        f"{size}_within_{of_size}": found.within,
+        "scar_from_mm": float(scar.min()) if len(scar) else None,
+        "scar_to_mm": float(scar.max()) if len(scar) else None,
+        "largest_depth_mm": float(found.depth.max()),
+        "largest_depth_between_mm": found.deepest,
+        f"{worn}_{unit}": float(weights @ found.depth),
+        f"{worn}_between_{unit}": found.volume,
+        "largest_pressure_MPa": float(found.pressure.max()),
+        "normal_force_N": case.model.thickness * float((weights * found.pressure) @ seen),
+        **coordinates(found.system),
+        "pressure": found.pressure.tolist(),
+        "depth": found.depth.tolist(),
+    }
+    if found.temperature is not None:
+        degrees = degrees_of(case)
+        for body, values in zip(("punch", "strip"), degrees.of(found.temperature), strict=True):
+            numbers[f"temperature_{body}_{degrees.unit}"] = values.tolist()
+    return found, numbers
+
+
+def final_text(numbers: dict[str, Any]) -> str:
+    """Return the key numbers of a final shape as a table: each with the interval that the node spacing leaves."""
+    from fenwear.results.sheet import LINES, OF_CONTACT, columns_text, shown
+
+    rows = [("scar along the sliding, from (mm)", [numbers["scar_from_mm"]]), ("... to (mm)", [numbers["scar_to_mm"]])]
+    for key, line in (LINES | OF_CONTACT).items():
+        if key in numbers and "within" not in key:
+            name, _, unit = key.rpartition("_")
+            value, within = numbers[key], numbers.get(f"{name}_within_{unit}", 0.0)
+            ends = numbers.get(f"{name}_between_{unit}", (value - within, value + within) if within else ())
+            rows.append((line.heading, [shown(one, line) for one in (value, *ends)]))
+    for key, values in numbers.items():
+        if key.startswith("temperature_"):
+            _, body, unit = key.split("_")
+            rows.append((f"largest temperature of the {body}'s contact ({unit.replace('deg', '°')})", [max(values)]))
+    text = columns_text(("value", "at least", "at most"), rows)
+    return (
+        f"{text}\nThe stick zone carries all of the load. Its largest pressure rises as nodes come closer to its edges."
+    )
 
 
 def _number(step: int | None) -> int | None:
@@ -183,18 +234,15 @@ def _number(step: int | None) -> int | None:
     return None if step is None else step - 1
 
 
-def _forces(state: SteadyState) -> dict[str, tuple[str, Any]]:
-    """Return what the contact carries in each half-cycle of a state, by names: the unit, and values."""
+def _forces(state: SteadyState) -> dict[str, Any]:
+    """Return the sizes and forces of the contact in each half-cycle of a state, and its nominal pressure, by names."""
     from fenwear.cycle.steady_cycle import cycle_of_state
     from fenwear.results.registry import quantities_of
     from fenwear.results.summary import nominal_pressure
 
     known, records = quantities_of(state.system), cycle_of_state(state)
-    found = {
-        name: (known[name].unit, known[name].compute(records).tolist()) for name in (*SIZES, *CARRIED) if name in known
-    }
-    nominal = nominal_pressure(state.system, state.system.normal_force)
-    return {**found, **{name: ("MPa", value) for name, value in nominal.items()}}
+    found = {name: known[name].compute(records).tolist() for name in (*SIZES, *CARRIED) if name in known}
+    return {**found, **nominal_pressure(state.system, state.system.normal_force)}
 
 
 def coordinates(system: Tribosystem) -> dict[str, Any]:
@@ -206,73 +254,66 @@ def coordinates(system: Tribosystem) -> dict[str, Any]:
     return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
-def _print_steady(case: str, state: SteadyState, forces: dict[str, tuple[str, Any]], step: str) -> None:
-    """Print the state as soon as it is there: the way to it may take longer."""
+def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
+    """Return a state as a table, a column for each sliding direction."""
     from fenwear.cycle.state import pressure_scale
     from fenwear.results.quantity import degrees_of
+    from fenwear.results.registry import quantities_of
+    from fenwear.results.sheet import LINES, OF_CONTACT, columns_text, shown
 
-    show(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
-    if step:
-        show(f"  of {step}")
-    system = state.system
-    part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
-    words, moves = system.direction_words, "turns" if any(system.sliding.field.turn) else "moves"
-    for k, (d, p, width) in enumerate(zip(state.directions, state.pressure, state.contact_width, strict=True)):
-        show(f"  strip {moves} {words[d]:9} largest pressure {p.max():8.3f} MPa, "
-              f"mean {forces['mean_pressure'][1][k]:.3f} MPa, contact {part.format(width)}")  # fmt: skip
-        own = [f"{what} {forces[name][1][k]:.5g} {forces[name][0]}" for name, what in CARRIED.items() if name in forces]
-        show(f"    {', '.join(own)}")
-    if "nominal_pressure" in forces:
-        show(f"  nominal pressure {forces['nominal_pressure'][1]:.4f} MPa: load over the projected area")
-    scale = pressure_scale(system, state.phase_pressure)
-    show(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
+    system, lines, degrees = state.system, LINES | OF_CONTACT, degrees_of(state.system.case)
+    known = quantities_of(system)
+    keys = {name: known[name].key for name in (*SIZES, *CARRIED) if name in found}
+    rows = [(lines[key].heading, [shown(one, lines[key]) for one in found[name]]) for name, key in keys.items()]
     wear, surface = 1e3 * state.wear_per_cycle, system.pair.weights * (state.wear_per_cycle > 0)
-    mean = (surface @ wear) / (surface.sum() or 1.0)
-    show(f"  wear per cycle {mean:.4g} µm on average, {wear.max():.4g} µm at most; "
-          + _velocities(state.velocity, "per cycle"))  # fmt: skip
-    if state.passes:
-        times = "once" if state.passes == 1 else f"{state.passes} times"
-        show(f"  material properties are those at these temperatures, updated {times}")
+    in_all = {
+        "nominal pressure: load over the projected area (MPa)": found.get("nominal_pressure"),
+        "pressure scale: integral of p² over integral of p (MPa)": pressure_scale(system, state.phase_pressure),
+        "wear per cycle, mean (µm)": float(surface @ wear) / (float(surface.sum()) or 1.0),
+        "... largest (µm)": float(wear.max()),
+        **{f"{name} ({_unit(name)} per cycle)": value for name, value in state.velocity.items()},
+    }
     if state.heat is not None:
-        degrees = degrees_of(system.case)
-        punch, strip = (degrees.of(body.max()) for body in (state.heat.punch, state.heat.strip))
-        unit = degrees.shown
-        show(f"  largest temperature at the contact: punch {punch:.3f} {unit}, strip {strip:.3f} {unit}")
-    sys.stdout.flush()
+        for body, warm in (("punch", state.heat.punch), ("strip", state.heat.strip)):
+            in_all[f"largest temperature of the {body}'s contact ({degrees.shown})"] = float(degrees.of(warm).max())
+    rows += [(label, [value]) for label, value in in_all.items() if value is not None]
+    title = f"cyclic steady state of {case} ({state.iterations} Newton iterations)"
+    of_step = [f"of {found['of']}"] if "of" in found else []
+    if state.passes:
+        of_step.append(f"material properties updated {state.passes} times to these temperatures")
+    return "\n".join([title, *of_step, columns_text([system.direction_words[d] for d in state.directions], rows)])
 
 
-def _print_way(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float], in_all: float) -> None:
-    """Print how the state is reached, and where the time went."""
+def _way_text(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float]) -> str:
+    """Return how the state is reached, and where the time went."""
     if math.isnan(rate):
-        show("  its stability and the way there are not known, see the warning")
+        text = "its stability and the way there are not known, see the warning"
     elif rate > 0:
-        show(
-            f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state; "
-            "it may be one of several"
+        text = (
+            f"unstable: disturbances grow at {rate:.3g} 1/s. A run moves away from this state; it may be one of several"
         )
     elif not followed:
-        show('  the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so')
+        text = 'the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so'
     elif cycles is None:
-        show("  pressure within 1 % of the pressure scale: not found within ten million cycles from the initial shape")
+        text = "pressure within 1 % of the pressure scale: not found within ten million cycles from the initial shape"
     else:
         digit = 10 ** math.floor(math.log10(max(cycles.uncertainty, 1)))  # no more are known
         number, wrong = (digit * round(one / digit) for one in (cycles.cycles, cycles.uncertainty))
         about = f"after about {number:,} ± {wrong:,} cycles"
-        show(f"  pressure within 1 % of the pressure scale {about} from the initial shape")
-    show(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
-          f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
+        text = f"pressure within 1 % of the pressure scale {about} from the initial shape"
+    setup, state, way, in_all = (_duration(one) for one in seconds.values())
+    return f"{text}\n{in_all} in all: meshes and operators {setup}, steady state {state}, the way there {way}"
 
 
 def _duration(seconds: float) -> str:
     return f"{1e3 * seconds:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
 
 
-def _velocities(velocity: dict[str, float], per: str) -> str:
+def _unit(mode: str) -> str:
+    """Return the unit of a rigid motion."""
     from fenwear.interface import is_translation
 
-    units = {name: "mm" if is_translation(name) else "rad" for name in velocity}
-    separator = "/" if len(per) == 1 else " "
-    return ", ".join(f"{name} = {value:.5g} {units[name]}{separator}{per}" for name, value in velocity.items())
+    return "mm" if is_translation(mode) else "rad"
 
 
 @app.command("optimum")
@@ -301,25 +342,26 @@ def optimum_command(
         )
         raise CaseError(InputError("punch.supports", reason))
     found = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
-    if as_json:
-        x = system.pair.x.tolist()
-        print_json(
-            {
-                n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
-                for n, o in found.items()
-            }
-            | ({"of": of_step} if of_step else {})
-        )
-        return
-    if of_step:
-        show(f"of {of_step}")
-    for name, state in found.items():
-        show(f"{name:9}  {_velocities(state.velocity, 's')}")
-        for end in (0, -1):
-            chi = math.degrees(state.tilt[end])
-            names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
-            at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
-            show(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")
+    x = system.pair.x.tolist()
+    data: dict[str, Any] = {
+        name: {**one.velocity, "x": x, "pressure": one.pressure.tolist(), "chi": one.tilt.tolist()}
+        for name, one in found.items()
+    }
+    answer(data | ({"of": of_step} if of_step else {}), lambda: _optimum_text(system, found, of_step), as_json=as_json)
+
+
+def _optimum_text(system: ContactSetup, found: dict[str, Optimum], of_step: str) -> str:
+    """Return the optima of both directions as a table, with the pressure and the angle at both ends of the contact."""
+    from fenwear.results.sheet import columns_text
+
+    states = list(found.values())
+    rows = [(f"{name} ({_unit(name)}/s)", [one.velocity[name] for one in states]) for name in states[0].velocity]
+    for end in (0, -1):
+        names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
+        at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
+        rows.append((f"pressure at {at} mm (MPa)", [float(one.pressure[end]) for one in states]))
+        rows.append((f"angle chi at {at} mm (degrees)", [math.degrees(one.tilt[end]) for one in states]))
+    return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(found), rows)])
 
 
 SAME = 1e-6  # of the pressure scale
@@ -355,32 +397,33 @@ def shape_command(
         system = with_reduced_heat(system, keep=True)
     shape = initial_shape(system, wanted)
     on_root(system.comm, lambda: write_shape(output, loaded, shape))
-    if as_json:
-        rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
-        known = [{"largest_pressure": pressure, "left_to_run_in": left} for pressure, left in rows]
-        numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}
-        print_json({**coordinates(system), **numbers, "uneven_wear": shape.uneven_wear})
-        return
-    _print_shape(case, wanted, shape)
+    rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
+    known = [{"largest_pressure": pressure, "left_to_run_in": left} for pressure, left in rows]
+    numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}
+    data = {**coordinates(system), **numbers, "uneven_wear": shape.uneven_wear}
+    answer(data, lambda: _shape_text(case, wanted, shape), as_json=as_json)
     log(f"profile, surface and case in {output}; next: fenwear run {output / 'case.toml'}")
 
 
-def _print_shape(case: str, wanted: list[tuple[float, float]], shape: InitialShape) -> None:
-    """Print how deep a shape to machine is, and its pressures under each load."""
-    show(f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep")
-    show(f"  made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale")
-    for (factor, share), state, p, left in zip(
-        wanted, shape.states, shape.largest_pressure, shape.left_to_run_in, strict=True
-    ):
-        at = "" if len(wanted) == 1 else f" at {factor:g} of the loads, {share:g} of the sliding"
-        worn = f"{state.pressure.max():.3f} MPa once worn in"
-        if math.isnan(p):
-            show(f"  largest pressure{at}: {worn}, and as warm as then from the start")
-        else:
-            change = "the same" if left < SAME else f"differ by {100 * left:.2g} % at most"
-            show(f"  largest pressure{at}: {p:.3f} MPa in the first cycle, {worn} ({change})")
+def _shape_text(case: str, wanted: list[tuple[float, float]], shape: InitialShape) -> str:
+    """Return how deep a shape to machine is, and its pressures under each load."""
+    from fenwear.results.sheet import columns_text
+
+    rows = [
+        ("largest pressure in the first cycle (MPa)", [None if math.isnan(p) else p for p in shape.largest_pressure]),
+        ("largest pressure once worn in (MPa)", [float(state.pressure.max()) for state in shape.states]),
+        ("largest difference of both, of the pressure scale (%)", [100 * round(x, 6) for x in shape.left_to_run_in]),
+    ]
+    lines = [
+        f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep",
+        f"made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale",
+        columns_text([f"load {factor:g}:{share:g}" for factor, share in wanted], rows),
+    ]
     if shape.uneven_wear > SAME:
-        show(f"  the loads reach different zones: their wear together is uneven by {100 * shape.uneven_wear:.2g} %")
+        lines.append(
+            f"the loads reach different zones: their wear together is uneven by {100 * shape.uneven_wear:.2g} %"
+        )
+    return "\n".join(lines)
 
 
 def _load_of(text: str) -> tuple[float, float]:

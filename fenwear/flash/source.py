@@ -317,7 +317,7 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
         raise CaseError(
             InputError("program", "expected none with contact.law = 'coulomb', where a cycle is done again")
         )
-    system, state = checkpoint.load(directory, assemble(case))
+    system, state, _ = checkpoint.load(directory, assemble(case))
     until = state.half_cycle + system.motion.half_cycles
     blocks = list(march(system, until, implicit=True, start=state))
     steps_of = [one for block in blocks for one in block.steps if isinstance(one, Steps)]

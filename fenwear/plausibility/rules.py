@@ -25,7 +25,7 @@ from fenwear.plausibility import meshes
 from fenwear.plausibility.boundary import Chamfers, Limits, contact_chamfers, contact_limits, opened, thickness
 from fenwear.plausibility.elastic import TAKEN_UP, elastic_share, elastic_way, large, stroke_amplitude
 from fenwear.plausibility.meshes import Fields
-from fenwear.results import between
+from fenwear.results.registry import quantities_of
 from fenwear.results.summary import factor, net_of, shakedown_limit
 from fenwear.sliding.wear import WornDepths
 
@@ -184,8 +184,8 @@ def _balances(made: Made, block: Block) -> dict[str, Array]:
     if system.bodies.followed is None:  # else on other meshes
         lost, worn = block.totals.of("volume_punch"), block.wear @ system.pair.weights
         found["worn volume"] = made.error("worn volume", lost - system.bodies.punch.thickness * worn, lost)
-    debris = between.values(block).get("debris_balance_error")
-    return found if debris is None else {**found, "debris": debris}
+    debris = quantities_of(block.system).get("debris_balance_error")
+    return found if debris is None else {**found, "debris": debris.compute(block)}
 
 
 def unbalanced(seen: Seen) -> Fields:

@@ -15,11 +15,10 @@ from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, InputError
 from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import read_history
-from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
+from fenwear.report.key_numbers import ALL_LINES, flat, line_of, number_text, read_case, read_summary
 from fenwear.report.lines import fields_of, tracks_of, worn_range
 from fenwear.report.stick import loop_of
 from fenwear.report.style import (
-    by_powers,
     direction_words,
     from_zero,
     legend_beside,
@@ -33,7 +32,7 @@ from fenwear.report.surface import gaps_of, model_of, part_lines
 from fenwear.results.disk import finite, writing
 from fenwear.results.quantity import in_kelvin
 from fenwear.results.reading import by_cycles, resolves
-from fenwear.results.sheet import BODIES, LINES, shown
+from fenwear.results.sheet import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,18 +90,16 @@ class Comparison:
         return "\n\n".join(parts)
 
     def named(self) -> dict[str, dict[str, list[Any]]]:
-        """Return the results by their names and units: the sheet, values at the same places, and the rest."""
-        of_sheet: dict[str, list[Any]] = {}
-        rest = {key: row for key, row in self.numbers.items() if not key.rpartition(".")[2].startswith(OF_EACH)}
-        for part in ("sliding", *BODIES):
-            for key, line in LINES.items():
-                row = rest.pop(f"{part}.{key}", [])
-                unit = f" ({line.unit})" if line.unit else ""
-                of = "" if part == "sliding" else f", {part}"
-                if row:
-                    of_sheet[f"{line.label}{of}{unit}"] = [shown(value, line) for value in row]
-        further = {_name(key): row for key, row in rest.items()}
-        return {"results": of_sheet, "at the same places": at_same_places(self.histories), "further": further}
+        """Return the results by their names and units, and values at the same places."""
+        results = {}
+        for path, row in self.numbers.items():
+            of, _, key = path.rpartition(".")
+            if not key.startswith(OF_EACH):
+                line = line_of(path)
+                suffix = f", {of}" if key in ALL_LINES and of not in ("", "sliding") else ""
+                heading = line._replace(label=line.label + suffix).heading
+                results[heading] = [shown(value, line) if isinstance(value, float) else value for value in row]
+        return {"results": results, "at the same places": at_same_places(self.histories)}
 
 
 def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
@@ -122,11 +119,6 @@ def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
         for k, x in enumerate(places):
             found[f"{field.label} at x = {x:.4g} mm"] = [float(row[k]) for row in rows]
     return found
-
-
-def _name(key: str) -> str:
-    unit = unit_of(key)
-    return f"{label_of(key)} ({unit})" if unit else label_of(key)
 
 
 def compare(directories: Sequence[Path]) -> Comparison:
@@ -210,7 +202,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
             ax.set_xlabel(line.across)
             ax.set_ylabel(line.up)
             if line.across == "half-cycle n":
-                by_powers(ax)
+                ax.set_xscale("log")
             if line.from_zero:
                 from_zero(ax)
             if line.ends is not None:

@@ -18,7 +18,6 @@ from fenwear.report.style import (
     RED,
     STANDARD,
     Style,
-    by_powers,
     direction_style,
     from_zero,
     legend_beside,
@@ -157,7 +156,7 @@ def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) ->
                 level_line(ax, *known[line.variable])
         ax.set_ylabel(panel.label.format(temperature_unit(history)))
         if panel.begins == "powers":
-            by_powers(ax, "y")
+            ax.set_yscale("log")
         elif panel.begins == "zero":
             from_zero(ax)
         legend_beside(ax, "" if panel.lines[0].of_bodies else strip_moves(history))
@@ -374,7 +373,7 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: boo
     first, last = float(x[0]), float(x[-1])
     slows_down = int(history.half_cycle[-1]) > 10_000 or "largest_temperature" not in history
     if logarithmic and slows_down and first > 0 and last > MANY * first:
-        by_powers(ax)
+        ax.set_xscale("log")
         ax.set_xlim(first, last)
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)

@@ -14,17 +14,19 @@ from fenwear.report.course import course_figures
 from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.lines import (
     LATE,
+    OF_CYCLES,
     between_of,
     chosen_half_cycles,
     fields_of,
     lines_figure,
+    nearest_half_cycles,
     profile_figure,
     that_wear,
     wear_map_figure,
     with_late_pressures,
 )
 from fenwear.report.maps import has_tracks, map_figure, tracks_figure, with_surfaces
-from fenwear.report.stick import stick_figures
+from fenwear.report.stick import stick_figures, with_sums
 from fenwear.report.style import STANDARD, Style, direction_words, name_bodies, save, strip_moves, wrapped
 from fenwear.report.surface import cut_places, gaps_of, model_of, part_lines, sides_of
 from fenwear.results.disk import write_text
@@ -51,9 +53,6 @@ TEXTS = {
     "plus and minus µ p. Grey: µ times the cycle's largest pressure.",
     "traction_map": "Size and direction of the tangential traction at four times of the first and of the last cycle.",
     "sliding": "Slip of each place in a cycle, its work of friction, and the largest stress in the strip's surface.",
-    "slip_map": "Slip of each place in the first and the last cycle.",
-    "friction_work_map": "Work of friction of each place in the first and the last cycle.",
-    "stress_map": "Largest stress along the sliding in the strip's surface in the first and the last cycle.",
     "energy": "(a) Work of friction in a half-cycle and (b) its ratio to the loop's box, with the border of gross "
     "sliding, over the {axis}.",
     "profiles": "Surface profiles of {bodies}, unworn and worn, at {chosen}. Heights, or the depths of round "
@@ -118,8 +117,19 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
     draw = _on_surfaces if model_of(history) == "solid" else _along_lines
     drawn = draw(history, chosen, look) | course_figures(history, look)
     if resolves(history):
-        drawn |= stick_figures(by_cycles(history), look)
+        drawn |= _of_cycles(history, chosen, look)
     return wrapped(drawn)
+
+
+def _of_cycles(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
+    """Return the figures of time steps, and slip, work and stress of whole cycles."""
+    cycles = by_cycles(history)
+    sums, drawn = with_sums(history, cycles), stick_figures(cycles, look)
+    fields = [field for field in OF_CYCLES if field.variable in sums]
+    ends = nearest_half_cycles(sums, chosen)
+    if model_of(history) == "solid":
+        return drawn | {f"{one.variable}_map": map_figure(sums, one, [ends[0], ends[-1]], look) for one in fields}
+    return drawn | {"sliding": lines_figure(sums, fields, ends, look)}
 
 
 def _on_surfaces(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
@@ -208,4 +218,5 @@ def _mapped(history: xarray.Dataset) -> dict[str, str]:
     """Return the titles of what there are maps of, by the variable."""
     text = "height of the {} over its smooth shape, without the form of its scar (S-F, ISO 25178),"
     rough = {f"surface{end}": text.format(body) for body, end in BODIES.items()}
-    return {name: field.title for name, field in fields_of(history).items()} | rough
+    of_cycles = {one.variable: one.title for one in OF_CYCLES}
+    return {name: field.title for name, field in fields_of(history).items()} | rough | of_cycles

@@ -12,7 +12,7 @@ from fenwear.case.names import Names
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 from fenwear.results.reading import in_current_names
-from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, shown
+from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, Line, shown
 
 UNITS = {
     "_per_s": "1/s",
@@ -26,6 +26,7 @@ UNITS = {
     "_mJ": "mJ",
     "_seconds": "s",
 }
+ALL_LINES = LINES | OF_CONTACT
 NO_NUMBERS = ("contributions", "untold", "remedies", "seconds")  # of the table of uncertainties
 SMALL = 0.01  # of an uncertainty: shares that are left out
 ANSWERS = ("worn_volume_mm3", "largest_depth_", "largest_pressure_MPa", "largest_pressure_in_cycle", "mean_pressure",
@@ -116,15 +117,12 @@ def flat(tables: Any, prefix: str = "") -> dict[str, Any]:
     return {path: value for key, inner in pairs for path, value in flat(inner, key).items()}
 
 
-def unit_of(path: str) -> str:
-    """Return the unit that a name along the path ends with, "" where there is none."""
-    names = [name.partition("[")[0] for name in path.split(".")]
-    return next((unit for name in names for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
-
-
-def label_of(path: str) -> str:
-    """Return a path in words, without its unit."""
-    return ", ".join(words_of(name) for name in path.split("."))
+def line_of(path: str) -> Line:
+    """Return the words and the unit of a number by its path in a summary: those of the sheet where that has it."""
+    names = path.split(".")
+    units = (unit for name in names for end, unit in UNITS.items() if name.partition("[")[0].endswith(end))
+    plain = Line(", ".join(map(words_of, names)), next(units, ""))
+    return ALL_LINES.get(path) or ALL_LINES.get(names[-1], plain)
 
 
 def number_text(value: Any, digits: int = 5) -> str:
@@ -138,48 +136,54 @@ def number_text(value: Any, digits: int = 5) -> str:
     return f"{value:,.{digits}g}".replace("-", "−")
 
 
-class Answer(NamedTuple):
-    """A number that a run was made for: in words and in the unit in which it is read, with its uncertainty.
+class Number(NamedTuple):
+    """A number of the report.
 
     Attributes:
-        key: Of the number in summary.json.
-        number: In the unit of its key.
+        path: In summary.json.
+        value: There.
         label: In words.
-        unit: Of value and uncertainty.
-        value: As text.
+        unit: In which it is read.
+        text: What is read of it.
         uncertainty: As text; "" where it is not known.
         sources: What makes most of the uncertainty.
     """
 
-    key: str
-    number: float
+    path: str
+    value: float
     label: str
     unit: str
-    value: str
+    text: str
     uncertainty: str = ""
     sources: str = ""
 
+    @classmethod
+    def of(cls, path: str, value: float, key: str) -> Number:
+        """Return a number as it is read, in the words of a key."""
+        line = line_of(key)
+        return cls(path, value, line.label, line.unit, number_text(shown(value, line)))
 
-def answers(summary: Mapping[str, Any]) -> list[Answer]:
+
+def answers(summary: Mapping[str, Any]) -> list[Number]:
     """Return what a run was made for: how much is worn and where, pressures and temperatures, with uncertainties."""
     given = summary.get(UNCERTAINTY, {})
     numbers, sources = flat(summary), {source: flat(own) for source, own in given.get("contributions", {}).items()}
     uncertain = flat({key: value for key, value in given.items() if key not in NO_NUMBERS})
-    lines, rows = {**LINES, **OF_CONTACT}, []
+    rows = []
     for path, value in numbers.items():
         of, _, key = path.rpartition(".")
-        if path.startswith((UNCERTAINTY, "contacts.")) or not key.startswith(ANSWERS) or key not in lines:
+        if path.startswith((UNCERTAINTY, "contacts.")) or not key.startswith(ANSWERS) or key not in ALL_LINES:
             continue
-        line, within = lines[key], uncertain.get(path, 0.0)
+        within = uncertain.get(path, 0.0)
         parts = sorted(((own.get(path, 0.0), source) for source, own in sources.items()), reverse=True)
         most = [f"{s.replace('_', ' ')} {100 * part / within:.0f} %" for part, s in parts if part > SMALL * within > 0]
-        digits, text = 5, ""
+        line, digits, text = ALL_LINES[key], 5, ""
         if within and value:
             within = max(within, ROUNDED * abs(value))
             digits = min(max(2 + math.floor(math.log10(abs(value) / within)), 1), 5)
             text = number_text(shown(float(f"{within:.1e}"), line))
         label, read = f"{words_of(key)}, {of}" if of else words_of(key), number_text(shown(value, line), digits)
-        rows.append(Answer(key, value, label, line.unit, read, text, ", ".join(most)))
+        rows.append(Number(path, value, label, line.unit, read, text, ", ".join(most)))
     return rows
 
 
@@ -206,13 +210,14 @@ def states(summary: Mapping[str, Any]) -> list[str]:
 def first_screen(summary: Mapping[str, Any], directory: Path) -> str:
     """Return the end of a run as lines for people: the largest number of each kind, its state, warnings and files."""
     rows, given = answers(summary), summary.get(UNCERTAINTY, {})
-    kinds = [[row for row in rows if row.unit and row.key.startswith(start)] for start in SHOWN_FIRST]
-    first = [max(kind, key=lambda row: row.number) for kind in kinds if kind]
+    named = [(row.path.rpartition(".")[2], row) for row in rows if row.unit]
+    kinds = [[row for key, row in named if key.startswith(start)] for start in SHOWN_FIRST]
+    first = [max(kind, key=lambda row: row.value) for kind in kinds if kind]
     wide = max((len(row.label) for row in first), default=0)
     lines = [f"{summary['half_cycles']:,} half-cycles: {summary['stop']}"]
     for row in first:
         within = f" ± {row.uncertainty}" if row.uncertainty else ""
-        lines.append(f"  {row.label:{wide}}  {row.value}{within} {row.unit}")
+        lines.append(f"  {row.label:{wide}}  {row.text}{within} {row.unit}")
     lines += [f"Uncertainty from the {s.replace('_', ' ')}: {why}" for s, why in given.get("untold", {}).items()]
     if any(row.uncertainty for row in first):
         lines += [f"To lower the uncertainty: {'; '.join(sorted(set(given['remedies'].values())))}"]
@@ -229,7 +234,7 @@ def words_of(name: str) -> str:
     bare, bracket, index = name.partition("[")
     words = LABELS.get(bare)
     if words is None:
-        line = {**LINES, **OF_CONTACT}.get(bare)
+        line = ALL_LINES.get(bare)
         stem = bare.removesuffix(next((suffix for suffix in UNITS if bare.endswith(suffix)), ""))
         words = stem.replace("_", " ") if line is None or line.label.startswith(("...", "at ")) else line.label
     return words + bracket + index

@@ -73,6 +73,14 @@ class Field(NamedTuple):
         return f"{self.title} ({self.unit})" if self.unit != "1" else self.title
 
 
+# Of cycles with time steps: `fenwear.report.stick.with_sums` adds them up.
+OF_CYCLES = (
+    Field("cycle_slip", "punch", "slip in a cycle", "µm", 1e3, "YlGnBu"),
+    Field("cycle_work", "punch", "work of friction in a cycle", "µJ/mm²", 1e3, "YlOrRd"),
+    Field("cycle_stress", "punch", "largest stress along the sliding in the strip's surface", "MPa", 1.0, "cividis"),
+)
+
+
 def fields_of(history: xarray.Dataset) -> dict[str, Field]:
     """Return what a history has at the nodes of a contact, by the variable."""
     warm = temperature_unit(history)
@@ -82,6 +90,7 @@ def fields_of(history: xarray.Dataset) -> dict[str, Field]:
         *(Field(f"wear{end}", body, f"worn depth of the {body}", "µm", 1e3, "YlOrBr") for body, end in BODIES.items()),
         *(Field(f"temperature_{b}", "punch", f"temperature of the {b}", warm, colours="YlOrRd") for b in BODIES),
         *(Field(f"surface{end}", b, f"height of the {b}", "µm", 1e3, "cividis") for b, end in BODIES.items()),
+        *OF_CYCLES,
         *between_of(history).values(),
     ]
     return {field.variable: field for field in found if field.variable in history}

@@ -63,7 +63,7 @@ def map_figure(history: xarray.Dataset, field: Field, half_cycles: Sequence[int]
     if field.variable == "pressure" and one_way(history):
         arrows = [surface.arrow(int(d)) for d in history.direction.sel(half_cycle=list(half_cycles)).values]
         titles = [title.replace("\n", f" {arrow}\n") for title, arrow in zip(titles, arrows, strict=True)]
-    figure, axes = map_panels(surface, titles, look)
+    figure, axes = map_panels(surface, titles, look, within=_reached(history, field.body))
     fill_maps(surface, axes, values, label, look, levels=levels, colours=field.colours, extend=extend)
     if field.variable == "pressure":
         for k, ax in enumerate(axes):
@@ -71,6 +71,14 @@ def map_figure(history: xarray.Dataset, field: Field, half_cycles: Sequence[int]
             if values[k].min() < level < values[k].max():
                 surface.contours(ax, values[k], filled=False, levels=[level], colors="black", linewidths=1.0)
     return figure
+
+
+def _reached(history: xarray.Dataset, body: str) -> Mask:
+    """Return which nodes of a body's surface touch or wear in a run (n,); all where none does."""
+    end = BODIES[body]
+    names = [name for name in (f"wear{end}", "pressure" if body == "punch" else "") if name in history]
+    found: Mask = np.any([(history[name].values > 0).any(axis=0) for name in names], axis=0)
+    return found if found.any() else np.ones_like(found)
 
 
 def _size(field: Field, values: Array) -> str:
@@ -96,7 +104,7 @@ def map_panels(
 
     seen = surface.map if within is None else surface.map[within]
     low, high = seen.min(axis=0), seen.max(axis=0)
-    room = (0.03 if within is None else MARGIN) * float((high - low).max()) + 1e-9
+    room = (0.03 if within is None or within.all() else MARGIN) * float((high - low).max()) + 1e-9
     size, count = high - low + 2 * room, len(titles)
     fitting = 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3
     columns = min(count, columns or fitting, 2 if look.width < NARROW and not columns else count)

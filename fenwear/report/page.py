@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import xarray
 
@@ -17,22 +17,12 @@ from fenwear.errors import CaseError, OutputError
 from fenwear.report.bodies import DrawingError, draw_pictures
 from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
-from fenwear.report.key_numbers import (
-    answers,
-    flat,
-    label_of,
-    names_in,
-    number_text,
-    read_case,
-    read_summary,
-    states,
-    unit_of,
-)
+from fenwear.report.key_numbers import Number, answers, flat, names_in, read_case, read_summary, states
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.registry import known
-from fenwear.results.sheet import BODIES, LINES, OF_CONTACT, UNCERTAINTY, shown
+from fenwear.results.sheet import BODIES, UNCERTAINTY
 
 REPORT = "report.html"
 WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise", "cyclically")
@@ -89,16 +79,6 @@ def try_report(directory: Path, log: Callable[[str], None]) -> None:
         log(f"warning: no report of the run: {error}; to try again: python -m fenwear plot {directory}")
 
 
-class Number(NamedTuple):
-    """A number of the page: its path in summary.json, its exact value, and what is read of it."""
-
-    path: str
-    label: str
-    value: float
-    text: str
-    unit: str
-
-
 def page(directory: Path, look: Style = STANDARD) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
@@ -126,14 +106,6 @@ def page(directory: Path, look: Style = STANDARD) -> str:
     )
 
 
-def _number(path: str, value: float, label: str, key: str) -> Number:
-    """Return a number as it is read: as the sheet has it, where it is one of its lines."""
-    line = (LINES | OF_CONTACT).get(key)
-    if line is not None:
-        return Number(path, label or line.label, value, number_text(shown(value, line)), line.unit)
-    return Number(path, label or label_of(key), value, number_text(value), unit_of(path))
-
-
 def numbers_of(summary: Mapping[str, Any]) -> dict[str, float]:
     """Return every number of a summary by its path."""
     left_out = ("versions", "warnings", "retries", UNCERTAINTY)
@@ -145,7 +117,7 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
     """Return all numbers of a summary in tables, by their captions; of a run without one those of its history."""
     if not summary:
         found = [known(name) for name in AT_LAST if name in history]
-        last = [_number(one.key, float(history[one.name][-1]), "", one.key) for one in found]
+        last = [Number.of(one.key, float(history[one.name][-1]), one.key) for one in found]
         return {"At the last recorded half-cycle": last}
     numbers, places = numbers_of(summary), summary.get("x_mm", [])
     starts = {"sliding": "Quantities that a tribometer measures", **{body: body.capitalize() for body in BODIES}}
@@ -158,10 +130,11 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
         bare, _, place = path.rstrip("]").partition("[")
         start = next((one for one in starts if path.startswith(f"{one}.")), "")
         if place:
-            label = f"{label_of(bare)} at x = {places[int(place)]:.4g} mm" if places else ""
-            tables["Along the contact"].append(_number(path, value, label, path))
+            at = f" at x = {places[int(place)]:.4g} mm" if places else ""
+            row = Number.of(path, value, bare)
+            tables["Along the contact"].append(row._replace(label=row.label + at))
         else:
-            tables[starts.get(start, "The run")].append(_number(path, value, "", path[len(start) :].lstrip(".")))
+            tables[starts.get(start, "The run")].append(Number.of(path, value, path.removeprefix(f"{start}.")))
     return {text: rows for text, rows in tables.items() if rows}
 
 

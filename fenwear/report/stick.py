@@ -9,8 +9,8 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
-from fenwear.report.lines import Track
-from fenwear.report.maps import even_levels, fill_maps, map_panels
+from fenwear.report.lines import OF_CYCLES, Track
+from fenwear.report.maps import map_panels
 from fenwear.report.style import (
     BLUE,
     RED,
@@ -18,7 +18,6 @@ from fenwear.report.style import (
     Style,
     colour_bar,
     contact_axis,
-    from_zero,
     legend_beside,
     panels,
     shades,
@@ -47,9 +46,8 @@ def stick_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, 
     """
     found = {"loops": loops(history, look), "tractions": tractions(history, look)}
     if model_of(history) == "solid":
-        found |= {"zones": zone_maps(history, look), "traction_map": traction_maps(history, look)}
-        return found | {f"{name}_map": summed_map(history, look, name) for name in summed(history)}
-    return found | {"zones": zones(history, look), "sliding": sliding(history, look)}
+        return found | {"zones": zone_maps(history, look), "traction_map": traction_maps(history, look)}
+    return found | {"zones": zones(history, look)}
 
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
@@ -167,53 +165,22 @@ def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     return figure
 
 
-SUMMED = {
-    "slip": ("slip in a cycle (µm)", "YlGnBu"),
-    "friction_work": ("work of friction in a cycle (µJ/mm²)", "YlOrRd"),
-    "stress": ("largest stress along the sliding in the strip's surface (MPa)", "RdBu_r"),
-}
+def with_sums(history: xarray.Dataset, cycles: xarray.Dataset) -> xarray.Dataset:
+    """Return the ends of cycles of a history with slip (mm), friction work (mJ/mm²) and largest stress (MPa) of each.
 
-
-def summed(history: xarray.Dataset) -> dict[str, Array]:
-    """Return slip (µm), work of friction (µJ/mm²) and largest stress (MPa) of each cycle (k, n), as far as known."""
-    pairs = [(history[f"traction{end}"], history[f"slip{end}"]) for end in ("", "_across") if f"slip{end}" in history]
+    Args:
+        history: Of half-cycles.
+        cycles: The same by cycles.
+    """
+    pairs = [(cycles[f"traction{end}"], cycles[f"slip{end}"]) for end in ("", "_across") if f"slip{end}" in cycles]
     work: Any = sum(traction * slip for traction, slip in pairs)
     squares: Any = sum(slip**2 for _, slip in pairs)
-    slid = (squares**0.5).where(history.pressure > 0, 0)
-    found = {
-        "slip": 1e3 * slid.sum("step").values,
-        "friction_work": -1e3 * work.sum("step").values,
-        "stress": history.surface_stress.max("step").values,
-    }
-    return {name: values for name, values in found.items() if np.isfinite(values).all()}
-
-
-def sliding(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Return slip, work of friction and largest stress of each place in three cycles."""
-    known, track = summed(history), through_middle(history)
-    figure, axes = panels(len(known), 2.3, look=look)
-    for ax, (name, values) in zip(axes, known.items(), strict=True):
-        for colour, place in shades(chosen(history, 3)):
-            ax.plot(*track.line(values[place], "punch"), color=colour, label=look.at(history, place))
-        ax.set_ylabel(SUMMED[name][0])
-        if values.min() >= 0:
-            from_zero(ax)
-        legend_beside(ax, look.of_one)
-    _to_contact(axes[-1], history, track.label)
-    return figure
-
-
-def summed_map(history: xarray.Dataset, look: Style, name: str) -> Figure:
-    """Return maps of one of `summed` in the first and the last cycle."""
-    label, colours = SUMMED[name]
-    surface, places = surface_of(history), first_and_last(history)
-    values = summed(history)[name][places]
-    size = float(np.abs(values).max()) or 1.0
-    titles = [look.in_words(history, place) for place in places]
-    figure, axes = map_panels(surface, titles, look, columns=len(places), within=touched(history))
-    levels = even_levels(-size if values.min() < 0 else 0.0, size)
-    fill_maps(surface, axes, values, label, look, levels=levels, colours=colours)
-    return figure
+    slid = (squares**0.5).where(cycles.pressure > 0, 0)
+    sums = (slid.sum("step").values, -work.sum("step").values, cycles.surface_stress.max("step").values)
+    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
+    ends = history.sel(half_cycle=strokes * cycles.cycle.values)
+    known = {one.variable: (history.pressure.dims, values) for one, values in zip(OF_CYCLES, sums, strict=True)}
+    return ends.assign({name: one for name, one in known.items() if np.isfinite(one[1]).all()})
 
 
 def zone_maps(history: xarray.Dataset, look: Style = STANDARD) -> Figure:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import ascii_lowercase
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -29,8 +29,6 @@ WIDTH = 7.0  # inches
 NARROW = 5.0  # inches: below it letters are smaller
 HIGH_WIDE, HIGH_NARROW = 0.75, 0.5  # of the height of a panel that its axes have
 UNIT = re.compile(r"\((?:[^()]|\([^()]*\))*\)")  # stays in one line
-POWER = re.compile(r"\$\\mathdefault\{(.*?)10\^\{(.*?)\}\}\$")  # as matplotlib writes it
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LETTER = 0.55  # width over height
 SHORTEST = 14  # letters of a line of a label
 ABOVE = 0.5  # inches: the names above the panels of a narrow figure
@@ -293,24 +291,6 @@ def reference_line(ax: Axes, height: float, name: str, at: float = 0.0) -> None:
     ax.axhline(height, color="0.5", linewidth=0.8, linestyle=":", label="_reference")
     ax.annotate(name, (at, height), xycoords=("axes fraction", "data"), xytext=(4, 2), textcoords="offset points",
                 color=GREY, fontsize="small")  # fmt: skip
-
-
-def by_powers(ax: Axes, along: Literal["x", "y"] = "x") -> None:
-    """Have an axis of a panel be logarithmic, its powers written in letters.
-
-    matplotlib's own are formulas, for which it makes a parser and asks it for every one of them.
-    """
-    from matplotlib.ticker import LogFormatterSciNotation
-
-    class Powers(LogFormatterSciNotation):
-        def __call__(self, x: float, pos: int | None = None) -> str:
-            formula = POWER.fullmatch(str(super().__call__(x, pos)))
-            return "" if formula is None else formula[1].replace(r"\times", " × ") + "10" + formula[2].translate(RAISED)
-
-    ax.set(**{f"{along}scale": "log"})
-    axis = ax.xaxis if along == "x" else ax.yaxis
-    axis.set_major_formatter(Powers())
-    axis.set_minor_formatter(Powers())
 
 
 def contact_axis(ax: Axes, label: str = ALONG_CONTACT) -> None:

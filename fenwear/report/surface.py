@@ -36,7 +36,6 @@ EDGEWISE = 0.3  # of a surface's area: what is seen of it along an axis, less of
 OVER = 1.1  # of the area around it: more of what is seen lies over itself
 ASIDE = 0.12  # of the way along an unrolled part: where its name stands, beside what touches
 HALF = 0.5  # of the way around: longer facets go over the cut
-ROUNDING = 1e-9  # of a map's size: of coordinates
 ARROWS = "→↗↑↖←↙↓↘"
 NEAR = 1e-9  # of the contact's length: places are the same
 BACK = 0.5  # of it: where radii begin anew
@@ -209,32 +208,10 @@ class Surface:
         around = np.median(along[ends[:, 0]] - along[ends[:, 1]] + ways)
         return np.vstack([self.map, self.map[again] + np.array([around, 0.0])]), np.append(every, again), cells
 
-    @cached_property
-    def _lattice(self) -> tuple[Array, Array, NDArray[np.int64]] | None:
-        """Coordinates along both axes (a,) and (b,), and the node at each place (b, a), of a map that is a lattice."""
-        size = ROUNDING * max(float(np.ptp(self.map)), 1e-300)
-        places = [np.unique(np.rint(along / size), return_inverse=True)[1] for along in self.map.T]
-        a, b = (int(place.max()) + 1 for place in places)
-        lattice = self.cells.shape[1] == 4 and a * b == len(self.x) and (a - 1) * (b - 1) == len(self.cells)
-        if not lattice or len(self._closed[0]) > len(self.x):
-            return None
-        nodes = np.full((b, a), -1)
-        nodes[places[1], places[0]] = np.arange(len(self.x))
-        spans = [np.ptp(place[self.cells], axis=1).max(initial=0) for place in places]
-        if nodes.min() < 0 or max(spans) > 1:
-            return None
-        return self.map[nodes[0], 0], self.map[nodes[:, 0], 1], nodes
-
     def contours(self, ax: Axes, values: Array, *, filled: bool = True, **how: Any) -> Any:
-        """Draw lines of equal values at the nodes (n,), or the areas between them, and return them.
-
-        On a lattice from line to line, which takes less time than triangles.
-        """
-        if self._lattice is None:
-            triangles, shown = self.drawn(values)
-            return (ax.tricontourf if filled else ax.tricontour)(triangles, shown, **how)
-        x, y, nodes = self._lattice
-        return (ax.contourf if filled else ax.contour)(x, y, values[nodes], **how)
+        """Draw lines of equal values at the nodes (n,), or the areas between them, and return them."""
+        triangles, shown = self.drawn(values)
+        return (ax.tricontourf if filled else ax.tricontour)(triangles, shown, **how)
 
     def drawn(self, values: Array) -> tuple[Triangulation, Array]:
         """Return triangles of the map and values at their corners: four around the middle of each quadrilateral.

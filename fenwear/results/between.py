@@ -15,6 +15,7 @@ contact nodes in the middle of a half-cycle. Its volume is the integral over the
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,106 +25,102 @@ from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.cycle import Block
 from fenwear.cycle.state import RunState
 from fenwear.layers.between import DEBRIS, PLASTIC
-from fenwear.results.quantity import Variable
+from fenwear.results.quantity import RECORD, Quantity
 from fenwear.results.surfaces import EDGE
 from fenwear.sliding.coating import CoatedBody, left_of
 from fenwear.sliding.wear import coefficient
 
-OF_DEBRIS: dict[str, Variable] = {
-    "debris_thickness": (("half_cycle", "x"), "mm", "thickness of the debris between the surfaces at the end"),
-    "largest_debris_thickness": (("half_cycle",), "mm", "largest thickness of the debris at the end"),
-    "debris_volume": (("half_cycle",), "mm3", "volume of the debris between the surfaces at the end"),
-    "ejected_volume": (("half_cycle",), "mm3", "volume of the debris ejected from the start"),
-    "debris_balance_error": (("half_cycle",), "1", "worn volume that is neither stored nor ejected, over the worn one"),
-}
-ON_STRIP: dict[str, Variable] = {
-    "debris_thickness_strip": (("half_cycle", "x_strip"), "mm", "thickness of the debris on the strip at the end"),
-}
-OF_FLOW: dict[str, Variable] = {
-    "plastic_depth": (("half_cycle", "x"), "mm", "depth that has flown beyond the hardness, apart from wear"),
-    "largest_plastic_depth": (("half_cycle",), "mm", "largest depth that has flown beyond the hardness"),
-    "plastic_volume": (("half_cycle",), "mm3", "volume that has flown beyond the hardness, apart from wear"),
-}
+ALONG, ON_STRIP = ("half_cycle", "x"), ("half_cycle", "x_strip")
+
+
+def _areas(block: Block) -> Array:
+    """Return the areas of the contact nodes (n,), mm²."""
+    return np.asarray(block.system.bodies.punch.thickness * block.system.pair.weights)
+
+
+def _row(block: Block, name: str) -> Array:
+    """Return a row of what lies between the surfaces at the contact nodes (k, n)."""
+    return np.asarray(block.between[:, block.system.layers.rows.index(name)])
+
+
+OF_FLOW = (
+    Quantity("plastic_depth", ALONG, "mm", "depth that has flown beyond the hardness, apart from wear",
+             lambda b: _row(b, PLASTIC)),
+    Quantity("largest_plastic_depth", RECORD, "mm", "largest depth that has flown beyond the hardness",
+             lambda b: _row(b, PLASTIC).max(axis=1), of="end"),
+    Quantity("plastic_volume", RECORD, "mm3", "volume that has flown beyond the hardness, apart from wear",
+             lambda b: _row(b, PLASTIC) @ _areas(b), of="end"),
+)  # fmt: skip
+
+
+def _debris(block: Block) -> tuple[Array, Array, Array]:
+    """Return the thickness of stored and of ejected debris (k, m), mm, and the areas that it lies on (m,), mm².
+
+    At the contact nodes, or on the strip's material where that carries it along.
+    """
+    system = block.system
+    if system.layers.strip_carries:
+        return block.carried[:, 0], block.carried[:, 1], system.bodies.punch.thickness * system.carried_areas
+    return _row(block, DEBRIS[0]), _row(block, DEBRIS[1]), _areas(block)
+
+
+def _thickness(block: Block) -> Array:
+    """Return the thickness of debris at the contact nodes (k, n), mm."""
+    stored = _debris(block)[0]
+    carried = block.system.layers.strip_carries
+    return np.asarray(stored @ block.system.pair.wear_interpolation.T if carried else stored)
+
+
+def _balance_error(block: Block) -> Array:
+    """Return the worn volume that is neither stored nor ejected, over the worn one (k,)."""
+    stored, ejected, areas = _debris(block)
+    begun = float(areas.sum()) * block.system.layers.debris.initial
+    fed = begun + sum(block.totals.of(f"volume_{body}") for body in ("punch", "strip"))
+    return np.asarray(np.abs(fed - (stored + ejected) @ areas) / np.maximum(fed, 1e-300))
+
+
+OF_DEBRIS = (
+    Quantity("debris_thickness", ALONG, "mm", "thickness of the debris between the surfaces at the end", _thickness),
+    Quantity("largest_debris_thickness", RECORD, "mm", "largest thickness of the debris at the end",
+             lambda b: _thickness(b).max(axis=1), of="end"),
+    Quantity("debris_volume", RECORD, "mm3", "volume of the debris between the surfaces at the end",
+             lambda b: _debris(b)[0] @ _debris(b)[2], of="end"),
+    Quantity("ejected_volume", RECORD, "mm3", "volume of the debris ejected from the start",
+             lambda b: _debris(b)[1] @ _debris(b)[2], of="end"),
+    Quantity("debris_balance_error", RECORD, "1", "worn volume that is neither stored nor ejected, over the worn one",
+             _balance_error, of="end"),
+)  # fmt: skip
+DEBRIS_ON_STRIP = Quantity("debris_thickness_strip", ON_STRIP, "mm", "thickness of the debris on the strip at the end",
+                           lambda b: _debris(b)[0])  # fmt: skip
 STATE, STATES = "state_", "states"  # how variables of states begin; where summary.json has them
 
 
-def _lying_variables(placed: ContactSetup) -> dict[str, Variable]:
-    """Return the variables of what lies between the surfaces."""
-    layers = placed.layers
-    own = {**(OF_DEBRIS if layers.debris.present else {}), **(OF_FLOW if PLASTIC in layers.rows else {})}
-    if layers.strip_carries:
-        own |= ON_STRIP
-    return {**own, **_of_states(placed)}
-
-
-def _of_states(placed: ContactSetup) -> dict[str, Variable]:
-    memory, found = placed.layers.memory, dict[str, Variable]()
-    for states, over, end, body in (
-        (memory.contact, "x", "", ""),
-        (memory.strip, "x_strip", "_strip", " of the strip"),
+def _of_states(placed: ContactSetup) -> list[Quantity]:
+    """Return the states that laws remember, at the contact nodes and on the strip's material."""
+    layers, memory = placed.layers, placed.layers.memory
+    found = []
+    for states, first, kept, dims, end, body in (
+        (memory.contact, len(layers.rows) - len(memory.contact), "between", ALONG, "", ""),
+        (memory.strip, len(layers.carried_rows), "carried", ON_STRIP, "_strip", " of the strip"),
     ):
-        for name, state in states.items():
+        for number, (name, state) in enumerate(states.items(), first):
             text = f"{name}{body}, a state that a law remembers, at the end"
-            found[f"{STATE}{name}{end}"] = (("half_cycle", over), state.unit, text)
+            compute = partial(_state, kept=kept, number=number)
+            found.append(Quantity(f"{STATE}{name}{end}", dims, state.unit, text, compute))
     return found
 
 
-def _states(block: Block) -> dict[str, Array]:
-    """Return the states of laws by the names of their variables (k, n), on the strip's material (k, n_strip)."""
-    layers = block.system.layers
-    first, own = len(layers.rows) - len(layers.memory.contact), len(layers.carried_rows)
-    found = {f"{STATE}{name}": block.between[:, first + k] for k, name in enumerate(layers.memory.contact)}
-    return found | {f"{STATE}{name}_strip": block.carried[:, own + k] for k, name in enumerate(layers.memory.strip)}
-
-
-def _lying_values(block: Block) -> dict[str, Array]:
-    """Return them for each half-cycle of a block by name: (k,), and (k, n) along the contact."""
-    system, rows = block.system, block.system.layers.rows
-    areas = system.bodies.punch.thickness * system.pair.weights
-    found: dict[str, Array] = {}
-    if PLASTIC in rows:
-        depth = block.between[:, rows.index(PLASTIC)]
-        found = {
-            "plastic_depth": depth,
-            "largest_plastic_depth": depth.max(axis=1),
-            "plastic_volume": depth @ areas,
-        }
-    found |= _states(block)
-    if not system.layers.debris.present:
-        return found
-    if system.layers.strip_carries:
-        areas = system.bodies.punch.thickness * system.carried_areas
-        stored, ejected = block.carried[:, 0], block.carried[:, 1]
-        lies, on_strip = stored @ system.pair.wear_interpolation.T, {"debris_thickness_strip": stored}
-    else:
-        stored, ejected = (block.between[:, rows.index(name)] for name in DEBRIS)
-        lies, on_strip = stored, {}
-    begun = float(areas.sum()) * system.layers.debris.initial
-    fed = begun + sum(block.totals.of(f"volume_{body}") for body in ("punch", "strip"))
-    return {
-        **found,
-        **on_strip,
-        "debris_thickness": lies,
-        "largest_debris_thickness": lies.max(axis=1),
-        "debris_volume": stored @ areas,
-        "ejected_volume": ejected @ areas,
-        "debris_balance_error": np.abs(fed - (stored + ejected) @ areas) / np.maximum(fed, 1e-300),
-    }
+def _state(block: Block, kept: str, number: int) -> Array:
+    return np.asarray(getattr(block, kept)[:, number])
 
 
 def states(last: Block) -> dict[str, dict[str, Any]]:
     """Return mean, smallest and largest of the states that laws remember at the end of a run, for summary.json."""
-    units = {name: unit for name, (_, unit, _) in _of_states(last.system).items()}
+    weights = {ALONG: last.system.pair.weights, ON_STRIP: last.system.pair.strip.weights}
     return {
-        name.removeprefix(STATE): {"unit": units[name], **_extent(_weights(last, name), rows[-1])}
-        for name, rows in _states(last).items()
+        one.name.removeprefix(STATE): {"unit": one.unit, **_extent(weights[one.dims], one.compute(last)[-1])}
+        for one in _of_states(last.system)
     }
-
-
-def _weights(block: Block, name: str) -> Array:
-    """Return the areas of the nodes that a state has values at."""
-    on_strip = _of_states(block.system)[name][0][-1] == "x_strip"
-    return block.system.pair.strip.weights if on_strip else block.system.pair.weights
 
 
 def _extent(weights: Array, values: Array) -> dict[str, float]:
@@ -133,40 +130,41 @@ def _extent(weights: Array, values: Array) -> dict[str, float]:
 
 
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
-SHARES = {"worn_through_of_scar": "scar", "worn_through_of_surface": "surface"}
 
 
-def of_coated(body: str) -> dict[str, Variable]:
-    """Return the variables of a coated body."""
+def of_coated(body: str) -> list[Quantity]:
+    """Return the quantities of a coated body."""
     end = BODIES[body]
-    left = f"coating of the {body} that is left at the end of the half-cycle"
-    text = "share of the {}'s coated {} in which the coating is worn through at the end of the half-cycle"
-    return {
-        f"coating{end}": (("half_cycle", f"x{end}"), "mm", left),
-        **{f"{name}{end}": (("half_cycle",), "1", text.format(body, of)) for name, of in SHARES.items()},
-        f"least_coating{end}": (("half_cycle",), "mm", f"least {left}"),
-    }
+    text = f"coating of the {body} that is left at the end of the half-cycle"
+    through = f"share of the {body}'s coated {{}} in which the coating is worn through at the end of the half-cycle"
+
+    def left(block: Block) -> Array:
+        thickness, _, depth = _coat(block, body)
+        return left_of(thickness, depth)
+
+    def of_scar(block: Block) -> Array:
+        thickness, areas, depth = _coat(block, body)
+        scar = (depth > EDGE * depth.max(axis=1, keepdims=True)) @ areas
+        return np.asarray((depth >= thickness) @ areas / np.maximum(scar, 1e-300))
+
+    def of_surface(block: Block) -> Array:
+        thickness, areas, depth = _coat(block, body)
+        return np.asarray((depth >= thickness) @ areas / max(float(areas.sum()), 1e-300))
+
+    return [
+        Quantity(f"coating{end}", ("half_cycle", f"x{end}"), "mm", text, left),
+        Quantity(f"worn_through_of_scar{end}", RECORD, "1", through.format("scar"), of_scar, of=body),
+        Quantity(f"worn_through_of_surface{end}", RECORD, "1", through.format("surface"), of_surface, of=body),
+        Quantity(f"least_coating{end}", RECORD, "mm", f"least {text}", lambda b: left(b).min(axis=1), of=body),
+    ]
 
 
-def _coating_variables(placed: ContactSetup) -> dict[str, Variable]:
-    """Return the variables of coatings."""
-    coated = zip(BODIES, placed.coatings, strict=True)
-    return {name: one for body, own in coated if own.any() for name, one in of_coated(body).items()}
-
-
-def coating_values(block: Block) -> dict[str, Array]:
-    """Return them for each half-cycle of a block by name: (k,), and (k, n) along the contact."""
-    pair, found = block.system.pair, dict[str, Array]()
-    surfaces = ((pair.weights, block.wear), (pair.strip.weights, block.wear_strip))
-    for end, thickness, (weights, depth) in zip(BODIES.values(), block.system.coatings, surfaces, strict=True):
-        if thickness.any():
-            coated, left = weights * (thickness > 0), left_of(thickness, depth)
-            through = (depth >= thickness) @ coated
-            scar = (depth > EDGE * depth.max(axis=1, keepdims=True)) @ coated
-            found |= {f"coating{end}": left, f"least_coating{end}": left.min(axis=1)}
-            found[f"worn_through_of_scar{end}"] = np.asarray(through / np.maximum(scar, 1e-300))
-            found[f"worn_through_of_surface{end}"] = np.asarray(through / max(float(coated.sum()), 1e-300))
-    return found
+def _coat(block: Block, body: str) -> tuple[Array, Array, Array]:
+    """Return a body's coating (n,), mm, the areas of its coated nodes (n,), mm², and the worn depth (k, n), mm."""
+    system, punch = block.system, body == "punch"
+    thickness = system.coatings[0 if punch else 1]
+    weights = system.pair.weights if punch else system.pair.strip.weights
+    return thickness, weights * (thickness > 0), block.wear if punch else block.wear_strip
 
 
 def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> dict[str, float]:
@@ -226,39 +224,30 @@ def _ends(coated: CoatedBody, depths: Array, cycles: Array) -> tuple[Mask, Array
 ENDS = {"punch": "", "strip": "_strip", "layer": "_layer"}  # how the names of variables end
 
 
-def of_creeping(name: str) -> dict[str, Variable]:
-    """Return the variables of a body or layer that creeps."""
-    end = ENDS[name]
-    depth = f"depth that the {name} has crept at the end of the half-cycle, apart from wear"
+def of_creeping(name: str) -> list[Quantity]:
+    """Return the quantities of a body or layer that creeps."""
+    end, of = ENDS[name], "end" if name == "layer" else name
+    text = f"depth that the {name} has crept at the end of the half-cycle, apart from wear"
     volume = f"volume that the {name} has crept over the contact nodes, at the end of the half-cycle"
-    return {
-        f"creep_depth{end}": (("half_cycle", "x"), "mm", depth),
-        f"creep_volume{end}": (("half_cycle",), "mm3", volume),
-        f"largest_creep_depth{end}": (("half_cycle",), "mm", f"largest {depth}"),
-    }
+
+    def depth(block: Block) -> Array:
+        return np.asarray(block.system.creep.depths(block.crept.T)[name].T)
+
+    return [
+        Quantity(f"creep_depth{end}", ALONG, "mm", text, depth),
+        Quantity(f"creep_volume{end}", RECORD, "mm3", volume, lambda b: depth(b) @ _areas(b), of=of),
+        Quantity(f"largest_creep_depth{end}", RECORD, "mm", f"largest {text}", lambda b: depth(b).max(axis=1), of=of),
+    ]
 
 
-def _creep_variables(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of what creeps."""
-    return {name: one for member in system.creep.members for name, one in of_creeping(member.name).items()}
-
-
-def _creep_values(block: Block) -> dict[str, Array]:
-    """Return them for each half-cycle of a block by name: (k,), and (k, n) along the contact."""
-    system, found = block.system, dict[str, Array]()
-    areas = system.bodies.punch.thickness * system.pair.weights
-    for name, depth in system.creep.depths(block.crept.T).items():
-        found[f"creep_depth{ENDS[name]}"] = depth.T
-        found[f"creep_volume{ENDS[name]}"] = areas @ depth
-        found[f"largest_creep_depth{ENDS[name]}"] = depth.max(axis=0)
-    return found
-
-
-def variables(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of what lies between the surfaces, of coatings and of what creeps."""
-    return {**_lying_variables(system), **_coating_variables(system), **_creep_variables(system)}
-
-
-def values(block: Block) -> dict[str, Array]:
-    """Return the values of these variables for each half-cycle of a block: (k,), and (k, n) along the contact."""
-    return {**_lying_values(block), **coating_values(block), **_creep_values(block)}
+def quantities(system: Tribosystem) -> list[Quantity]:
+    """Return the quantities of what lies between the surfaces, of coatings and of what creeps."""
+    layers = system.layers
+    return [
+        *(OF_FLOW if PLASTIC in layers.rows else ()),
+        *(OF_DEBRIS if layers.debris.present else ()),
+        *([DEBRIS_ON_STRIP] if layers.strip_carries else ()),
+        *_of_states(system),
+        *(one for body, own in zip(BODIES, system.coatings, strict=True) if own.any() for one in of_coated(body)),
+        *(one for member in system.creep.members for one in of_creeping(member.name)),
+    ]

@@ -9,14 +9,11 @@ from __future__ import annotations
 import errno
 import math
 import os
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-
-from mpi4py import MPI
 
 from fenwear.errors import OutputError
 
@@ -35,16 +32,21 @@ def writing(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def writing_together(comm: MPI.Comm, path: Path) -> Iterator[None]:
-    """As `writing`, where all ranks write by a library: one that fails ends all, as they may wait for it."""
-    try:
-        with writing(path):
-            yield
-    except OutputError as error:
-        if comm.size > 1:
-            print(f"fenwear: {error}", file=sys.__stderr__, flush=True)
-            comm.Abort(1)
-        raise
+def replacing(path: Path) -> Iterator[Path]:
+    """Give the path of a new file, which takes the place of an older one as a whole.
+
+    Raises:
+        OutputError: it cannot be written; the older one stays.
+    """
+    part = path.with_name(f"{path.name}.part")
+    with writing(path):
+        try:
+            part.unlink(missing_ok=True)  # a killed run may have left half of one
+            yield part
+            part.replace(path)
+        except (OSError, RuntimeError):
+            part.unlink(missing_ok=True)
+            raise
 
 
 def _reason(error: OSError | RuntimeError) -> str:
@@ -71,14 +73,8 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         OutputError: it cannot be written; the older one stays.
     """
-    part = path.with_name(f"{path.name}.part")
-    with writing(path):
-        try:
-            part.write_text(text, "utf-8")
-            part.replace(path)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
+    with replacing(path) as part:
+        part.write_text(text, "utf-8")
 
 
 def check_room(folder: Path, size: int) -> None:
@@ -89,13 +85,3 @@ def check_room(folder: Path, size: int) -> None:
     """
     with writing(folder), tempfile.TemporaryFile(dir=folder) as file:
         os.posix_fallocate(file.fileno(), 0, size)
-
-
-def claim(path: Path, size: int) -> None:
-    """Make a file that many bytes longer, on the disk: writing there cannot fail for lack of room.
-
-    Raises:
-        OSError: there is no room.
-    """
-    with path.open("ab") as file:
-        os.posix_fallocate(file.fileno(), file.tell(), size)

@@ -7,7 +7,7 @@ NetCDF on the nodes, for fenwear's own pictures.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,8 +30,8 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
 from fenwear.results import netcdf
-from fenwear.results.disk import check_room, writing
-from fenwear.results.quantity import KELVIN, degrees_of
+from fenwear.results.disk import check_room, replacing, writing
+from fenwear.results.quantity import degrees_of
 from fenwear.results.vtkhdf import append, step_of
 from fenwear.sliding.wear import WornDepths
 
@@ -53,25 +53,9 @@ MEANINGS = {
 AXES = {2: ("x", "z"), 3: ("x", "y", "z")}
 
 
-@dataclass(frozen=True)
-class BodyFields:
-    """The fields of one body: functions on its nodes.
-
-    Attributes:
-        displacement: mm.
-        out_of_plane: Displacement along y, around the axis of rings, mm; None where no traction acts along it.
-        stress: Its components by `STRESS`, MPa; in rings x, y and z are r, around and z.
-        von_mises: Equivalent stress, MPa.
-        temperature: K; None without heat.
-        heat_flux: -k grad theta, mW/mm²; None without heat.
-    """
-
-    displacement: fem.Function
-    out_of_plane: fem.Function | None
-    stress: fem.Function
-    von_mises: fem.Function
-    temperature: fem.Function | None
-    heat_flux: fem.Function | None
+# Functions on the nodes of a body by the names above: displacement, stress by `STRESS` (in rings x, y and z are r,
+# around and z) and von Mises stress; out of the plane only where a traction acts along it, the last two only with heat.
+Fields = dict[str, fem.Function]
 
 
 def body_fields(
@@ -82,7 +66,7 @@ def body_fields(
     temperatures: tuple[Array, Array] | None,
     friction_ratio: Array | None = None,
     worn: WornDepths | None = None,
-) -> tuple[BodyFields, BodyFields]:
+) -> tuple[Fields, Fields]:
     """Return the fields of the punch and the strip; collective.
 
     Args:
@@ -96,12 +80,9 @@ def body_fields(
     """
     traction = friction_ratio
     traction = _traction(system, phase, pressure, temperatures, worn) if traction is None else in_space(traction)
-    punch, strip = (
-        _solve(elastic, load, modes, heat, None if temperatures is None else temperatures[k])
-        for k, ((elastic, load, modes), heat) in enumerate(
-            zip(_loaded(system, phase, pressure, rigid, traction), system.bodies.heat or (None, None), strict=True)
-        )
-    )
+    warm = [] if temperatures is None else list(zip(system.bodies.heat, temperatures, strict=False))
+    loaded = _loaded(system, phase, pressure, rigid, traction)
+    punch, strip = (_solve(*body, given) for body, given in zip_longest(loaded, warm))
     return punch, strip
 
 
@@ -111,7 +92,7 @@ def displacements(
     """Return punch and strip, each with its displacement (mm) before any heat, as `body_fields`; collective."""
     traction = _traction(system, phase, pressure, None, None)
     loaded = _loaded(system, phase, pressure, rigid, traction)
-    return tuple((elastic, _displacement(elastic, load, modes)) for elastic, load, modes in loaded)
+    return tuple((elastic, _displacement(elastic, load, modes, np.zeros(1))) for elastic, load, modes in loaded)
 
 
 def _loaded(
@@ -143,36 +124,30 @@ def _traction(
     return system.friction_in_space(phase, mu)
 
 
-def _solve(
-    elastic: ElasticBody,
-    load: Array,
-    rigid: Array,
-    heat: HeatBody | None,
-    temperature: Array | None,
-) -> BodyFields:
+def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody, Array] | None) -> Fields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
-    theta = change = None
-    thermal: Array | float = 0.0
-    if heat is not None and temperature is not None:
-        theta = heat.function(temperature)
+    found: Fields = {}
+    change, thermal = None, np.zeros(1)
+    if warm is not None:
+        heat, temperature = warm
         change = heat.function(temperature - heat.heat.initial)
         coupling = elastic.thermal_coupling(heat.space)
         thermal = times(coupling, change.x.array[: heat.owned])
         coupling.destroy()
-    displacement = _displacement(elastic, load, rigid, thermal)
+        found["temperature"] = theta = heat.function(temperature)
+        found["heat_flux"] = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (elastic.dim,))
+    found["displacement"] = displacement = _displacement(elastic, load, rigid, thermal)
     out_of_plane = None
     if elastic.dim == 2 and load[:, 1].any():
         out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, elastic.on_trace(load)[:, 1])
+        found["displacement_out_of_plane"] = out_of_plane
     components = _stress(elastic, displacement, out_of_plane, change)
-    stress = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
-    von_mises = _interpolated(_von_mises(*components), elastic, "von_mises", ())
-    flux = None
-    if heat is not None and theta is not None:
-        flux = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (elastic.dim,))
-    return BodyFields(displacement, out_of_plane, stress, von_mises, theta, flux)
+    found["stress"] = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
+    found["von_mises"] = _interpolated(_von_mises(*components), elastic, "von_mises", ())
+    return found
 
 
-def _displacement(elastic: ElasticBody, load: Array, rigid: Array, thermal: Array | float = 0.0) -> fem.Function:
+def _displacement(elastic: ElasticBody, load: Array, rigid: Array, thermal: Array) -> fem.Function:
     """Return a body's displacement (mm) under such forces, and those of its heat (owned,), N/mm; collective."""
     force, dim = elastic.load.copy(), elastic.dim
     on_surface = elastic.trace.place(in_model(elastic.on_trace(load), dim)[:, :, None])
@@ -251,7 +226,7 @@ def write_fields(
     directory: Path,
     system: Tribosystem,
     half_cycle: int,
-    fields: tuple[BodyFields, BodyFields],
+    fields: tuple[Fields, Fields],
     direction: int,
     worn: WornDepths,
     pressure: Array,
@@ -277,10 +252,7 @@ def write_fields(
     stem = f"half_cycle_{half_cycle:06d}"
     data: dict[str, Any] = {}
     for elastic, body in zip((system.bodies.punch, system.bodies.strip), fields, strict=True):
-        name = elastic.body.name
-        given = (body.displacement, body.out_of_plane, body.stress, body.von_mises, body.temperature, body.heat_flux)
-        functions = [f for f in given if f is not None]
-        data.update(_gathered(name, elastic, functions))
+        data.update(_gathered(elastic, [body[name] for name in MEANINGS if name in body]))
         data.update(_groups(elastic))
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
@@ -296,11 +268,10 @@ def write_fields(
 def _in_degrees(data: dict[str, Any], system: Tribosystem) -> None:
     """Put temperatures on the scale of the case."""
     degrees = degrees_of(system.case)
-    for body in ("punch", "strip"):
-        name = f"{body}_temperature"
-        if name in data and degrees is not KELVIN:
+    for name in ("punch_temperature", "strip_temperature"):
+        if name in data:
             over, values, attributes = data[name]
-            data[name] = (over, None if values is None else degrees.of(values), {**attributes, "units": degrees.unit})
+            data[name] = (over, degrees.of(values), {**attributes, "units": degrees.unit})
 
 
 def _frame(system: Tribosystem) -> dict[str, Any]:
@@ -345,16 +316,14 @@ def _make_folder(folder: Path, size: int) -> None:
 
 
 def _write_nodal(dataset: xarray.Dataset, folder: Path, stem: str) -> None:
-    path, part = folder / f"{stem}.nc", folder / f"{stem}.part"
-    with writing(path):
+    with replacing(folder / f"{stem}.nc") as part:
         netcdf.write(part, dataset)
-        part.replace(path)
     append(folder / SERIES, step_of(dataset))
 
 
-def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
+def _gathered(elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
     """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
-    comm, space = elastic.body.mesh.comm, elastic.space
+    comm, space, name = elastic.body.mesh.comm, elastic.space, elastic.body.name
     index_map, degree, dim = space.dofmap.index_map, space.ufl_element().degree, elastic.dim
     cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(dim).size_local]
     corners = _corners(elastic.body.mesh.basix_cell().name, degree)

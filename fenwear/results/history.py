@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,21 +23,21 @@ from fenwear.case.program import stages_of
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.results import roughness, steps
-from fenwear.results.disk import check_room, claim, write_text, writing
+from fenwear.results.disk import check_room, replacing, write_text, writing
 from fenwear.results.netcdf import Netcdf
-from fenwear.results.quantity import KELVIN, Variable, computed, degrees_in, degrees_of
+from fenwear.results.quantity import KELVIN, Quantity, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
 from fenwear.results.surfaces import Column, conforming, on_mesh, part_columns, surface_columns
 from fenwear.stack import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 # What runs and sweeps leave in their folders.
-OF_RESULTS = (HISTORY, "history.part", SUMMARY, CASE, "checkpoint", "fields", "figures", "report.html", "flash",
-              "export", "variants", "sweep.nc", "sweep.csv", "sweep.png")  # fmt: skip
+OF_RESULTS = (HISTORY, f"{HISTORY}.part", SUMMARY, CASE, "checkpoint.npz", "checkpoint", "fields", "figures",
+              "report.html", "flash", "export", "variants", "sweep.nc", "sweep.csv", "sweep.png")  # fmt: skip
 UNKNOWN = ("gap", "creep_depth", "creep_depth_strip")  # beyond the grid that there was; a layer has crept by 0 there
 GRID = "contact_grid"  # corner, spacing and counts, where it grows
 SECONDS_BETWEEN_WRITES = 2.0
-SHARE = 20  # of the time between two writes over that of copying the file, which grows with it
+SHARE = 20  # of the time between two writes over that of a write, which copies the file
 CHUNK = 256  # rows that a variable's storage grows by, at most
 CHUNK_VALUES = 2**18  # that it grows by at most
 INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
@@ -48,9 +47,9 @@ Rows = dict[str, NDArray[Any]]  # of variables, by their names
 INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 
 
-def variables_of(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of a history by their names: dimensions, units, long name."""
-    return {name: (one.dims, one.unit, one.long_name) for name, one in quantities_of(system).items() if one.dims}
+def variables_of(system: Tribosystem) -> dict[str, Quantity]:
+    """Return the quantities that a history has, by their names."""
+    return {name: one for name, one in quantities_of(system).items() if one.dims}
 
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
@@ -112,12 +111,6 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
     }
 
 
-def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Return the values of variables over a block's half-cycles."""
-    known = quantities_of(block.system)
-    return computed(block, [known[name] for name in names])
-
-
 def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:
     """Return the contact grid that the history in a folder stands on, where grids grow; None where there is none."""
     own = system.pair.punch.grid
@@ -131,7 +124,7 @@ def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:
 
 def _on_grid(
     rows: dict[str, NDArray[Any]],
-    variables: dict[str, tuple[tuple[str, ...], str, str]],
+    variables: dict[str, Quantity],
     before: Tribosystem,
     after: Tribosystem,
 ) -> dict[str, NDArray[Any]]:
@@ -141,7 +134,7 @@ def _on_grid(
     surfaces["_strip"] = (of_strip, before.pair.strip.weights, after.pair.strip.weights)
     found = {}
     for name, values in rows.items():
-        last = variables[name][0][-1]
+        last = variables[name].dims[-1]
         end = {"x": "", "node": "", "x_strip": "_strip", "node_strip": "_strip"}.get(last)
         if end is None:
             found[name] = values
@@ -209,26 +202,25 @@ def free_directory(stem: Path) -> Path:
     return path
 
 
-def next_write(copying: float = 0.0) -> float:
-    """Return when a history is written again, s of the monotonic clock, after one whose copy took so many seconds."""
-    return time.monotonic() + max(SECONDS_BETWEEN_WRITES, SHARE * copying)
+def next_write(writing_took: float = 0.0) -> float:
+    """Return when a history is written again, s of the monotonic clock, after a write of so many seconds."""
+    return time.monotonic() + max(SECONDS_BETWEEN_WRITES, SHARE * writing_took)
 
 
 class HistoryWriter:
     """Writes blocks of half-cycles to history.nc, every few seconds; for one rank.
 
-    history.nc has a twin that lags one write behind. A write brings the twin up to date, and the two
-    change places: history.nc is whole and readable at any moment, and no write costs more in a long run.
+    A write appends to a copy of history.nc, which takes its place: the file is whole and readable at any moment.
     """
 
     def __init__(self, directory: Path, system: Tribosystem, resumed_after: int | None = None) -> None:
-        """Begin a history, or go on with the one of a run that is resumed after a half-cycle.
+        """Begin a history, or continue that of a run that is resumed after a half-cycle.
 
         Raises:
-            CaseError: the history to go on with cannot be read.
+            CaseError: the history to continue cannot be read.
             OutputError: it cannot be written.
         """
-        self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
+        self.path = directory / HISTORY
         self._variables = variables_of(system)
         self._columns = columns_of(system)
         self._system = system
@@ -236,25 +228,17 @@ class HistoryWriter:
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
-        self._pending: list[dict[str, NDArray[Any]]] = []
-        self._last: dict[str, NDArray[Any]] | None = None
+        self._written: NDArray[np.int64] = np.zeros(0, dtype=np.int64)  # half-cycles in the file
+        self._pending: list[Rows] = []
+        self._last: Rows = {}  # those of the last cycle
         self._due = next_write()
-        self._seconds_of_copying = 0.0
-        self.rows = self._twin_rows = 0
-        with writing(self.path):
-            for left_by_a_killed_run in (self._twin, self._spare):
-                left_by_a_killed_run.unlink(missing_ok=True)
-            if resumed_after is None or not self.path.exists():
-                self._create(system)
-            else:
-                self._cut(resumed_after)
-
-    def _create(self, system: Tribosystem) -> None:
-        self._lay_out(system)
-        self._twin.replace(self.path)
+        if resumed_after is None or not self.path.exists():
+            self._lay_out({})
+        else:
+            self._resume(resumed_after)
 
     def relay(self, before: Tribosystem, after: Tribosystem) -> None:
-        """Go on with another contact grid, on which what is written then stands, too, worn volumes as they were.
+        """Continue with another contact grid, on which what is written then stands, too, worn volumes as they were.
 
         Raises:
             OutputError: as `add`.
@@ -266,24 +250,17 @@ class HistoryWriter:
         self._begin_anew(columns, lambda rows: _on_grid(rows, old, before, after))
 
     def _begin_anew(self, columns: dict[str, Column], changed: Callable[[Rows], Rows]) -> None:
-        """Go on in a file of other sizes, with what is written by now changed to them."""
+        """Continue in a file of other sizes, with what is written by now changed to them."""
         self.flush()
         self._columns = columns
-        with writing(self.path):
-            self._lay_out(self._system)
-            with h5py.File(self.path, "r") as stored, h5py.File(self._twin, "r+") as twin:
-                known = {name: stored[name][: self.rows] for name in self._variables}
-                for name, values in changed(known).items():
-                    twin[name].resize(self.rows, axis=0)
-                    twin[name][...] = values
-            self._twin.replace(self.path)
-        self._twin_rows = 0
-        if self._last is not None:
-            self._last = changed(self._last)
+        with writing(self.path), h5py.File(self.path, "r") as file:
+            stored = {name: file[name][: len(self._written)] for name in self._variables}
+        self._lay_out(changed(stored))
+        self._last = changed(self._last) if self._last else {}
 
     def _over_steps(self, rows: Rows) -> Rows:
         """Return rows whose half-cycles have as many time steps as the file has; it gets more where they have more."""
-        own = [rows[name].shape[1] for name, (over, _, _) in self._variables.items() if steps.STEP in over]
+        own = [rows[name].shape[1] for name, one in self._variables.items() if steps.STEP in one.dims]
         if own and max(own) > len(self._columns[steps.STEP].values):
             column = self._columns[steps.STEP]._replace(values=np.arange(1, max(own) + 1))
             self._begin_anew({**self._columns, steps.STEP: column}, self._padded)
@@ -294,48 +271,41 @@ class HistoryWriter:
             return rows
         count = len(self._columns[steps.STEP].values)
         return {
-            name: steps.padded(values, count, axis=1) if steps.STEP in self._variables[name][0] else values
+            name: steps.padded(values, count, axis=1) if steps.STEP in self._variables[name].dims else values
             for name, values in rows.items()
         }
 
-    def _lay_out(self, system: Tribosystem) -> None:
-        """Begin a file, without rows, in place of the twin."""
+    def _lay_out(self, rows: Rows) -> None:
+        """Make the file with some rows."""
+        system, sizes = self._system, self._sizes()
+        count, about = len(rows.get("half_cycle", ())), system.pair.punch.dim
         columns = sum(column.values.nbytes + INDEX for column in self._columns.values())
-        check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + columns)
-        sizes, about = self._sizes(), system.pair.punch.dim
-        with Netcdf(self._twin, {"half_cycle": None, **sizes}) as file:
-            file.attributes["title"] = system.case.title or "fenwear run"
-            file.attributes["Conventions"] = "CF-1.11"
-            file.attributes["case"] = system.case.to_toml()
-            file.attributes["directions"] = " ".join(system.direction_words.values())  # of d = 1 and d = -1
-            file.attributes["conforming"] = int(conforming(system.pair))
-            file.attributes["versions"] = json.dumps(versions())
-            file.attributes.update(steps.attributes(system))
-            if grows(system) and system.pair.punch.grid is not None:
-                file.attributes[GRID] = system.pair.punch.grid.numbers
-            if system.case.model.kind != "plane":
-                file.attributes["Conventions"] = "CF-1.11 UGRID-1.0"
-                file.attributes["model"] = system.case.model.kind
-            for name, column in self._columns.items():
-                file.add(name, column.dimensions, column.attributes, column.values)
-            for name, (dimensions, units, long_name) in self._variables.items():
-                inner = tuple(sizes[d] for d in dimensions[1:])
-                own = self._degrees.unit if units == KELVIN.unit else units
-                told = {"units": own, "long_name": long_name, **on_mesh(dimensions, about)}
-                kind = int if name in INTEGERS else float
-                file.add(name, dimensions, told, kind=kind, chunks=(_chunk(inner), *inner))
+        with replacing(self.path) as part:
+            check_room(self.path.parent, self._bytes(count) + 4 * len(system.case.to_toml()) + columns)
+            with Netcdf(part, {"half_cycle": None, **sizes}) as file:
+                file.attributes.update(_attributes(system))
+                for name, column in self._columns.items():
+                    file.add(name, column.dimensions, column.attributes, column.values)
+                for name, one in self._variables.items():
+                    inner = tuple(sizes[d] for d in one.dims[1:])
+                    unit = self._degrees.unit if one.unit == KELVIN.unit else one.unit
+                    words = {"units": unit, "long_name": one.long_name, **on_mesh(one.dims, about)}
+                    kind = int if name in INTEGERS else float
+                    file.add(name, one.dims, words, kind=kind, chunks=(_chunk(inner), *inner))
+            if rows:
+                self._put(part, rows, 0)
 
-    def _cut(self, half_cycle: int) -> None:
-        """Drop what a killed run wrote after its last checkpoint."""
+    def _resume(self, half_cycle: int) -> None:
+        """Take up the file, up to a half-cycle: the next write drops what a killed run wrote after it."""
         try:
             with h5py.File(self.path, "r") as file:
                 stored = file["half_cycle"][:]
-                if "largest_temperature" in file:  # a run goes on in the degrees that it began with
+                if "largest_temperature" in file:  # a run continues in the degrees that it began with
                     self._degrees = degrees_in(str(file["largest_temperature"].attrs["units"]))
                 if steps.STEP in self._columns:  # more than the case's where a step of its program had more
                     column = self._columns[steps.STEP]._replace(values=file[steps.STEP][:])
                     self._columns = {**self._columns, steps.STEP: column}
-                missing = [n for n, (d, _, _) in self._variables.items() if file[n].ndim != len(d)]
+                missing = [name for name, one in self._variables.items() if file[name].ndim != len(one.dims)]
             if missing:
                 raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
@@ -343,13 +313,7 @@ class HistoryWriter:
                 "cannot be read, or is of another version; remove it to continue with a new one, from the checkpoint"
             )
             raise CaseError(InputError(str(self.path), message)) from None
-        self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
-        if self.rows < len(stored):
-            self._copy()
-            with h5py.File(self._twin, "r+") as file:
-                for name in self._variables:
-                    file[name].resize(self.rows, axis=0)
-            self._twin.replace(self.path)
+        self._written = stored[: np.searchsorted(stored, half_cycle, side="right")]
 
     def add(self, block: Block) -> None:
         """Take a block; write what has gathered if the last write is some seconds ago.
@@ -357,9 +321,9 @@ class HistoryWriter:
         Raises:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
-        rows = rows_of(block, self._variables)
-        for name, (_, units, _) in self._variables.items():
-            if units == KELVIN.unit:
+        rows = computed(block, variables_of(block.system).values())
+        for name, one in self._variables.items():
+            if one.unit == KELVIN.unit:
                 rows[name] = self._degrees.of(rows[name])
         rows = self._over_steps(rows)
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
@@ -375,23 +339,12 @@ class HistoryWriter:
         Raises:
             OutputError: as `add`.
         """
-        if self._last is not None:
-            last, stored = self._last["half_cycle"], self._stored_tail()
-            known = stored | {int(n) for rows in self._pending for n in rows["half_cycle"]}
-            missing = [int(n) for n in last if int(n) not in known]
-            first = min(missing, default=0)
-            again = {n for n in stored if missing and n > first}  # a write came between: what follows is written anew
-            self.rows -= len(again)
-            self._twin_rows = min(self._twin_rows, self.rows)
-            new = np.isin(last, [*missing, *again])
-            self._pending.append({name: values[new] for name, values in self._last.items()})
+        if self._last:
+            first = self._last["half_cycle"][0]
+            self._pending = [{n: v[rows["half_cycle"] < first] for n, v in rows.items()} for rows in self._pending]
+            self._pending.append(self._last)
+            self._written = self._written[self._written < first]
         self.flush()
-        with writing(self._twin):
-            self._twin.unlink(missing_ok=True)
-
-    def _stored_tail(self) -> set[int]:
-        with writing(self.path), h5py.File(self.path, "r") as file:
-            return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
 
     def flush(self) -> None:
         """Write what has gathered.
@@ -399,48 +352,24 @@ class HistoryWriter:
         Raises:
             OutputError: as `add`.
         """
-        self._seconds_of_copying = 0.0
+        begin = time.monotonic()
         joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
         if len(joined.get("half_cycle", ())):
-            order = np.argsort(joined["half_cycle"], kind="stable")  # the last cycle may begin before what was kept
-            joined = {name: values[order] for name, values in joined.items()}
-            with writing(self.path):
-                try:
-                    self._write(joined)
-                except (OSError, RuntimeError):
-                    self._twin.unlink(missing_ok=True)
-                    raise
+            count = len(self._written)
+            with replacing(self.path) as part:
+                check_room(self.path.parent, self.path.stat().st_size + self._bytes(len(joined["half_cycle"])))
+                shutil.copyfile(self.path, part)
+                self._put(part, joined, count)
+            self._written = np.concatenate([self._written, joined["half_cycle"]])
         self._pending = []
-        self._due = next_write(self._seconds_of_copying)
+        self._due = next_write(time.monotonic() - begin)
 
-    def _write(self, values: dict[str, NDArray[Any]]) -> None:
-        count = self.rows + len(values["half_cycle"])
-        with h5py.File(self.path, "r") as stored, self._open_twin(count) as twin:
+    def _put(self, path: Path, rows: Rows, start: int) -> None:
+        """Write rows behind the first so many of a file, in place of what follows there."""
+        with h5py.File(path, "r+") as file:
             for name in self._variables:
-                twin[name].resize(count, axis=0)
-                twin[name][self._twin_rows : self.rows] = stored[name][self._twin_rows : self.rows]
-                twin[name][self.rows : count] = values[name]
-        self._twin_rows, self.rows = self.rows, count
-        self._change_places()
-
-    def _open_twin(self, rows: int) -> h5py.File:
-        """Open the twin, with room for so many rows in all."""
-        if not self._twin.exists():
-            self._copy()
-        claim(self._twin, self._bytes(rows - self._twin_rows))
-        try:
-            return h5py.File(self._twin, "r+")
-        except OSError:  # locked: someone still reads what was history.nc before the last write
-            self._twin.unlink()
-            self._copy()
-            claim(self._twin, self._bytes(rows - self._twin_rows))
-            return h5py.File(self._twin, "r+")
-
-    def _copy(self) -> None:
-        begin = time.monotonic()
-        shutil.copyfile(self.path, self._twin)
-        self._twin_rows = self.rows
-        self._seconds_of_copying = time.monotonic() - begin
+                file[name].resize(start + len(rows[name]), axis=0)
+                file[name][start:] = rows[name]
 
     def _sizes(self) -> dict[str, int]:
         return {
@@ -452,21 +381,28 @@ class HistoryWriter:
     def _bytes(self, rows: int) -> int:
         """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""
         sizes, total = self._sizes(), 0
-        for dimensions, _, _ in self._variables.values():
-            inner = tuple(sizes[d] for d in dimensions[1:])
+        for one in self._variables.values():
+            inner = tuple(sizes[d] for d in one.dims[1:])
             chunk = _chunk(inner)
             chunks = (rows > 0) + -(-rows // chunk)
             total += chunks * chunk * 8 * math.prod(inner) + (chunks // 16 + 1) * INDEX
         return total
 
-    def _change_places(self) -> None:
-        try:
-            os.link(self.path, self._spare)
-        except OSError:  # no hard links here: the next write makes a copy
-            self._twin.replace(self.path)
-            return
-        self._twin.replace(self.path)
-        self._spare.replace(self._twin)
+
+def _attributes(system: Tribosystem) -> dict[str, Any]:
+    """Return the attributes of a history."""
+    solid, grid = system.case.model.kind != "plane", system.pair.punch.grid
+    return {
+        "title": system.case.title or "fenwear run",
+        "Conventions": "CF-1.11 UGRID-1.0" if solid else "CF-1.11",
+        "case": system.case.to_toml(),
+        "directions": " ".join(system.direction_words.values()),  # of d = 1 and d = -1
+        "conforming": int(conforming(system.pair)),
+        "versions": json.dumps(versions()),
+        **({"model": system.case.model.kind} if solid else {}),
+        **({GRID: grid.numbers} if grid is not None and grows(system) else {}),
+        **steps.attributes(system),
+    }
 
 
 def write_summary(directory: Path, summary: dict[str, Any]) -> None:

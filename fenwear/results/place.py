@@ -15,7 +15,9 @@ each of them, in the middle along y; there the angle is from the force that the 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
-from fenwear.results.quantity import Variable
+from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.sliding.wear import WornDepths
 
 
@@ -40,16 +42,30 @@ TRUE = 1e-3  # of the radius: how far the points of a round surface may be from 
 ARC = 2.5  # radius over the chord of the contact, up to which it is round
 MOVED = {"lambda_F": "moved_z", "lambda_Fx": "moved_x", "lambda_Fy": "moved_y", "lambda_M": "turned_y",
          "lambda_Mx": "turned_x", "lambda_My": "turned_y", "lambda_Mz": "turned_z"}  # fmt: skip
-ECCENTRICITY: dict[str, Variable] = {
-    "eccentricity": (("half_cycle",), "mm", "way from the bore's middle to the shaft's"),
-    "eccentricity_x": (("half_cycle",), "mm", "x component of the way from the bore's middle to the shaft's"),
-    "eccentricity_z": (("half_cycle",), "mm", "z component of the way from the bore's middle to the shaft's"),
+ECCENTRICITY = {
+    "eccentricity": ("mm", "way from the bore's middle to the shaft's"),
+    "eccentricity_x": ("mm", "x component of the way from the bore's middle to the shaft's"),
+    "eccentricity_z": ("mm", "z component of the way from the bore's middle to the shaft's"),
     "attitude_angle": (
-        ("half_cycle",),
         "degree",
         "angle from the way in which the load presses the shaft to that of its eccentricity, as the strip turns",
     ),
 }
+AT_END = ("eccentricity", "attitude_angle")  # of a single bore, in summary.json
+
+
+def of_bore(name: str, values: Callable[[Any], Mapping[str, Array]]) -> list[Quantity]:
+    """Return the quantities of the shaft's place in a bore.
+
+    Args:
+        name: Of the bore; "" of the only one.
+        values: Their values for each half-cycle, by `ECCENTRICITY`.
+    """
+    end, words = (f"_{name}", f" ({name})") if name else ("", "")
+    return [
+        Quantity(key + end, RECORD, unit, text + words, InTable(values, key), of="end" if key + end in AT_END else "")
+        for key, (unit, text) in ECCENTRICITY.items()
+    ]
 
 
 class Circle(NamedTuple):
@@ -84,32 +100,23 @@ def motions(placed: ContactSetup) -> list[str]:
     return found
 
 
-def variables(placed: ContactSetup) -> dict[str, Variable]:
-    """Return the variables of a history that tell the bodies' place."""
-    found: dict[str, Variable] = {}
-    for name, mode in zip(motions(placed), placed.rigid.mode_names, strict=True):
+def quantities(placed: ContactSetup) -> list[Quantity]:
+    """Return the quantities of the bodies' place: their free motions, and that of a shaft in its bores."""
+    found: list[Quantity] = []
+    for number, (name, mode) in enumerate(zip(motions(placed), placed.rigid.mode_names, strict=True)):
         body = "strip" if name.endswith("_strip") else "punch"
         axis = name.split("_")[1]
         unit, text = ("mm", f"moved along {axis}") if is_translation(mode) else ("rad", f"turned about {axis}")
         part = "" if len(mode.split("_")) < 3 else f" ({'_'.join(mode.split('_')[2:])})"
-        found[name] = (("half_cycle",), unit, f"how far the {body}{part} has {text}, from where it was meshed")
-    for name in bores_of(placed):
-        words = f" ({name})" if name else ""
-        found |= {key + _end(name): (over, unit, text + words) for key, (over, unit, text) in ECCENTRICITY.items()}
+        words = f"how far the {body}{part} has {text}, from where it was meshed"
+        found.append(Quantity(name, RECORD, unit, words, partial(_motion, number=number)))
+    for name, bore in bores_of(placed).items():
+        found += of_bore(name, partial(_eccentricity, bore=bore, named=bool(name)))
     return found
 
 
-def values(block: Block) -> dict[str, Array]:
-    """Return them of each half-cycle of a block (k,)."""
-    system = block.system
-    found: dict[str, Array] = dict(zip(motions(system), block.rigid.T, strict=True))
-    for name, bore in bores_of(system).items():
-        found |= {key + _end(name): value for key, value in _eccentricity(block, bore, named=bool(name)).items()}
-    return found
-
-
-def _end(name: str) -> str:
-    return f"_{name}" if name else ""
+def _motion(block: Block, number: int) -> Array:
+    return np.asarray(block.rigid[:, number])
 
 
 def _eccentricity(block: Block, bore: Bore, *, named: bool) -> dict[str, Array]:

@@ -18,7 +18,6 @@ from fenwear.case import Case
 if TYPE_CHECKING:
     import xarray  # with pandas, half a second that commands without tables spare themselves
 
-Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 RECORD = ("half_cycle",)
 SUFFIXES = {
     "1": "",

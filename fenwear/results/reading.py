@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
-from fenwear.results.history import HISTORY, columns_of, rows_of, variables_of
+from fenwear.results.history import HISTORY, columns_of, variables_of
 from fenwear.results.netcdf import load
-from fenwear.results.quantity import KELVIN, RECORD, degrees_of, reduced
+from fenwear.results.quantity import KELVIN, RECORD, computed, degrees_of, reduced
 from fenwear.results.registry import known
 from fenwear.results.steps import STEP
 from fenwear.results.surfaces import conforming
@@ -196,13 +196,13 @@ def to_dataset(blocks: Block | Iterable[Block]) -> xarray.Dataset:
         raise CaseError(InputError("blocks", "expected at least one: no half-cycle was computed"))
     system = found[0].system
     variables, degrees = variables_of(system), degrees_of(system.case)
-    parts = [rows_of(block, variables) for block in found]
+    parts = [computed(block, variables_of(block.system).values()) for block in found]
     data = {name: (c.dimensions, c.values, dict(c.attributes)) for name, c in columns_of(system).items()}
-    for name, (dimensions, unit, text) in variables.items():
-        values = np.concatenate([part[name] for part in parts])
+    for name, one in variables.items():
+        values, unit = np.concatenate([part[name] for part in parts]), one.unit
         if unit == KELVIN.unit:
-            values, unit = degrees.of(values), degrees.unit  # noqa: PLW2901
-        data[name] = (dimensions, values, {"units": unit, "long_name": text})
+            values, unit = degrees.of(values), degrees.unit
+        data[name] = (one.dims, values, {"units": unit, "long_name": one.long_name})
     attributes = {"title": system.case.title or "fenwear run", "conforming": int(conforming(system.pair))}
     if system.case.model.kind != "plane":
         attributes["model"] = system.case.model.kind

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache, partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from fenwear.cycle.steady_cycle import SteadyCycle
 from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.interface import is_translation
 from fenwear.results import between, place, roughness, sheet, steps
-from fenwear.results.quantity import RECORD, InTable, Quantity
+from fenwear.results.quantity import RECORD, Quantity
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
@@ -141,17 +141,6 @@ def in_model(one: Quantity, *, on_surface: bool) -> tuple[str, str]:
     return ON_SURFACES.get(one.name, (one.unit, one.long_name)) if on_surface else (one.unit, one.long_name)
 
 
-def _of_room(room: Any, system: Tribosystem) -> list[Quantity]:
-    """Return the quantities of a module that computes its values together."""
-    return [_in_table(room.values, name, *variable) for name, variable in room.variables(system).items()]
-
-
-def _in_table(values: Any, name: str, dims: tuple[str, ...], unit: str, text: str) -> Quantity:
-    stem, strip = name.removesuffix("_strip"), name.endswith("_strip")
-    of = "end" if name in AT_END else ("strip" if strip else "punch") if stem in OF_BODIES else ""
-    return Quantity(name, dims, unit, text, InTable(values, name), CYCLES.get(name, "last"), of=of)
-
-
 def _in_cycle(records: Block | SteadyCycle) -> float:
     """Return the largest pressure of a cycle in any phase or time step, MPa."""
     if isinstance(records, SteadyCycle):
@@ -163,29 +152,6 @@ def _in_cycle(records: Block | SteadyCycle) -> float:
 
 IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pressure at any time of the cycle",
                     _in_cycle, steady=True, of="end")  # fmt: skip
-CYCLES: dict[str, Literal["largest", "mean", "sum"]] = {
-    "energy_ratio": "mean",
-    "friction_work_increment": "sum",
-    "energy_balance_error": "largest",
-    "jump_error": "largest",
-}
-
-
-def _of_steps(name: str) -> Quantity:
-    return Quantity(name, (), *steps.OF_CYCLE[name], InTable(steps.of_cycle, name), of="end")
-
-
-# What summary.json has of the tables of these modules: at its top, and of a body.
-AT_END = (
-    *("plastic_volume", "largest_plastic_depth", "debris_volume", "ejected_volume", "largest_debris_thickness"),
-    *("debris_balance_error", "creep_volume_layer", "largest_creep_depth_layer", "eccentricity", "attitude_angle"),
-    *("energy_ratio", "stick_width", "stick_width_within", "stick_area", "stick_area_within"),
-)
-OF_BODIES = (
-    *("creep_volume", "largest_creep_depth", "worn_through_of_scar", "worn_through_of_surface", "least_coating"),
-    *("roughness_Sa", "roughness_Sq"),
-)
-ROOMS = (between, place, roughness, steps)
 
 
 def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
@@ -198,9 +164,8 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
         *(() if case.heat is None else OF_HEAT),
         *(() if case.heat is None or case.heat.track is None else OF_TRACK),
         *sheet.quantities(system),
-        *(one for room in ROOMS for one in _of_room(room, system)),
+        *(one for room in (between, place, roughness, steps) for one in room.quantities(system)),
         IN_CYCLE,
-        *(_of_steps(name) for name in steps.names_of_cycle(system)),
     ]
     if case.model.kind != "plane":
         found = on_surfaces(found)
@@ -211,15 +176,13 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
 
 @cache
 def _prototypes() -> dict[str, Quantity]:
-    rooms = {**place.ECCENTRICITY, **steps.VARIABLES, **steps.of_solids(), **between.OF_DEBRIS, **between.OF_FLOW}
-    for body in sheet.BODIES:
-        rooms |= {**between.of_creeping(body), **between.of_coated(body), **roughness.of_body(body)}
     listed = [*IN_RUN, *OF_STRIP, *OF_PROGRAM, *OF_HEAT, *OF_TRACK, *sheet.SLIDING, *sheet.TURNING]
     for body in sheet.BODIES:
         listed += [*sheet.of_a_body(body), *sheet.of_a_plane_body(body)]
         listed += sheet.of_the_scar(body, sheet.PLACES, ("length", "width"))
-    listed += [_in_table(steps.values, name, *one) for name, one in rooms.items()]
-    listed += [IN_CYCLE, *map(_of_steps, steps.OF_CYCLE)]
+        listed += [*between.of_creeping(body), *between.of_coated(body), *roughness.of_body(body)]
+    listed += [*place.of_bore("", dict), *steps.IN_STEPS, *steps.of_solids(), *between.OF_DEBRIS, *between.OF_FLOW]
+    listed += [IN_CYCLE, *steps.OF_CYCLE]
     return {one.name: one for one in listed}
 
 

@@ -7,6 +7,8 @@ Before anything has worn they are those of the whole grid.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +16,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
-from fenwear.results.quantity import Variable
+from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.results.surfaces import Column
 
 FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
@@ -46,23 +48,24 @@ def columns(system: Tribosystem) -> dict[str, Column]:
     }
 
 
-def variables(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of rough surfaces."""
-    return {name: one for body in _rough(system) for name, one in of_body(body).items()}
+def quantities(system: Tribosystem) -> list[Quantity]:
+    """Return the quantities of rough surfaces."""
+    return [one for body in _rough(system) for one in of_body(body)]
 
 
-def of_body(body: str) -> dict[str, Variable]:
-    """Return the variables of a rough body."""
-    return {f"{name}{ENDS[body]}": (("half_cycle",), unit, text.format(body)) for name, (unit, text) in NAMES.items()}
+def of_body(body: str) -> list[Quantity]:
+    """Return the quantities of a rough body."""
+    table = partial(_values, body=body)
+    return [
+        Quantity(f"{name}{ENDS[body]}", RECORD, unit, text.format(body), InTable(table, name), of=body)
+        for name, (unit, text) in NAMES.items()
+    ]
 
 
-def values(block: Block) -> dict[str, Array]:
-    """Return them for each half-cycle of a block by name (k,)."""
-    found = dict[str, Array]()
-    for body in _rough(block.system):
-        rows = np.array([sa_sq(worn_heights(block, body, k)) for k in range(len(block))]).reshape(-1, 2)
-        found |= {f"{name}{ENDS[body]}": column for name, column in zip(NAMES, rows.T, strict=True)}
-    return found
+def _values(block: Block, body: str) -> dict[str, Array]:
+    """Return Sa and Sq of a body for each half-cycle of a block (k,)."""
+    rows = np.array([sa_sq(worn_heights(block, body, k)) for k in range(len(block))]).reshape(-1, 2)
+    return dict(zip(NAMES, rows.T, strict=True))
 
 
 def sa_sq(z: Array) -> tuple[float, float]:

@@ -11,7 +11,8 @@ slips of the last cycle, time step by time step.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from fenwear.cycle.block import BlockHeat
 from fenwear.cycle.state import known_pressures
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
-from fenwear.results.quantity import Variable
+from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.results.surfaces import Column
 from fenwear.sliding.ways import SlidingTensor
 from fenwear.sliding.wear import WornDepths
@@ -39,33 +40,53 @@ if TYPE_CHECKING:
 
 STEP = "step"
 ROUNDING = 1e-9  # of a share
-VARIABLES: dict[str, Variable] = {
-    "step_fraction": (("half_cycle", STEP), "1", "fraction of the cycle at the end of the time step"),
-    "displacement": (("half_cycle", STEP), "mm", "displacement of the strip's supports at the end of the time step"),
-    "tangential_force": (("half_cycle", STEP), "N", "tangential force on the strip at the end of the time step"),
-    "step_pressure": (("half_cycle", STEP, "x"), "MPa", "contact pressure at the end of the time step"),
-    "traction": (("half_cycle", STEP, "x"), "MPa", "tangential traction on the punch, along x"),
-    "slip": (("half_cycle", STEP, "x"), "mm", "slip of the punch against the strip in the time step"),
-    "stick": (("half_cycle", STEP, "x"), "1", "1 where the surfaces touch and do not slip"),
-    "surface_stress": (("half_cycle", STEP, "x"), "MPa", "stress along x in the strip's surface opposite each node"),
-    "friction_work_increment": (("half_cycle",), "mJ", "work of friction in the half-cycle"),
-    "energy_ratio": (("half_cycle",), "1", "work of friction over largest force times stroke"),
-    "stick_share": (("half_cycle",), "1", "share of the contact that sticks all through the cycle that ends here"),
-    "regime": (("half_cycle",), "1", "regime of fretting: 0 stick, 1 partial slip, 2 gross sliding"),
-    "energy_balance_error": (("half_cycle",), "1", "missing energy of the half-cycle over its largest term"),
-    "stick_width": (("half_cycle",), "mm", "width that sticks all through the cycle that ends here"),
-    "stick_width_within": (("half_cycle",), "mm", "half the interval in which the width that sticks is known to lie"),
-    "jump_error": (("half_cycle",), "1", "estimated error of the depths of the jump that ends here, over its wear"),
-}
-HEAT_VARIABLES: dict[str, Variable] = {
-    "step_temperature_punch": (("half_cycle", STEP, "x"), "K", "temperature of the punch's surface at the step's end"),
-    "step_temperature_strip": (("half_cycle", STEP, "x"), "K", "temperature of the strip's surface at the step's end"),
-}
-ACROSS: dict[str, Variable] = {
-    "traction_across": (("half_cycle", STEP, "x"), "MPa", "tangential traction on the punch, across the sliding"),
-    "slip_across": (("half_cycle", STEP, "x"), "mm", "slip in the time step, across the sliding"),
-}
-IN_SOLIDS: dict[str, tuple[str, str, str]] = {
+STEPS, NODES = ("half_cycle", STEP), ("half_cycle", STEP, "x")
+
+
+def _rows(block: Block) -> dict[str, NDArray[Any]]:
+    """Return the time steps of a block's half-cycles by name: (k, ...), padded with NaN."""
+    system = block.system
+    rows = [_row(system, steps) for steps in steps_of(block)]
+    size = most(system)
+    return {name: np.array([padded(np.asarray(row[name], dtype=float), size) for row in rows]) for name in rows[0]}
+
+
+def _in_steps(name: str, dims: tuple[str, ...], unit: str, text: str, **more: Any) -> Quantity:
+    """Return a quantity of the time steps of half-cycles."""
+    return Quantity(name, dims, unit, text, InTable(_rows, name), **more)
+
+
+IN_STEPS = (
+    _in_steps("step_fraction", STEPS, "1", "fraction of the cycle at the end of the time step"),
+    _in_steps("displacement", STEPS, "mm", "displacement of the strip's supports at the end of the time step"),
+    _in_steps("tangential_force", STEPS, "N", "tangential force on the strip at the end of the time step"),
+    _in_steps("step_pressure", NODES, "MPa", "contact pressure at the end of the time step"),
+    _in_steps("traction", NODES, "MPa", "tangential traction on the punch, along x"),
+    _in_steps("slip", NODES, "mm", "slip of the punch against the strip in the time step"),
+    _in_steps("stick", NODES, "1", "1 where the surfaces touch and do not slip"),
+    _in_steps("surface_stress", NODES, "MPa", "stress along x in the strip's surface opposite each node"),
+    _in_steps("friction_work_increment", RECORD, "mJ", "work of friction in the half-cycle", cycle="sum"),
+    _in_steps("energy_ratio", RECORD, "1", "work of friction over largest force times stroke", cycle="mean", of="end"),
+    _in_steps("stick_share", RECORD, "1", "share of the contact that sticks all through the cycle that ends here"),
+    _in_steps("regime", RECORD, "1", "regime of fretting: 0 stick, 1 partial slip, 2 gross sliding"),
+    _in_steps("energy_balance_error", RECORD, "1", "missing energy of the half-cycle over its largest term",
+              cycle="largest"),
+    _in_steps("stick_width", RECORD, "mm", "width that sticks all through the cycle that ends here", of="end"),
+    _in_steps("stick_width_within", RECORD, "mm", "half the interval in which the width that sticks is known to lie",
+              of="end"),
+    _in_steps("jump_error", RECORD, "1", "estimated error of the depths of the jump that ends here, over its wear",
+              cycle="largest"),
+)  # fmt: skip
+OF_HEAT = tuple(
+    _in_steps(f"step_temperature_{body}", NODES, "K", f"temperature of the {body}'s surface at the step's end")
+    for body in ("punch", "strip")
+)
+ACROSS = (
+    _in_steps("traction_across", NODES, "MPa", "tangential traction on the punch, across the sliding"),
+    _in_steps("slip_across", NODES, "mm", "slip in the time step, across the sliding"),
+)
+# Solids have these in place of the plane's, with other words or under another name.
+IN_SOLIDS = {
     "traction": ("traction", "MPa", "tangential traction on the punch, along the sliding"),
     "slip": ("slip", "mm", "slip of the punch against the strip in the time step, along the sliding"),
     "surface_stress": ("surface_stress", "MPa", "stress along the sliding in the strip's surface opposite each node"),
@@ -75,20 +96,29 @@ IN_SOLIDS: dict[str, tuple[str, str, str]] = {
 IN_TURNING = {"displacement": "rad", "tangential_force": "N mm"}  # units where the strip turns
 
 
-def _step_variables(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of time steps of a system whose law resolves them; none of others."""
-    found = {**VARIABLES, **(HEAT_VARIABLES if system.exchange.conducts else {})}
+def _step_quantities(system: Tribosystem) -> list[Quantity]:
+    """Return the quantities of time steps of a system whose law resolves them; none of others."""
+    if not system.sticks:
+        return []
+    found, turns = [*IN_STEPS, *(OF_HEAT if system.exchange.conducts else ())], any(system.sliding.field.turn)
     if system.pair.punch.dim == 3:
-        found = {**{name: one for name, one in found.items() if name not in IN_SOLIDS}, **of_solids()}
-    if any(system.sliding.field.turn):
-        found = {name: (over, IN_TURNING.get(name, unit), text) for name, (over, unit, text) in found.items()}
-    return found
+        found = [*(one for one in found if one.name not in IN_SOLIDS), *of_solids()]
+    if turns:
+        found = [replace(one, unit=IN_TURNING.get(one.name, one.unit)) for one in found]
+    other = "largest_force" if turns else "largest_torque"
+    return [*found, *(one for one in OF_CYCLE if one.name != other)]
 
 
-def of_solids() -> dict[str, Variable]:
-    """Return what a solid has in place of the plane's variables of the same names, and as well."""
-    found = {new: (VARIABLES[name][0], unit, text) for name, (new, unit, text) in IN_SOLIDS.items()}
-    return {**found, **ACROSS}
+def of_solids() -> list[Quantity]:
+    """Return the quantities that a solid has in place of the plane's, and as well."""
+    known = {one.name: one for one in IN_STEPS}
+    return [
+        *(
+            _in_steps(new, known[name].dims, unit, text, of=known[name].of)
+            for name, (new, unit, text) in IN_SOLIDS.items()
+        ),
+        *ACROSS,
+    ]
 
 
 def _step_columns(system: Tribosystem) -> dict[str, Column]:
@@ -121,14 +151,6 @@ def attributes(system: Tribosystem) -> dict[str, Any]:
 def most(system: Tribosystem) -> int:
     """Return the largest number of time steps of a half-cycle."""
     return int(np.bincount([step.half_cycle for step in system.law_state.problem.program.steps]).max())
-
-
-def _step_values(block: Block) -> dict[str, NDArray[Any]]:
-    """Return the time steps of a block's half-cycles by name: (k, ...), padded with NaN."""
-    system = block.system
-    rows = [_row(system, steps) for steps in steps_of(block)]
-    size = most(system)
-    return {name: np.array([padded(np.asarray(row[name], dtype=float), size) for row in rows]) for name in rows[0]}
 
 
 def steps_of(block: Block) -> tuple[Steps, ...]:
@@ -225,29 +247,19 @@ def surface_stress(case: Case, records: TimeStepRecords) -> Array:
     return young / (1 - nu**2) * both - nu / (1 - nu) * records.pressure
 
 
-OF_CYCLE = {
-    "largest_force": ("N", "largest tangential force in the cycle"),
-    "largest_torque": ("N mm", "largest torque in the cycle"),
-    "largest_traction": ("MPa", "largest tangential traction in the cycle"),
-    "largest_stick_traction": ("MPa", "largest tangential traction in the cycle where it sticks"),
-    "largest_surface_stress": ("MPa", "largest stress along the sliding in the strip's surface in the cycle"),
-    "friction_work_of_cycle": ("mJ", "work of friction in the cycle"),
-    "steps_per_half_cycle": ("1", "time steps of a half-cycle, mean over the cycle"),
-}
-
-
-def of_cycle(last: Block) -> dict[str, float]:
-    """Return the numbers of the time steps of the last cycle, by `OF_CYCLE`; none of a law without them."""
+def _of_cycle(last: Block) -> dict[str, float]:
+    """Return the numbers of the time steps of the last cycle, by `OF_CYCLE`."""
     system = last.system
-    found = _step_values(last)
+    found = _rows(last)
     cycle = slice(-system.motion.half_cycles, None)
     traction = np.abs(found["traction"][cycle])
     if system.pair.punch.dim == 3:
         traction = np.hypot(traction, found["traction_across"][cycle])
     stuck = traction[found["stick"][cycle] == 1]
-    force = np.nanmax(np.abs(found["tangential_force"][cycle]))
+    force = float(np.nanmax(np.abs(found["tangential_force"][cycle])))
     return {
-        "largest_torque" if any(system.sliding.field.turn) else "largest_force": float(force),
+        "largest_force": force,
+        "largest_torque": force,
         "largest_traction": float(np.nanmax(traction)),
         "largest_stick_traction": float(stuck.max(initial=0.0)),
         "largest_surface_stress": float(np.nanmax(found["surface_stress"][cycle])),
@@ -256,10 +268,18 @@ def of_cycle(last: Block) -> dict[str, float]:
     }
 
 
-def names_of_cycle(system: Tribosystem) -> list[str]:
-    """Return the names of what `of_cycle` tells of a system."""
-    other = "largest_force" if any(system.sliding.field.turn) else "largest_torque"
-    return [name for name in OF_CYCLE if name != other] if system.sticks else []
+OF_CYCLE = tuple(
+    Quantity(name, (), unit, text, InTable(_of_cycle, name), of="end")
+    for name, unit, text in (
+        ("largest_force", "N", "largest tangential force in the cycle"),
+        ("largest_torque", "N mm", "largest torque in the cycle"),
+        ("largest_traction", "MPa", "largest tangential traction in the cycle"),
+        ("largest_stick_traction", "MPa", "largest tangential traction in the cycle where it sticks"),
+        ("largest_surface_stress", "MPa", "largest stress along the sliding in the strip's surface in the cycle"),
+        ("friction_work_of_cycle", "mJ", "work of friction in the cycle"),
+        ("steps_per_half_cycle", "1", "time steps of a half-cycle, mean over the cycle"),
+    )
+)
 
 
 def extremes(block: Block) -> dict[str, float]:
@@ -339,31 +359,20 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
     return TableCycle(ways.sum(axis=0), records.pressure, steps.wear, tensors)
 
 
-PRINCIPAL = tuple(f"principal_{axis}" for axis in "xyz")
+def _directions(block: Block, axis: int) -> Array:
+    """Return a component of the direction of most work of friction (k, n)."""
+    return np.array([one.direction[:, axis] for one in block.sliding])
 
 
-_OVER = ("half_cycle", "x")
-_MOST = "direction with most of the work of friction in a cycle"
-TABLE_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "cross_shear": (_OVER, "1", "cross-shear ratio of a cycle on the punch: share of the work across its direction"),
-    **{name: (_OVER, "1", f"{_MOST}, along {name[-1]}") for name in PRINCIPAL},
-}
-
-
-def _table_variables(placed: ContactSetup) -> dict[str, tuple[tuple[str, ...], str, str]]:
-    """Return the variables of a history of solids that slide in directions of their own at each place."""
-    return TABLE_VARIABLES if placed.slides_many_ways else {}
-
-
-def _table_values(block: Block) -> dict[str, Array]:
-    """Return them of each half-cycle of a block (k, n)."""
-    if not block.sliding:
-        return {}
-    directions = np.array([one.direction for one in block.sliding])
-    return {
-        "cross_shear": np.array([one.ratio for one in block.sliding]),
-        **dict(zip(PRINCIPAL, np.moveaxis(directions, 2, 0), strict=True)),
-    }
+OF_TABLE = (
+    Quantity("cross_shear", ("half_cycle", "x"), "1", "cross-shear ratio of a cycle on the punch: share of the work "
+             "across its direction", lambda b: np.array([one.ratio for one in b.sliding])),
+    *(
+        Quantity(f"principal_{axis}", ("half_cycle", "x"), "1",
+                 f"direction with most of the work of friction in a cycle, along {axis}", partial(_directions, axis=k))
+        for k, axis in enumerate("xyz")
+    ),
+)  # fmt: skip
 
 
 def _table_columns(placed: ContactSetup) -> dict[str, Column]:
@@ -430,14 +439,9 @@ def _cross_shear(tensor: SlidingTensor, areas: Array) -> Mapping[str, float]:
     return {"mean_cross_shear": mean, "largest_cross_shear": float(np.max(ratio, where=rubbed, initial=0.0))}
 
 
-def variables(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of time steps, and of a cycle that is a table."""
-    return {**(_step_variables(system) if system.sticks else {}), **_table_variables(system)}
-
-
-def values(block: Block) -> dict[str, NDArray[Any]]:
-    """Return the values of these variables for each half-cycle of a block (k, ...)."""
-    return {**(_step_values(block) if block.system.sticks else {}), **_table_values(block)}
+def quantities(system: Tribosystem) -> list[Quantity]:
+    """Return the quantities of time steps, and of a cycle that is a table of a solid's ways."""
+    return [*_step_quantities(system), *(OF_TABLE if system.slides_many_ways else ())]
 
 
 def columns(system: Tribosystem) -> dict[str, Column]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from fenwear.arrays import Array
-from fenwear.results.disk import check_room, writing
+from fenwear.results.disk import check_room, replacing
 
 if TYPE_CHECKING:
     import xarray
@@ -51,24 +51,14 @@ def append(path: Path, step: Step) -> None:
     Raises:
         OutputError: the file cannot be written; the old one stays.
     """
-    part = path.with_name(f"{path.name}.part")
     size = step.points.nbytes + sum(10 * c.nbytes for _, c in step.cells) + sum(v.nbytes for v in step.values.values())
-    with writing(path):
-        check_room(path.parent, 2 * size + HEADER * (8 + len(step.values)) + _size(path))
-        try:
-            part.unlink(missing_ok=True)  # a killed run may have left half of one
-            if path.exists():
-                shutil.copyfile(path, part)
-            with h5py.File(part, "a") as file:
-                _append(file.require_group(ROOT), step)
-            part.replace(path)
-        except (OSError, RuntimeError):
-            part.unlink(missing_ok=True)
-            raise
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.exists() else 0
+    before = path.stat().st_size if path.exists() else 0
+    with replacing(path) as part:
+        check_room(path.parent, 2 * size + HEADER * (8 + len(step.values)) + before)
+        if before:
+            shutil.copyfile(path, part)
+        with h5py.File(part, "a") as file:
+            _append(file.require_group(ROOT), step)
 
 
 def _append(root: Any, step: Step) -> None:

@@ -62,7 +62,7 @@ def test_nothing_turns_in_the_mean() -> None:
     bodies, gap = system.bodies, system.pair.initial_gap
     fields = body_fields(system, first.pressure[-1], first.rigid[-1], 0, None)
     u, beside = (
-        field.displacement.x.array[: len(body.load)]
+        field["displacement"].x.array[: len(body.load)]
         for field, body in zip(fields, (bodies.punch, bodies.strip), strict=True)
     )
     held = u - sum(a * mode for mode, a in zip(bodies.punch.rigid_modes, first.rigid[-1], strict=True))

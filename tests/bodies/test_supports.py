@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
-from fenwear.results import place
+from fenwear.results.place import quantities
+from fenwear.results.quantity import computed
 
 TURNING = """
 title = "A bushing that finds its place on a turning shaft"
@@ -75,7 +76,7 @@ def test_attitude_angle(friction: float, tmp_path: Path) -> None:
         np.testing.assert_allclose(traction.sum(axis=0), [0, 50], atol=1e-8)
         middle = angle @ (weights * pressure) / (weights @ pressure)
         assert middle == pytest.approx(-np.arctan(friction), abs=np.radians(0.3))
-    found = place.values(worn)
+    found = computed(worn, quantities(worn.system))
     assert found["attitude_angle"][-1] == pytest.approx(-np.degrees(np.arctan(friction)), abs=0.3)
     assert found["eccentricity"][-1] == pytest.approx(0.05 + worn.wear[-1].max(), abs=2e-3)
 

@@ -27,7 +27,7 @@ import xarray
 
 from fenwear import Case, make_case, run_case
 from fenwear.errors import FenwearError
-from fenwear.results.checkpoint import FOLDER
+from fenwear.results.checkpoint import FILE
 from fenwear.results.reading import load_history
 
 KINDS = {  # and half-cycles: seconds of which most are not the set-up
@@ -73,7 +73,7 @@ def ended(pid: int, after: float = LEAVES) -> tuple[int, float]:
 
 def await_checkpoint(pid: int, folder: Path) -> None:
     """Wait until a process has kept a checkpoint, or has ended."""
-    while not (folder / FOLDER).is_dir() and os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+    while not (folder / FILE).is_file() and os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         time.sleep(0.002)
 
 

@@ -64,9 +64,9 @@ def test_a_checkpoint_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> 
     """By what a run comes to that never stopped."""
     true = checkpoint.load
 
-    def load(*given: Any) -> tuple[Tribosystem, RunState]:
-        system, state = true(*given)
-        return system, replace(state, worn=WornDepths((1 + 1e-6) * state.worn.punch, state.worn.strip))
+    def load(*given: Any) -> tuple[Tribosystem, RunState, dict[str, float]]:
+        system, state, extremes = true(*given)
+        return system, replace(state, worn=WornDepths((1 + 1e-6) * state.worn.punch, state.worn.strip)), extremes
 
     monkeypatch.setattr(checkpoint, "load", load)
     verdict, why = invariants.try_problem(SEEDS["plane, restart"])

@@ -129,7 +129,7 @@ def test_goes_on_from_a_checkpoint(edited: Edited, tmp_path: Any) -> None:
     system = assemble(edited("example1-heat", on_track(), *SMALL))
     first = list(march(system, 5))[-1]
     checkpoint.save(tmp_path, system, first.end, {})
-    _, state = checkpoint.load(tmp_path, system)
+    _, state, _ = checkpoint.load(tmp_path, system)
     assert state.temperature is not None
     assert state.temperature.bulk == pytest.approx(bulk(system, first), rel=1e-12)
     rest, whole = (list(march(system, 8, start=start))[-1] for start in (state, first.end))

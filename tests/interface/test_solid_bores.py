@@ -8,7 +8,8 @@ import numpy as np
 
 from fenwear import Tribosystem, assemble, load_case, make_case, march
 from fenwear.interface.patches import patches
-from fenwear.results import place
+from fenwear.results.place import quantities
+from fenwear.results.quantity import computed
 
 LENGTH = 2.0  # mm
 
@@ -69,7 +70,7 @@ def test_a_slice_is_the_plane() -> None:
         expected, found = flat.pressure[-1], deep.pressure[-1]
         errors.append(np.abs(found - expected[at]).max() / expected.max())
         np.testing.assert_allclose(deep.wear[-1], flat.wear[-1][at], rtol=0, atol=1e-3 * flat.wear[-1].max())
-        eccentricity = (place.values(block)["eccentricity"] for block in (deep, flat))
+        eccentricity = (computed(block, quantities(block.system))["eccentricity"] for block in (deep, flat))
         np.testing.assert_allclose(*eccentricity, rtol=1e-4)
     assert errors[1] < 0.5 * errors[0] < 1e-3
 
@@ -90,6 +91,6 @@ def test_a_load_off_the_middle_tilts() -> None:
     x = system.pair.opposite
     about_x = (x[:, 1] * forces[:, 2] - x[:, 2] * forces[:, 1]).sum()
     np.testing.assert_allclose(about_x / 2000, 3, rtol=1e-3)
-    found = place.values(first)
+    found = computed(first, quantities(first.system))
     assert found["turned_x"][-1] < 0  # down where the load is
     assert found["attitude_angle"][-1] < 0

@@ -15,7 +15,8 @@ from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState
 from fenwear.cycle.tangent import lies_after, phase_tangent
 from fenwear.errors import CaseError
-from fenwear.results.between import values
+from fenwear.results.between import quantities
+from fenwear.results.quantity import computed
 
 MOVES = (
     "contact.law='gross-sliding'",
@@ -63,7 +64,7 @@ def test_jumps_go_with_the_march() -> None:
     system = system_of("run.half_cycles=100", BOTH, carried(0.6, "3 mm"))
     explicit, jumps = (end(system, how, 3e-3) for how in ("explicit", "jump"))
     for run in (explicit, jumps):
-        found = values(run)
+        found = computed(run, quantities(run.system))
         assert found["debris_balance_error"][-1] < 1e-12
         assert found["debris_thickness_strip"][-1].max() > 0.1 * run.end.worn.strip.max()
     for of in (lambda run: run.end.worn.punch, lambda run: run.end.worn.strip, lambda run: run.end.worn.carried[0]):
@@ -125,7 +126,7 @@ def test_with_stick_by_hand_and_by_jumps() -> None:
     apart = []
     for tolerance in (0.3, 0.03, 0.003):
         jumps = end(system, "jump", tolerance)
-        assert values(jumps)["debris_balance_error"].max() < 1e-12
+        assert computed(jumps, quantities(jumps.system))["debris_balance_error"].max() < 1e-12
         apart.append(
             [
                 float(np.abs(of(jumps) - of(marched)).max() / of(marched).max())
@@ -164,8 +165,10 @@ def test_along_a_closed_track_against_the_closed_form() -> None:
         x, worn = width * ROUND / TRACK / life, float(block.totals.of("volume_punch")[-1]) / thickness / count
         wanted = share * worn / (TRACK * x) * -np.expm1(-count * x)
         assert block.end.worn.carried[0] == pytest.approx(wanted, rel=error)
-        assert values(block)["debris_balance_error"][-1] < 1e-12
-        assert values(block)["debris_volume"][-1] == pytest.approx(thickness * TRACK * wanted, rel=error)
+        assert computed(block, quantities(block.system))["debris_balance_error"][-1] < 1e-12
+        assert computed(block, quantities(block.system))["debris_volume"][-1] == pytest.approx(
+            thickness * TRACK * wanted, rel=error
+        )
     assert steady(system).debris == pytest.approx(share * worn / (TRACK * x), rel=1e-8)
 
 

@@ -10,10 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.tri import TriContourSet
-from numpy.typing import NDArray
 
 from fenwear import load_case
 from fenwear.report.bodies import common_view, deformed, displacement, draw_pictures, points
@@ -23,7 +20,6 @@ from fenwear.report.figures import all_figures, read_history
 from fenwear.report.lines import fields_of
 from fenwear.report.maps import LEVELS, map_figure
 from fenwear.report.page import numbers_of
-from fenwear.report.style import by_powers
 from fenwear.report.surface import Surface, along_contact, centre_of_wear, model_of, surface_of
 from fenwear.run import run_case
 
@@ -230,52 +226,6 @@ def test_pictures(folders: dict[str, Path], name: str) -> None:
     drawn = draw_pictures(folders[name])
     assert {path.name.partition("_")[0] for path in drawn} == {"bodies"}
     assert all(path.stat().st_size > 10_000 for path in drawn)
-
-
-def test_contours_of_lattices_are_those_of_their_triangles() -> None:
-    """Areas between levels as triangles have them, and where the cells are no lattice by these alone."""
-    x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-0.5, 0.5, 31), indexing="ij")
-    numbers, points = np.arange(x.size).reshape(x.shape), np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
-    cells = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=-1).reshape(-1, 4)
-    order = np.random.default_rng(0).permutation(len(points))
-    rank = np.argsort(order)
-    whole = Surface("punch", points[order], rank[cells], points[order, :2], (0, 1))
-    holed = Surface("punch", points[order], rank[np.delete(cells, 600, axis=0)], points[order, :2], (0, 1))
-    values = np.exp(-3 * (points[order, 0] ** 2 + 2 * points[order, 1] ** 2))
-    areas = []
-    for surface in (whole, holed):
-        ax = Figure().subplots()
-        drawn = surface.contours(ax, values, levels=np.linspace(0, 1, 6))
-        areas.append([sum(_signed(part) for part in path.to_polygons()) for path in drawn.get_paths()])
-        assert isinstance(drawn, TriContourSet) == (surface is holed)
-    missed = 2 / 40 / 30
-    np.testing.assert_allclose(areas[0], areas[1], rtol=0, atol=1.01 * missed)
-    assert sum(areas[0]) == pytest.approx(2.0, rel=1e-9)
-    assert sum(areas[1]) == pytest.approx(2.0 - missed, rel=1e-9)
-
-
-def _signed(polygon: NDArray[np.float64]) -> float:
-    """Return the area within a polygon (k, 2), holes below zero."""
-    x, y = polygon.T
-    return float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum() / 2)
-
-
-def test_powers_in_letters() -> None:
-    """Logarithmic axes have the powers that matplotlib writes as formulas, also between them where there are few."""
-    for ends, along in (((1e-6, 1e3), "x"), ((2.0, 60.0), "y")):
-        formulas, letters = Figure().subplots(), Figure().subplots()
-        formulas.set(**{f"{along}scale": "log", f"{along}lim": ends})
-        by_powers(letters, along)
-        letters.set(**{f"{along}lim": ends})
-        for minor in (False, True):
-            theirs, ours = (
-                [text.get_text() for text in getattr(ax, f"get_{along}ticklabels")(minor=minor)]
-                for ax in (formulas, letters)
-            )
-            turned = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-            written = [re.sub(r"10\^\{(.*)\}", r"10\1", text[len("$\\mathdefault{") : -2]) for text in theirs]
-            assert [text.translate(turned) for text in ours] == [text.replace("\\times", " × ") for text in written]
-            assert not any("$" in text for text in ours)
 
 
 def test_strip_below_its_own_track(folders: dict[str, Path]) -> None:

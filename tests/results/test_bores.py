@@ -10,7 +10,8 @@ import xarray
 
 from fenwear import assemble, load_case, march, vary
 from fenwear.cycle import evolve
-from fenwear.results import place
+from fenwear.results.place import quantities
+from fenwear.results.quantity import computed
 from fenwear.results.summary import contact_sheets
 from fenwear.run import run_case
 
@@ -32,7 +33,7 @@ def test_each_bushing_has_its_own() -> None:
     between, beyond = (next(march(vary(system, f"strip.loads.0.through=[0, {at}, 0]"), 1)) for at in (10.0, 45.0))
     # Beyond, it is so far from being in line that each bushing touches at an end, where its middle has some play.
     for block, signs, play in ((between, (1, 1), 0.1), (beyond, (-1, 1), 0.4)):
-        sheets, found = contact_sheets(block), place.values(block)
+        sheets, found = contact_sheets(block), computed(block, quantities(block.system))
         assert list(sheets) == ["left", "right"]
         assert sum(one["force_z_N"] for one in sheets.values()) == pytest.approx(2000, rel=1e-9)
         assert sum(one["force_x_N"] for one in sheets.values()) == pytest.approx(0, abs=1e-6)
@@ -43,7 +44,7 @@ def test_each_bushing_has_its_own() -> None:
             assert one["eccentricity_mm"] == found[f"eccentricity_{name}"][-1]
     # Under a light load, which bends nothing, the shaft's places differ by its tilt.
     light = vary(system, "strip.loads.0.through=[0, 45, 0]", "strip.loads.0.force=[0, 0, 20]")
-    found = place.values(next(march(light, 1)))
+    found = computed(next(march(light, 1)), quantities(light))
     moved = (found["eccentricity_z_right"] - found["eccentricity_z_left"])[-1]
     assert 60 * found["turned_x_strip"][-1] == pytest.approx(moved, rel=5e-3)
 
@@ -68,7 +69,8 @@ def test_on_meshes_that_follow(integration: str) -> None:
     found = []
     for follow in ("0.001", "never"):
         case = load_case("bushing", [*small, fast, f"geometry.follow_wear={follow}", f"run.integration={integration}"])
-        found.append({name: value[-1] for name, value in place.values(list(evolve(assemble(case)))[-1]).items()})
+        last = list(evolve(assemble(case)))[-1]
+        found.append({name: value[-1] for name, value in computed(last, quantities(last.system)).items()})
     one, other = found
     assert one["eccentricity"] == pytest.approx(other["eccentricity"], rel=2e-3)
     assert one["attitude_angle"] == pytest.approx(other["attitude_angle"], abs=0.1)

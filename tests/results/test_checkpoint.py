@@ -82,7 +82,7 @@ def test_a_signal_loses_nothing(fenwear: Run, tmp_path: Path, number: signal.Sig
     command = [sys.executable, "-m", "fenwear", "run", "example1-heat", "-o", str(folder), *settings]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
-        while not (folder / "checkpoint").exists():
+        while not (folder / checkpoint.FILE).exists():
             assert process.poll() is None
             time.sleep(0.05)
         process.send_signal(number)
@@ -93,7 +93,7 @@ def test_a_signal_loses_nothing(fenwear: Run, tmp_path: Path, number: signal.Sig
         assert process.returncode == 1
         assert "--resume" in messages
         assert "Traceback" not in messages
-    with np.load(folder / "checkpoint" / "state.npz") as moment:
+    with np.load(folder / checkpoint.FILE) as moment:
         reached = int(moment["state.half_cycle"])
     assert (np.diff(history(folder).half_cycle) > 0).all()
     on = options(f"run.half_cycles={reached + 20}", "output.every=10")
@@ -118,7 +118,8 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
         done = fenwear("run", "example1-heat", "-o", folder, *options(*settings), "--resume")
         assert done.returncode == 2
         assert expected in done.stderr
-    (tmp_path / "run" / "checkpoint" / "extremes.json").unlink()  # as earlier ones have none
+    (tmp_path / "run" / checkpoint.FILE).unlink()
+    (tmp_path / "run" / "checkpoint").mkdir()  # as earlier versions have it
     done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume")
     assert done.returncode == 2
     assert "is damaged, or of an earlier version" in done.stderr

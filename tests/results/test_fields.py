@@ -14,7 +14,7 @@ from fenwear import Tribosystem, march
 from fenwear.bodies.antiplane import shear_out_of_plane
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.results.fields import BodyFields, body_fields, write_fields
+from fenwear.results.fields import Fields, body_fields, write_fields
 
 COARSE = ("geometry.degree=3", "geometry.parameters.elements_along_contact=8")
 
@@ -59,9 +59,9 @@ def test_fields_close_the_gap_with_heat(assembled: Callable[..., Tribosystem], t
     temperatures = block.end.temperature.temperatures()
     warm, cold = (body_fields(system, *state, given) for given in (temperatures, None))
 
-    def on_trace(fields: BodyFields, elastic: ElasticBody) -> np.ndarray:
+    def on_trace(fields: Fields, elastic: ElasticBody) -> np.ndarray:
         owned = elastic.dim * elastic.space.dofmap.index_map.size_local
-        return elastic.trace.pick(fields.displacement.x.array[:owned, None])[:, 1, 0]
+        return elastic.trace.pick(fields["displacement"].x.array[:owned, None])[:, 1, 0]
 
     punch, strip = system.bodies.punch, system.bodies.strip
     pressed, expansion = on_trace(cold[1], strip), on_trace(warm[1], strip) - on_trace(cold[1], strip)

@@ -77,5 +77,5 @@ def test_free_motions_are_those_of_loaded_surfaces() -> None:
     fields = body_fields(system, block.pressure[-1], block.rigid[-1], 0, None)
     punch = system.bodies.punch
     (field, _), size = fields, len(punch.load)
-    moved = loaded_motion(punch, field.displacement.x.array[:size])
+    moved = loaded_motion(punch, field["displacement"].x.array[:size])
     np.testing.assert_allclose(moved, block.rigid[-1], rtol=1e-8)

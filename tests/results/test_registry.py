@@ -16,7 +16,7 @@ from fenwear.cycle.steady_cycle import cycle_of_state
 from fenwear.life import Model, evaluate, parse_quantity, read_data
 from fenwear.report.key_numbers import flat, read_summary
 from fenwear.results import between
-from fenwear.results.quantity import RECORD, Quantity
+from fenwear.results.quantity import RECORD, Quantity, computed
 from fenwear.results.reading import current_names, load_history
 from fenwear.results.registry import known, quantities_of
 from fenwear.results.summary import nominal_pressure
@@ -117,7 +117,7 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
     pair = SimpleNamespace(weights=weights, strip=SimpleNamespace(weights=weights))
     system = SimpleNamespace(pair=pair, coatings=(np.ones(len(weights)), np.zeros(len(weights))))
     block: Any = SimpleNamespace(system=system, wear=depth, wear_strip=0 * depth)
-    found = between.coating_values(block)
+    found = computed(block, between.of_coated("punch"))
     assert found["worn_through_of_scar"] == pytest.approx([0.5])
     assert found["worn_through_of_surface"] == pytest.approx([0.1])
 

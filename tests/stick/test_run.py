@@ -86,7 +86,7 @@ def test_figures_of_one_body_that_wears(tmp_path: Path, body: str) -> None:
     history = by_cycles(load_history(folder))
     places = chosen(history, 3)
     assert (places[0], places[-1]) == (0, history.sizes["cycle"] - 1)
-    assert {"loops", "zones", "sliding"} <= set(stick_figures(history))
+    assert {"loops", "zones"} <= set(stick_figures(history))
 
 
 def test_gross_sliding_is_told(tmp_path: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_kill_between_checkpoints_costs_what_came_after(tmp_path: Path) -> Non
     whole = run(tmp_path / "two", [*how, "run.half_cycles=10"])
     shutil.copyfile(tmp_path / "two" / "history.nc", tmp_path / "one" / "history.nc")
     xarray.testing.assert_identical(run(tmp_path / "one", [*how, "run.half_cycles=10"], resume=True), whole)
-    with (tmp_path / "one" / "checkpoint" / "state.npz").open("r+b") as file:
+    with (tmp_path / "one" / "checkpoint.npz").open("r+b") as file:
         file.truncate(5000)
     with pytest.raises(CaseError, match=r"--resume: the checkpoint in .* is damaged"):
         run(tmp_path / "one", [*how, "run.half_cycles=20"], resume=True)

@@ -12,7 +12,7 @@ import xarray
 from work import half_cycles_whose_work_is_heat
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
-from fenwear.cli.partial_slip import final_of
+from fenwear.cli.states import final_of
 from fenwear.results.reading import by_cycles, load_history
 from fenwear.run import run_case
 from fenwear.stick.heat import balance_error
@@ -132,12 +132,12 @@ def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:
 def test_the_end_is_without_heat_of_friction() -> None:
     """As without the table heat where all is at the initial temperature; else as warm as held boundaries make it."""
     cold = [setting for setting in SMALL if not setting.startswith(("heat", "strip.temperatures"))]
-    exact, _ = final_of(load_case("fretting-partial-slip", cold))
-    same, numbers = final_of(load_case("fretting-partial-slip", list(SMALL)))
+    exact, _ = final_of(assemble(load_case("fretting-partial-slip", cold)))
+    same, numbers = final_of(assemble(load_case("fretting-partial-slip", list(SMALL))))
     assert same.depth == pytest.approx(exact.depth, abs=1e-12 * exact.depth.max())
     assert max(numbers["temperature_punch_K"]) == pytest.approx(0.0, abs=1e-12)
     held = "strip.temperatures=[{on='strip_bottom', temperature='50 K'}]"
-    end, _ = final_of(load_case("fretting-partial-slip", [*SMALL, held]))
+    end, _ = final_of(assemble(load_case("fretting-partial-slip", [*SMALL, held])))
     assert end.temperature is not None
     assert 40 < end.temperature.min() < end.temperature.max() < 50
     zone = (end.pressures > 0).any(axis=0)
@@ -148,7 +148,7 @@ def test_the_end_is_without_heat_of_friction() -> None:
 def test_what_does_not_go_with_heat_is_told() -> None:
     """The end of bodies that lose no heat, a full operator, the split."""
     with pytest.raises(CaseError, match=r"^heat\.convection: "):
-        final_of(load_case("fretting-partial-slip", [*SMALL, "strip.temperatures=[]", "heat.convection=0"]))
+        final_of(assemble(load_case("fretting-partial-slip", [*SMALL, "strip.temperatures=[]", "heat.convection=0"])))
     for setting, message in (("operator='full'", "heat.operator"), ("coupling='split'", "heat.coupling")):
         with pytest.raises(CaseError, match=f"{message}: expected"):
             load_case("fretting-partial-slip", [*SMALL, f"heat.{setting}"])

@@ -14,7 +14,8 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import make_case
 from fenwear.cycle import Block, jump
-from fenwear.results import place
+from fenwear.results.place import quantities
+from fenwear.results.quantity import computed
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 RADIUS, YOUNG, POISSON, LOAD = 10.0, 210e3, 0.3, 50.0  # of the bore, mm; MPa; N/mm
@@ -180,7 +181,7 @@ def bushing() -> Result:
 
 def _eccentricity(last: Block) -> float:
     """Return the way from the bore's middle to the shaft's at the end, mm."""
-    return float(place.values(last)["eccentricity"][-1])
+    return float(computed(last, quantities(last.system))["eccentricity"][-1])
 
 
 TABLE = (  # s (mm); depth (mm), half angle (degrees), area (mm²), largest pressure (MPa) at D = 0.05 mm and P = 50 N/mm

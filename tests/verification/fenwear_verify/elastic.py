@@ -114,7 +114,7 @@ def patch() -> Result:
             for body, field, strain in zip((system.bodies.punch, system.bodies.strip), fields, strains, strict=True):
                 owned = body.space.dofmap.index_map.size_local
                 z = body.space.tabulate_dof_coordinates()[:owned, 1]
-                ours.append(field.displacement.x.array[: 2 * owned].reshape(-1, 2))
+                ours.append(field["displacement"].x.array[: 2 * owned].reshape(-1, 2))
                 exact.append(np.stack([0 * z, strains[1] * heights[1] + strain * z], axis=1))
             expected, found = (np.concatenate(system.comm.allgather(np.concatenate(part))) for part in (exact, ours))
             scale = np.abs(expected).max()

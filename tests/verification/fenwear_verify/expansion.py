@@ -84,7 +84,7 @@ def free_expansion() -> Result:
         nothing = np.zeros(len(system.pair.x))
         unloaded = vary(system, "punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
         fields, _ = body_fields(unloaded, nothing, np.zeros(0), 0, (theta, strip))
-        ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
+        ours = fields["displacement"].x.array[: 2 * len(x)].reshape(-1, 2)
         s, expansion = x + half, alpha if plane == "stress" else (1 + nu) * alpha
         start = t0 - half * tx  # the temperature at the first pin, from where s is counted
         exact = expansion * np.stack(
@@ -97,7 +97,7 @@ def free_expansion() -> Result:
         rows.append(profile(f"plane {plane}: displacement (mm)", exact, ours, 1e-9, scale=scale))
         if plane == "stress":
             held = 2e5 * alpha * t0  # what a bar held at its ends would bear
-            largest = system.comm.allreduce(float(np.abs(fields.von_mises.x.array).max()), max)
+            largest = system.comm.allreduce(float(np.abs(fields["von_mises"].x.array).max()), max)
             rows.append(number(f"plane {plane}: largest stress / E alpha t0", 0, largest / held, 1e-8, scale=1))
     return Result(rows)
 

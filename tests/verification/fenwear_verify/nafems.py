@@ -26,7 +26,7 @@ def pressed(system: Tribosystem) -> tuple[Array, Array, float]:
     """Return x and the pressure (n,) without friction, and how the top centre of the strip moves up, mm; collective."""
     contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
     _, strip = body_fields(system, contact.pressure[0], contact.rigid[0], 0, None)
-    u = strip.displacement
+    u = strip["displacement"]
     x = u.function_space.tabulate_dof_coordinates()
     nearest = int(np.hypot(x[:, 0], x[:, 1] - HEIGHT).argmin())
     return system.pair.x, contact.pressure[0], float(u.x.array[2 * nearest + 1])

@@ -21,8 +21,7 @@ from fenwear.accuracy import (
     uncertainty_text,
     values_of,
 )
-from fenwear.accuracy.jumps import by_short_jumps
-from fenwear.accuracy.told import of_mesh
+from fenwear.accuracy.contributions import by_short_jumps, of_mesh
 from fenwear.accuracy.values import values_of_steady
 from fenwear.assembly import with_reduced_heat
 from fenwear.cycle import jump

@@ -91,9 +91,9 @@ class Comparison:
 
     def named(self) -> dict[str, dict[str, list[Any]]]:
         """Return the results by their names and units, and values at the same places."""
-        results = {}
-        for path, row in self.numbers.items():
-            of, _, key = path.rpartition(".")
+        results, order = {}, {key: number for number, key in enumerate(ALL_LINES)}
+        for path in sorted(self.numbers, key=lambda p: order.get(p, order.get(p.rpartition(".")[2], len(order)))):
+            row, (of, _, key) = self.numbers[path], path.rpartition(".")
             if not key.startswith(OF_EACH):
                 line = line_of(path)
                 suffix = f", {of}" if key in ALL_LINES and of not in ("", "sliding") else ""

@@ -259,7 +259,7 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
     text = (
         f"{setup}\n"
-        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
+        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle\n"
         f"first cycle: {REGIMES[regime_of(records, stuck)]}, "
         f"tangential force up to {thick * abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"

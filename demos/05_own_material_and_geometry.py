@@ -30,7 +30,7 @@ from matplotlib.collections import PolyCollection
 from fenwear import CaseError, assemble, make_case, steady
 from fenwear.compat import geometry_dofmap
 from fenwear.cycle import growth_rate
-from fenwear.report.figures import read_history
+from fenwear.results.reading import read_history
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements

@@ -75,7 +75,7 @@ _HOMES = {
     "steady": "cycle",
     "run_case": "run",
     "export": "results.export",
-    "read_history": "report.figures",
+    "read_history": "results.reading",
     "to_dataset": "results.reading",
     "flash_temperatures": "flash.temperatures",
     "sweep": "sweeps",

@@ -10,10 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -41,10 +45,6 @@ from fenwear.report.style import (
     wrapped,
 )
 from fenwear.results.netcdf import load
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FIELDS, FIGURES = "fields", "figures"
 BODIES = ("punch", "strip")
@@ -122,8 +122,6 @@ def _contact_nodes(fields: xarray.Dataset, body: str) -> NDArray[np.int64]:
 
 def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style = STANDARD) -> Figure:
     """Return both bodies with their elements, supports, loads and coordinates: whole, and near the contact."""
-    from matplotlib.lines import Line2D
-
     figure, axes = panels(2, 4.2, share_x=False, look=look)
     x, z = fields.punch_contact_x.values, fields.punch_contact_z.values
     width = float(np.ptp(x))
@@ -152,8 +150,6 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style
 
 def _elements(ax: Axes, fields: xarray.Dataset, body: str) -> None:
     """Draw the elements of a body: the edges of its linear cells that lie on an element's boundary."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
     cells = fields[f"{body}_cells"].values
     points = np.column_stack([fields[f"{body}_{a}"].values for a in "xz"])
     parts = int(fields[f"{body}_cells"].attrs["degree"]) ** 2  # linear cells of an element
@@ -369,9 +365,6 @@ def section(data: xarray.Dataset, body: str, field: str, view: View) -> tuple[Ar
 
 def bodies_figure(data: xarray.Dataset, field: str, view: View) -> Figure:
     """Draw both bodies, coloured by a field, with a bar of colours and what is to be known."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-
     name, unit, colours = SHOWN[field]
     unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
+from matplotlib.figure import Figure
 
 from fenwear.arrays import Array
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, InputError
 from fenwear.report.course import directions_present, mark_few
-from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import ALL_LINES, flat, line_of, number_text, read_case, read_summary
 from fenwear.report.lines import fields_of, tracks_of, worn_range
 from fenwear.report.stick import loop_of
@@ -31,11 +31,8 @@ from fenwear.report.style import (
 from fenwear.report.surface import gaps_of, model_of, part_lines
 from fenwear.results.disk import finite, writing
 from fenwear.results.quantity import in_kelvin
-from fenwear.results.reading import by_cycles, resolves
+from fenwear.results.reading import by_cycles, read_history, resolves
 from fenwear.results.sheet import shown
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FORMATS = (".png", ".pdf", ".svg")
 COURSES = {

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sized
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
@@ -27,10 +30,6 @@ from fenwear.report.style import (
     strip_moves,
 )
 from fenwear.results.sheet import BODIES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
@@ -378,7 +377,5 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: boo
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)
         if last < SHORT:
-            from matplotlib.ticker import MaxNLocator
-
             ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.set_xlabel(look.label)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import xarray
+from matplotlib.figure import Figure
 
-from fenwear.errors import CaseError, InputError
 from fenwear.report.bodies import field_figures
 from fenwear.report.course import course_figures
 from fenwear.report.key_numbers import names_in, read_case
@@ -30,12 +29,8 @@ from fenwear.report.stick import stick_figures, with_sums
 from fenwear.report.style import STANDARD, Style, direction_words, name_bodies, save, strip_moves, wrapped
 from fenwear.report.surface import cut_places, gaps_of, model_of, part_lines, sides_of
 from fenwear.results.disk import write_text
-from fenwear.results.history import HISTORY
-from fenwear.results.reading import by_cycles, load_history, resolves
+from fenwear.results.reading import by_cycles, read_history, resolves
 from fenwear.results.sheet import BODIES
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 FOLDER = "figures"
 CAPTIONS = "captions.txt"
@@ -95,20 +90,6 @@ AXES = {
     "distance": ("sliding distance", "the sliding distances named"),
     "time": ("time", "the times named"),
 }
-
-
-def read_history(directory: Path | str) -> xarray.Dataset:
-    """Return the history of a run, in memory.
-
-    Raises:
-        CaseError: there is none, it cannot be read, or holds no half-cycle yet.
-    """
-    history, path = load_history(directory), str(Path(directory) / HISTORY)
-    if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
-        raise CaseError(InputError(path, "no history of a run: it has other variables"))
-    if history.sizes["half_cycle"] == 0:
-        raise CaseError(InputError(path, "holds no half-cycle yet"))
-    return history
 
 
 def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style = STANDARD) -> dict[str, Figure]:

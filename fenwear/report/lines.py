@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
@@ -28,10 +30,6 @@ from fenwear.report.style import (
 )
 from fenwear.report.surface import along_contact, cut_places, gaps_of, model_of, parted, surface_of
 from fenwear.results.sheet import BODIES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LAST = 0.1  # of what is done, that a mean pressure is of
 LATE = "late_pressure"  # the variable that has it

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
@@ -31,10 +35,6 @@ from fenwear.report.style import (
 from fenwear.report.surface import AXES, Surface, model_of, surface_of
 from fenwear.results.roughness import evaluated, levelled
 from fenwear.results.sheet import BODIES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other
@@ -100,8 +100,6 @@ def map_panels(
         columns: Maps beside each other; 0 for as many as fit.
         within: Nodes around which maps end (n,); by default all.
     """
-    from matplotlib.collections import LineCollection
-
     seen = surface.map if within is None else surface.map[within]
     low, high = seen.min(axis=0), seen.max(axis=0)
     room = (0.03 if within is None or within.all() else MARGIN) * float((high - low).max()) + 1e-9
@@ -148,8 +146,6 @@ def fill_maps(
 
 def even_levels(low: float, high: float) -> Array:
     """Return round steps of colours between two values."""
-    from matplotlib.ticker import MaxNLocator
-
     locator = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10])
     return np.asarray(locator.tick_values(low, high if high > low else low + 1.0))
 
@@ -200,8 +196,6 @@ def has_tracks(history: xarray.Dataset) -> bool:
 
 def tracks_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Return tracks over the cycle, and the cross-shear ratio with the principal direction in the last one."""
-    from matplotlib.collections import LineCollection
-
     surface, last = surface_of(history), history.isel(half_cycle=-1)
     seen = list(surface.seen)
     figure, (left, right) = map_panels(surface, ["tracks over a cycle", "cross-shear and main direction"], look)

@@ -15,12 +15,13 @@ import xarray
 
 from fenwear.errors import CaseError, OutputError
 from fenwear.report.bodies import DrawingError, draw_pictures
-from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures, read_history
+from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import Number, answers, flat, names_in, read_case, read_summary, states
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.reading import read_history
 from fenwear.results.registry import known
 from fenwear.results.sheet import BODIES, UNCERTAINTY
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
@@ -24,10 +29,6 @@ from fenwear.report.style import (
 )
 from fenwear.report.surface import Surface, along_contact, gaps_of, model_of, parted, surface_of
 from fenwear.results.reading import cycle_at
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of a half-cycle: what is drawn of it
 THROUGH_MIDDLE = "place along the sliding, through the middle (mm)"
@@ -147,8 +148,6 @@ def _states(cycle: xarray.Dataset) -> NDArray[np.int64]:
 
 def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Return where the surfaces stick, slip and are open over the first and the last cycle."""
-    from matplotlib.colors import ListedColormap
-
     places = first_and_last(history)
     figure, axes = panels(len(places), 2.4, look=look)
     for ax, place in zip(axes, places, strict=True):
@@ -185,9 +184,6 @@ def with_sums(history: xarray.Dataset, cycles: xarray.Dataset) -> xarray.Dataset
 
 def zone_maps(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Return where the surfaces stick and slip at four times of a half-cycle, in the first and the last cycle."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.patches import Patch
-
     surface, (steps, titles) = surface_of(history), _shown(history, look)
     figure, axes = map_panels(surface, titles, look, columns=len(SHARES), within=touched(history))
     polygons, owner = node_cells(surface)

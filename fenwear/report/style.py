@@ -8,19 +8,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import ascii_lowercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib import colormaps, rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
 
 from fenwear.arrays import Array
 from fenwear.case.names import Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
 
 FORMATS = ("png", "pdf", "svg")
 LEAST, MOST = 50.0, 500.0  # mm
@@ -165,9 +167,6 @@ def panels(
 
     In several columns they follow each other row by row, and those of a row share the upward axis.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     size = 10.0 if look.width >= NARROW else 8.0
     settings = {"axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": "medium", "font.size": size}
     with rc_context({**settings, "pdf.fonttype": 42, "svg.fonttype": "none"}):
@@ -185,8 +184,6 @@ def panels(
 
 def shades(values: Sequence[int]) -> list[tuple[Any, int]]:
     """Return a colour for each value, dark to light, even in grey."""
-    from matplotlib import colormaps
-
     lightness = np.linspace(0.0, LIGHTEST, max(len(values), 2))
     return [(colormaps["plasma"](shade), n) for shade, n in zip(lightness, values, strict=False)]
 
@@ -239,10 +236,6 @@ def panels_of_maps(rows: int, columns: int, size: Array, look: Style = STANDARD)
 
     The bar stands beside the maps; below them where the figure is narrow.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
-
     narrow = look.width < NARROW
     each = (look.width - (0.7 if narrow else 1.8)) / columns - 0.1
     height = rows * (each * size[1] / size[0] + 0.45) + (1.1 if narrow else 0.5)
@@ -302,8 +295,6 @@ def contact_axis(ax: Axes, label: str = ALONG_CONTACT) -> None:
 
 def name_bodies(figures: Iterable[Figure], names: Names) -> None:
     """Let all that is written in figures have the names of the bodies."""
-    from matplotlib.text import Text
-
     if names.given:
         for text in (text for figure in figures for text in figure.findobj(Text)):
             text.set_text(names.told(text.get_text()))
@@ -314,8 +305,6 @@ def save(figure: Figure, path: Path, dpi: int) -> None:
 
     Panels of a fixed aspect are laid out twice: only then are their labels where they will be.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     if path.suffix == ".png":
         figure.set_dpi(dpi)
         canvas: Any = FigureCanvasAgg(figure)

@@ -10,10 +10,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -21,11 +25,6 @@ from scipy.sparse.csgraph import connected_components
 from fenwear.arrays import Array, Mask
 from fenwear.report.style import ALONG_CONTACT
 from fenwear.results.sheet import BODIES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.tri import Triangulation
 
 POINTS = 301  # along a cut
 TICKS = 2  # intervals between those of each of several parts on a map
@@ -143,8 +142,6 @@ class Surface:
 
     def set_ticks(self, ax: Axes) -> None:
         """Have the axes of a map tell where each of the parts is that are laid beside each other."""
-        from matplotlib.ticker import MaxNLocator
-
         if not self.overlaps:
             return
         places, texts = list[float](), list[str]()
@@ -219,8 +216,6 @@ class Surface:
         Args:
             values: At the nodes (n,).
         """
-        from matplotlib.tri import Triangulation
-
         points, nodes, cells = self._closed
         values = values[nodes]
         triangles = np.concatenate([cells[:, [0, k, k + 1]] for k in range(1, cells.shape[1] - 1)])
@@ -247,8 +242,6 @@ class Surface:
             along: Along the sliding, or across it.
             nodes: Those of it that are cut (n,); by default all, of parts behind each other the first.
         """
-        from matplotlib.tri import LinearTriInterpolator, Triangulation
-
         free, fixed = (0, 1) if along else (1, 0)
         # Where a track is closed, triangles between its two ends lie all over it.
         size = np.ptp(self.sliding[self.triangles, 0], axis=1)

@@ -67,6 +67,20 @@ def load_history(directory: Path | str) -> xarray.Dataset:
     return history.rename(current_names(map(str, history.variables)))
 
 
+def read_history(directory: Path | str) -> xarray.Dataset:
+    """Return the history of a run, in memory.
+
+    Raises:
+        CaseError: there is none, it cannot be read, or holds no half-cycle yet.
+    """
+    history, path = load_history(directory), str(Path(directory) / HISTORY)
+    if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
+        raise CaseError(InputError(path, "no history of a run: it has other variables"))
+    if history.sizes["half_cycle"] == 0:
+        raise CaseError(InputError(path, "holds no half-cycle yet"))
+    return history
+
+
 def current_names(names: Iterable[str]) -> dict[str, str]:
     """Return the present name of each of a file's names that has changed, by its old one."""
     known = [*names]

@@ -14,7 +14,7 @@ from PIL import Image
 from fenwear import CaseError, load_case
 from fenwear.report.bodies import element_edges
 from fenwear.report.course import course_figure, heat_balance_figure
-from fenwear.report.figures import all_figures, draw_figures, read_history
+from fenwear.report.figures import all_figures, draw_figures
 from fenwear.report.lines import (
     LATE,
     chosen_half_cycles,
@@ -26,7 +26,7 @@ from fenwear.report.lines import (
     with_late_pressures,
 )
 from fenwear.report.style import COLOURS, Style, chosen_formats, chosen_look, shades
-from fenwear.results.reading import load_history
+from fenwear.results.reading import load_history, read_history
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
 SHOWN = {"shape", "profiles", "wear_map", "pressure", "peaks", "volume", "scar", "friction", "convergence"}

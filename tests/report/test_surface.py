@@ -16,11 +16,12 @@ from fenwear import load_case
 from fenwear.report.bodies import common_view, deformed, displacement, draw_pictures, points
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.course import is_conforming
-from fenwear.report.figures import all_figures, read_history
+from fenwear.report.figures import all_figures
 from fenwear.report.lines import fields_of
 from fenwear.report.maps import LEVELS, map_figure
 from fenwear.report.page import numbers_of
 from fenwear.report.surface import Surface, along_contact, centre_of_wear, model_of, surface_of
+from fenwear.results.reading import read_history
 from fenwear.run import run_case
 
 EVIL = '<script>alert("1")</script> & <img src=x onerror=alert(1)>'

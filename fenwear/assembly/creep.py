@@ -263,8 +263,9 @@ class Creep:
         found = np.zeros((m, n, m, n))
         for member, own in zip(self.members, shares, strict=True):
             for i in range(m):
+                displaced = member.matrix(i, ratios[i])
                 for phase in range(m):
-                    found[phase, :, i] += own[phase, i] * member.coupled(phase, i, ratios[i])
+                    found[phase, :, i] += own[phase, i] * member.opened(phase, displaced)
         self._couplings.append((list(shares), list(ratios), found))
         del self._couplings[:-KEPT]
         return found

@@ -53,9 +53,6 @@ class Member(Protocol):
     def opened(self, phase: int, values: Array) -> Array:
         """Return the gap (n, ...) that displacements (size, ...) open in a phase."""
 
-    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
-        """Return the gap of a phase (n, n) that unit pressures of another one, with their friction, displace open."""
-
     def from_other(self, other: Member, states: Array, nodes: NDArray[np.int64]) -> Array:
         """Return states (terms, size) here of those of the same on another contact grid.
 
@@ -155,10 +152,6 @@ class CreepingBody:
         parts[self.which] = own
         return face.opened(*parts)[:, 0]
 
-    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
-        """Return the gap of a phase (n, n) by unit pressures of another one."""
-        return self.opened(phase, self.matrix(other, ratio))
-
     def from_other(self, _other: Member, states: Array, _nodes: NDArray[np.int64]) -> Array:
         """Return states (terms, size) as they are: its grid stays."""
         return states
@@ -195,20 +188,6 @@ class CreepingForces(CreepingBody):
         forces, by_loads = np.split(values, [-super().size])
         displaced = self._operator(phase).apply(forces.reshape(*self._forces, *values.shape[1:]))
         return super().opened(phase, displaced.reshape(by_loads.shape) + by_loads)
-
-    @cached_property
-    def _displaced(self) -> dict[int, tuple[Array, Array]]:
-        return {}
-
-    def coupled(self, phase: int, other: int, ratio: Array) -> Array:
-        """Return the gap of a phase (n, n) by unit pressures of another one, whose displacements are kept."""
-        known = self._displaced.get(other)
-        if known is None or known[0] is not ratio:
-            matrix = self.matrix(other, ratio)
-            forces = matrix[: -super().size].reshape(*self._forces, -1)
-            moved = self._operator(other).apply(forces).reshape(-1, matrix.shape[1])
-            known = self._displaced[other] = (ratio, moved)
-        return super().opened(phase, known[1])
 
     @property
     def _grid(self) -> RegularGrid:
@@ -258,10 +237,6 @@ class CreepingLayer:
     def opened(self, _phase: int, values: Array) -> Array:
         """Return the gap that closures open: as much."""
         return values
-
-    def coupled(self, _phase: int, other: int, ratio: Array) -> Array:
-        """Return the gap of a phase (n, n) by unit pressures of another one."""
-        return self.matrix(other, ratio)
 
     def from_other(self, _other: Member, states: Array, nodes: NDArray[np.int64]) -> Array:
         """Return closures (terms, n) where they were, elsewhere none."""

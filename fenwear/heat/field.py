@@ -334,6 +334,7 @@ class ReducedField:
         contact_responses: Sequence[Array] | None = None,
         *,
         one_way: bool = False,
+        modal: bool = False,
     ) -> None:
         """Project the steps; collective.
 
@@ -343,6 +344,7 @@ class ReducedField:
             basis: V with its lift.
             contact_responses: Of the full steps, for a basis of what later steps feel alone.
             one_way: Whether the material moves through the mesh in one direction.
+            modal: Whether V is of `modal_basis`, on which each step of a body at rest is a factor for each mode.
         """
         self._one_way = one_way
         self.basis, self.contact_responses = basis, contact_responses
@@ -354,6 +356,7 @@ class ReducedField:
             self._propagators.append(propagator)
             self._sources.append(source)
             self.responses.append(response)
+        self._decays = [np.diag(one).copy() for one in self._propagators] if modal else self._propagators
 
     def _projected(self, step: HeatStep, inflow: csc_array) -> tuple[Array, Array, Array]:
         """Return what a step makes of coordinates, without any, and of unit fluxes; collective."""
@@ -396,8 +399,8 @@ class ReducedField:
         return self.propagation(step).free(coordinates, sources=sources)
 
     def propagation(self, step: int) -> Propagation:
-        """Return the dense step."""
-        return Propagation(self._propagators[step], self._sources[step], self.responses[step])
+        """Return the step: dense, or one that lets each mode decay."""
+        return Propagation(self._decays[step], self._sources[step], self.responses[step])
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""
@@ -416,29 +419,3 @@ def modal_basis(basis: ReducedBasis, step: HeatStep, duration: float) -> tuple[R
     values, vectors = np.linalg.eigh((projected + projected.T) / 2)
     modes = ReducedBasis(basis.body, basis.lift, np.asarray(basis.columns @ vectors))
     return modes, np.maximum(values - 1 / duration, 0.0)
-
-
-class ModalField(ReducedField):
-    """The reduced temperature of a body at rest on its modes: each step is a factor for each of them."""
-
-    def __init__(
-        self,
-        steps: Sequence[HeatStep],
-        inflow: csc_array,
-        basis: ReducedBasis,
-        contact_responses: Sequence[Array] | None = None,
-    ) -> None:
-        """Project the steps; collective.
-
-        Args:
-            steps: Of the body, of different durations.
-            inflow: Loads of unit fluxes (owned, n), mm.
-            basis: Of `modal_basis`.
-            contact_responses: See `ReducedField`.
-        """
-        super().__init__(steps, inflow, basis, contact_responses)
-        self._decays = [np.diag(one).copy() for one in self._propagators]
-
-    def propagation(self, step: int) -> Propagation:
-        """Return the step that lets each mode decay."""
-        return replace(super().propagation(step), decay=self._decays[step])

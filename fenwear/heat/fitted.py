@@ -31,7 +31,7 @@ from fenwear.bodies import kept
 from fenwear.bodies.factor import Factor, available, entries, make_together
 from fenwear.errors import HeatError
 from fenwear.heat.conduction import PREFIX, HeatBody, HeatStep, Surroundings
-from fenwear.heat.field import CHUNK, ModalField, ReducedBasis, ReducedField, modal_basis
+from fenwear.heat.field import CHUNK, ReducedBasis, ReducedField, modal_basis
 from fenwear.heat.reduction import PASSES, ROUNDING, reduced_basis
 from fenwear.heat.side import EARLIER
 from fenwear.parallel import once, total
@@ -331,7 +331,7 @@ def _on(
 ) -> ReducedField:
     """Return the field on a basis, of material at rest on its modes; collective."""
     if not any(wish.velocities):
-        return ModalField(steps, inflow, modal_basis(basis, steps[0], wish.duration)[0], exact)
+        return ReducedField(steps, inflow, modal_basis(basis, steps[0], wish.duration)[0], exact, modal=True)
     one_way = min(wish.velocities) * max(wish.velocities) >= 0 and any(step.moves for step in steps)
     return ReducedField(steps, inflow, basis, exact, one_way=one_way)
 

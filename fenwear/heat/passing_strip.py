@@ -25,7 +25,7 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.field import FullField, Functional, ModalField, Propagation, ReducedBasis, ReducedField, modal_basis
+from fenwear.heat.field import FullField, Functional, Propagation, ReducedBasis, ReducedField, modal_basis
 from fenwear.heat.fitted import TRIES, Trial, Way, certificate, contact_responses, pressures, rigid_gaps
 from fenwear.heat.passage import Passage
 from fenwear.heat.reduction import reduced_basis
@@ -146,12 +146,8 @@ class PassingStrip:
         """Whether its modes hold what is felt a step later alone; the rest is in the nodes' own responses."""
         return len(self.passage.nodes) > MANY
 
-    def modes(self, shortest: float) -> ReducedBasis:
-        """Return a basis of modes for stages of this length, s, and longer ones; collective."""
-        return self._modes(shortest)[0]
-
     def _modes(self, shortest: float) -> tuple[ReducedBasis, Array]:
-        """Return the same, and the rates of the modes (dim,), 1/s."""
+        """Return a basis of modes for stages of this length, s, and longer ones, and their rates (dim,); collective."""
         if self._known is None or self._known[0] > shortest * (1 + 1e-9):
             step = self.body.step(0.0, shortest, self.around)
             # Fluxes weigh by their areas, as friction makes them; a node of a triangle may have none.
@@ -171,7 +167,7 @@ class PassingStrip:
         plans: Sequence[Sequence[StepPlan]],
         opened: Callable[[Array], Array],
         allowed: float,
-    ) -> tuple[ModalField, float]:
+    ) -> tuple[ReducedField, float]:
         """Return the strip on its modes and its difference from the whole mesh, more of them where it is large.
 
         Collective.
@@ -191,7 +187,7 @@ class PassingStrip:
         trial = Trial(self.loads, entering, csr_array(end @ self.nodes), opened, rigid, through=end)
         exact = contact_responses(steps, self.loads, self.nodes) if self.lasting else None
         for tries in range(1, TRIES + 1):
-            small = ModalField(steps, self.loads, self.modes(duration), exact)
+            small = ReducedField(steps, self.loads, self._modes(duration)[0], exact, modal=True)
             difference = certificate(steps[0], 0.0, self.around, small, trial)
             if difference <= allowed or tries == TRIES:
                 break

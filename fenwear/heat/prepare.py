@@ -14,7 +14,7 @@ from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange
-from fenwear.heat.field import FullField, Functional, ModalField, ReducedField
+from fenwear.heat.field import FullField, Functional, ReducedField
 from fenwear.heat.fitted import BasisRequest, Trial, Way, fitted_field, kept_basis, made, pressures, rigid_gaps
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing_strip import MANY, PassingStrip, ReciprocatingField
@@ -292,7 +292,7 @@ def _passing(
     body, around, passage = strip.body, strip.around, strip.passage
     transfers, kinds = [transfer for transfer, _ in of_places], [kind for _, kind in of_places]
     steps = [body.step(0.0, stage.duration, around) for stage in stages]
-    inner: FullField | ModalField
+    inner: FullField | ReducedField
     difference = None
     if reduced:
         shortest = stages[0].duration

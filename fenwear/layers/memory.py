@@ -224,8 +224,6 @@ class _Slopes:
 def _solved(matrices: Array, rows: Array) -> Array:
     if not len(rows):
         return rows
-    if matrices.shape[1] == 1:
-        return np.asarray(rows / matrices[:, 0, 0])
     return np.asarray(np.linalg.solve(matrices, rows.T[:, :, None])[:, :, 0].T)
 
 
@@ -547,6 +545,4 @@ def _feels(name: str, state: State, other: str) -> bool:
 
 def _increment(rate: Array, growth: Array, tau: float) -> Array:
     """Return what states change by in a time, by their rates (Q, n) and phi of tau J (n, Q, Q)."""
-    if len(rate) == 1:
-        return np.asarray((tau * growth[:, 0, 0]) * rate)
     return np.asarray(tau * np.einsum("nab,bn->an", growth, rate))

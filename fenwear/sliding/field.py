@@ -75,7 +75,7 @@ class SlidingField:
 
     def over(self, amount: float) -> SlidingField:
         """Return the motion of which this is so many units."""
-        shift, turn = (_vector(np.array(part) / amount) for part in (self.shift, self.turn))
+        shift, turn = (vector_of(np.array(part) / amount) for part in (self.shift, self.turn))
         return SlidingField(shift, turn, self.centre)
 
     def rate(self, x: Array, normal: Array) -> Array:
@@ -120,12 +120,13 @@ def screw(shift: Array, turn: Array, centre: Array) -> SlidingField:
     """
     size = float(turn @ turn)
     if size == 0:
-        return SlidingField(shift=_vector(shift))
+        return SlidingField(shift=vector_of(shift))
     along = (shift @ turn) / size * turn
-    return SlidingField(_vector(along), _vector(turn), _vector(centre + np.cross(turn, shift) / size))
+    return SlidingField(vector_of(along), vector_of(turn), vector_of(centre + np.cross(turn, shift) / size))
 
 
-def _vector(values: Array) -> Vector:
+def vector_of(values: Array) -> Vector:
+    """Return three numbers as a tuple, without a zero that is negative."""
     x, y, z = (float(c) + 0.0 for c in values)
     return x, y, z
 

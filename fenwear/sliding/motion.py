@@ -26,7 +26,7 @@ from fenwear.arrays import Array
 from fenwear.case import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.placement import HERE, Placement, Vector
-from fenwear.sliding.field import ALONG_X, Screw, Slide, SlidingField, Way
+from fenwear.sliding.field import ALONG_X, Screw, Slide, SlidingField, Way, vector_of
 
 DEFAULT_POSITIONS = 9  # at least, in a half-cycle where the strip wears or is uneven; odd, with one in the middle
 
@@ -417,7 +417,7 @@ def _table_motion(description: Cycle, *, moves: bool) -> Motion:
     course, centre = description.course, description.centre
     times = course.fraction * course.duration
     turns = Turn.from_matrix(course.turn).as_rotvec()
-    rows = [Placement(_vector(course.shift[k]), _vector(turn), centre) for k, turn in enumerate(turns)]
+    rows = [Placement(vector_of(course.shift[k]), vector_of(turn), centre) for k, turn in enumerate(turns)]
     phases = []
     for k, (first, last) in enumerate(itertools.pairwise(rows)):
         way = Screw(first, last)
@@ -433,9 +433,4 @@ def _table_motion(description: Cycle, *, moves: bool) -> Motion:
 def _unit(vector: Vector) -> Vector:
     size = np.linalg.norm(vector)
     first = next(c for c in vector if abs(c) > 1e-9 * size)
-    return _vector(np.array(vector) / np.copysign(size, first))
-
-
-def _vector(values: Array) -> Vector:
-    x, y, z = (float(c) for c in values)
-    return x, y, z
+    return vector_of(np.array(vector) / np.copysign(size, first))

@@ -33,6 +33,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
+from fenwear.heat.periodic import JumpEnd
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.interface.placement import HERE, Placement
 from fenwear.layers import conductance_of
@@ -169,7 +170,7 @@ class CycleMap:
 
     def after(self, temperature: Array, cycles: float) -> Array:
         """Return the temperatures after so many cycles in one implicit Euler step: (I + N (I - P)) s' = s + N b."""
-        return np.asarray(scipy.linalg.solve(self._matrix(cycles), temperature + cycles * self.source))
+        return JumpEnd(self.through, cycles).state(temperature, self.source)
 
     def at_rest(self) -> Array:
         """Return the temperatures that cycles lead to in the end (dim,): (I - P) s = b.
@@ -183,17 +184,13 @@ class CycleMap:
                 "For `steady` hold a temperature or set a convection: any value will do, since in the end nothing slips"
             )
             raise CaseError(InputError("heat.convection", message))
-        return np.asarray(scipy.linalg.solve(np.eye(len(self.source)) - self.through, self.source))
+        return JumpEnd(self.through, np.inf).state(self.source, self.source)
 
     def error(self, before: Array, after: Array, rate: Array, cycles: float) -> Array:
         """Return about the error of such a step (dim,), by the trapezoidal rule with the rate of change before it."""
         now = self.through @ after + self.source - after
         missing = after - before - cycles / 2 * (rate + now)
-        return np.asarray(scipy.linalg.solve(self._matrix(cycles), missing))
-
-    def _matrix(self, cycles: float) -> Array:
-        eye = np.eye(len(self.source))
-        return np.asarray(eye + cycles * (eye - self.through))
+        return JumpEnd(self.through, cycles).state(missing, np.zeros_like(missing))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from fenwear.heat.field import ModalField, ReducedBasis, ReducedField, modal_basis
+from fenwear.heat.field import ReducedBasis, ReducedField, modal_basis
 
 DURATION = 0.05
 
@@ -22,7 +22,7 @@ def test_modes_are_the_dense_steps(assembled: Callable[..., Any]) -> None:
     fields, _ = np.linalg.qr(step.respond(random.normal(size=(body.owned, 12))))
     basis = ReducedBasis(body, body.initial(), np.asarray(fields))
     modes, rates = modal_basis(orthonormal(basis), step, DURATION)
-    dense, modal = ReducedField([step], loads, orthonormal(basis)), ModalField([step], loads, modes)
+    dense, modal = ReducedField([step], loads, orthonormal(basis)), ReducedField([step], loads, modes, modal=True)
     assert (rates >= 0).all()
     ends = []
     for field in (dense, modal):

@@ -10,8 +10,7 @@ import typer
 from mpi4py import MPI
 
 from fenwear.case import builtin_cases
-from fenwear.cli import suggestions
-from fenwear.cli.base import JsonOption, answer, app, print_json
+from fenwear.cli.base import JsonOption, answer, app, print_json, suggested_keys
 from fenwear.parallel import on_root
 
 
@@ -23,7 +22,7 @@ def info_command(
             metavar="KEY",
             help="Explain this key of the case file, this table, or this ready geometry: bushing.geo; or list what a "
             "file has: a mesh, a shape from CAD, a table, a height map.",
-            autocompletion=suggestions.keys,
+            autocompletion=suggested_keys,
             show_default=False,
         ),
     ] = "",

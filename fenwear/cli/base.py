@@ -14,7 +14,6 @@ from mpi4py import MPI
 
 from fenwear.case import Case, load_case
 from fenwear.case.names import BY_ROLE
-from fenwear.cli import suggestions
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
@@ -30,12 +29,48 @@ UsageError: type[Any] = next(kind for kind in reversed(typer.BadParameter.__mro_
 
 DEFAULT_CASE = "example1-heat"
 
+# What the shell suggests for the words of a command.
+
+
+def suggested_cases(incomplete: str) -> list[str]:
+    """Return the built-in cases that begin so; files are the shell's own to suggest."""
+    from fenwear.case import builtin_cases
+
+    return [name for name in builtin_cases() if name.startswith(incomplete)]
+
+
+def suggested_keys(incomplete: str) -> list[str]:
+    """Return the keys and tables of the case file that begin so."""
+    return sorted({path for path, _ in _paths() if path.startswith(incomplete)})
+
+
+def suggested_settings(incomplete: str) -> list[str]:
+    """Return the keys that begin so, each ready for its value."""
+    return sorted({f"{path}=" for path, value in _paths() if value and path.startswith(incomplete)})
+
+
+def suggested_tests(incomplete: str) -> list[str]:
+    """Return the usual tests that begin so."""
+    from fenwear.case.templates import template_names
+
+    return [name for name in template_names() if name.startswith(incomplete)]
+
+
+def _paths() -> Iterator[tuple[str, bool]]:
+    """Yield every path, for both bodies, and whether it takes a value, as some tables do in place of their keys."""
+    from fenwear.case.keys import all_keys
+
+    for key in all_keys():
+        for body in ("punch", "strip"):
+            yield key.path.replace("BODY", body), not key.table or key.values.startswith("number")
+
+
 CaseArgument = Annotated[
     str,
     typer.Argument(
         metavar="CASE",
         help="A case file (TOML) or the name of a built-in case.",
-        autocompletion=suggestions.cases,
+        autocompletion=suggested_cases,
     ),
 ]
 SetOption = Annotated[
@@ -44,7 +79,7 @@ SetOption = Annotated[
         "--set",
         metavar="KEY=VALUE",
         help='Override a key: --set motion.amplitude="2 mm"; remove a key: --set unset=heat.inflow',
-        autocompletion=suggestions.settings,
+        autocompletion=suggested_settings,
     ),
 ]
 FreshOption = Annotated[bool, typer.Option("--fresh", help="Ignore the set-ups that earlier runs have kept on disk.")]

@@ -11,7 +11,6 @@ from mpi4py import MPI
 
 import fenwear
 from fenwear.case import plausibility_warnings
-from fenwear.cli import suggestions
 from fenwear.cli.base import (
     DEFAULT_CASE,
     CaseArgument,
@@ -28,6 +27,7 @@ from fenwear.cli.base import (
     recorded,
     show,
     show_results,
+    suggested_tests,
     with_names,
 )
 from fenwear.errors import CaseError, InputError
@@ -274,7 +274,7 @@ def new_command(
         typer.Argument(
             metavar="TEST",
             help="Name of a test, such as block-on-ring; without it all tests are listed.",
-            autocompletion=suggestions.tests,
+            autocompletion=suggested_tests,
             show_default=False,
         ),
     ] = "",

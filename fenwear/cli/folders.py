@@ -96,7 +96,7 @@ def flash_command(
     from fenwear.report.maps import flash_figures
     from fenwear.report.style import name_bodies, save
     from fenwear.results.disk import writing
-    from fenwear.results.netcdf import write
+    from fenwear.results.hdf5 import write
 
     found = flash_temperatures(directory, settings)
     folder, names = output or directory / "flash", found.heating.placed.names

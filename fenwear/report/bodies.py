@@ -44,7 +44,7 @@ from fenwear.report.style import (
     strip_moves,
     wrapped,
 )
-from fenwear.results.netcdf import load
+from fenwear.results.hdf5 import load
 
 FIELDS, FIGURES = "fields", "figures"
 BODIES = ("punch", "strip")

@@ -6,17 +6,21 @@ their uncertainty, whether the run has become stationary, and a picture. Figures
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import jinja2
 import xarray
+from markupsafe import Markup
 
+from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, OutputError
 from fenwear.report.bodies import DrawingError, draw_pictures
 from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures
-from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import Number, answers, flat, names_in, read_case, read_summary, states
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
@@ -169,3 +173,51 @@ def _figures(directory: Path, written: float, history: xarray.Dataset, look: Sty
     for name, text in captions.items():
         found[name] = picture(images[name].read_bytes(), images[name].suffix[1:], text, text)
     return found
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image inside the page.
+
+    Attributes:
+        source: The image itself, as a data URL.
+        caption: Below it.
+        alt: What it shows, for those who do not see it.
+    """
+
+    source: str
+    caption: str
+    alt: str
+
+
+def picture(image: bytes, suffix: str, caption: str, alt: str) -> Picture:
+    """Return an image file's content, of the type of its suffix ("png", "gif"), as a part of a page."""
+    return Picture(f"data:image/{suffix};base64,{base64.b64encode(image).decode('ascii')}", caption, alt)
+
+
+def time(moment: datetime) -> Markup:
+    """Return a time for readers and programs."""
+    return Markup('<time datetime="{}">{}</time>').format(
+        moment.isoformat(timespec="seconds"), f"{moment:%d %B %Y, %H:%M %Z}"
+    )
+
+
+_TEMPLATES = jinja2.Environment(
+    loader=jinja2.PackageLoader("fenwear.report"),
+    autoescape=True,
+    undefined=jinja2.StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+_TEMPLATES.globals["time"] = time
+
+
+def render(template: str, names: Names = BY_ROLE, **values: object) -> Markup:
+    """Return a template with its values; every text among them that is no Markup is escaped, and names the bodies."""
+
+    def told(value: object) -> object:
+        plain = isinstance(value, str) and not isinstance(value, Markup) and not value.startswith("data:")
+        return names.told(str(value)) if plain else value
+
+    templates = _TEMPLATES.overlay(finalize=told) if names.given else _TEMPLATES
+    return Markup(templates.get_template(template).render(values))

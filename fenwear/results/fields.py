@@ -29,10 +29,9 @@ from fenwear.compat import facet_nodes
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
-from fenwear.results import netcdf
 from fenwear.results.disk import check_room, replacing, writing
+from fenwear.results.hdf5 import append, step_of, write
 from fenwear.results.quantity import degrees_of
-from fenwear.results.vtkhdf import append, step_of
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:
@@ -317,7 +316,7 @@ def _make_folder(folder: Path, size: int) -> None:
 
 def _write_nodal(dataset: xarray.Dataset, folder: Path, stem: str) -> None:
     with replacing(folder / f"{stem}.nc") as part:
-        netcdf.write(part, dataset)
+        write(part, dataset)
     append(folder / SERIES, step_of(dataset))
 
 

@@ -24,7 +24,7 @@ from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.results import roughness, steps
 from fenwear.results.disk import check_room, replacing, write_text, writing
-from fenwear.results.netcdf import Netcdf
+from fenwear.results.hdf5 import Netcdf
 from fenwear.results.quantity import KELVIN, Quantity, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
 from fenwear.results.surfaces import Column, conforming, on_mesh, part_columns, surface_columns

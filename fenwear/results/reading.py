@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
+from fenwear.results.hdf5 import load
 from fenwear.results.history import HISTORY, columns_of, variables_of
-from fenwear.results.netcdf import load
 from fenwear.results.quantity import KELVIN, RECORD, computed, degrees_of, reduced
 from fenwear.results.registry import known
 from fenwear.results.steps import STEP

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
 
 from fenwear.report.style import BLUE, GREY, RED, legend_beside, panels, run_style, shades
 from fenwear.results.disk import writing
 from fenwear.results.steps import REGIMES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PICTURE = "sweep.png"
 FRETTING = ("regime", "stick_share", "energy_ratio", "largest_depth", "largest_depth_strip")

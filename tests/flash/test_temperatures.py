@@ -13,7 +13,7 @@ import pytest
 from fenwear import CaseError, load_case, run_case
 from fenwear.flash import source
 from fenwear.flash.temperatures import FlashTemperatures, flash_temperatures
-from fenwear.results.netcdf import load
+from fenwear.results.hdf5 import load
 
 STEEL = (
     "materials.steel.conductivity='46 W/(m K)'",

@@ -13,8 +13,8 @@ import pytest
 import xarray
 
 from fenwear import CaseError, load_case
+from fenwear.results.hdf5 import load
 from fenwear.results.history import HISTORY
-from fenwear.results.netcdf import load
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 

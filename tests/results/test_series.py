@@ -12,7 +12,7 @@ import xarray
 
 from fenwear import load_case
 from fenwear.results.fields import SERIES
-from fenwear.results.vtkhdf import TRIANGLE, Step, append
+from fenwear.results.hdf5 import TRIANGLE, Step, append
 from fenwear.run import run_case
 
 

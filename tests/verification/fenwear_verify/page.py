@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fenwear.arrays import Array
-from fenwear.report.html_page import Picture, picture, render
+from fenwear.report.page import Picture, picture, render
 from fenwear.report.style import COLOURS, DASHES, panels
 from fenwear_verify.suite import Line, Outcome, Plot
 

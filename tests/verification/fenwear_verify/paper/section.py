@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fenwear.arrays import Array
-from fenwear.report.html_page import Picture, picture, render
+from fenwear.report.page import Picture, picture, render
 from fenwear_verify.paper.figures import Picture as Drawing
 from fenwear_verify.paper.figures import paper_figures
 from fenwear_verify.paper.published import OPEN

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block, HalfCycle, Recorder
 from fenwear.cycle.state import RunState
-from fenwear.errors import ConvergenceError, InterruptedRunError
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError
 from fenwear.parallel import Team
 
 BLOCK = 200  # half-cycles
@@ -158,7 +158,7 @@ class _Stretches:
             except (ConvergenceError, InterruptedRunError) as error:
                 self.system.names.tell(error)
                 failure: Exception = error
-                if isinstance(error, ConvergenceError):
+                if isinstance(error, ConvergenceError) and not isinstance(error, CaseError):
                     failure = type(error)(f"half-cycle {state.half_cycle + 1}: {error}")
                     failure.__cause__ = error
                 return _Stretch(recorder.take(state) if recorder else None, state, failure=failure)

@@ -307,3 +307,10 @@ def test_laws_are_asked_at_pressures_alone() -> None:
 def test_what_is_wrong(setting: str, expected: str) -> None:
     with pytest.raises(CaseError, match=expected):
         load_case("example2", [setting])
+
+
+def test_a_coefficient_that_fails_in_a_run_names_its_key(assembled: Assemble) -> None:
+    """As it does where a case is read."""
+    system = assembled("example1", *SMALL, "contact.friction={expression='0.3 - p / 100'}")
+    with pytest.raises(CaseError, match=r"contact\.friction"):
+        list(march(system, 40))

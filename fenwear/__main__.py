@@ -11,7 +11,7 @@ import sys
 import traceback
 from typing import TYPE_CHECKING, Any, TextIO
 
-from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, StackError
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, PartDoneError, StackError
 from fenwear.stack import check_numbers, importing
 
 if TYPE_CHECKING:
@@ -107,11 +107,11 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except ConvergenceError as error:
         print(f"fenwear: {with_names(str(error))}", file=sys.stderr)
         return 3
-    except (InterruptedRunError, OutputError, StackError) as error:
+    except (InterruptedRunError, OutputError, PartDoneError, StackError) as error:
         print(f"fenwear: {error}", file=sys.stderr)
         if isinstance(error, InterruptedRunError):
             ignore_from_now_on()
-        return 1
+        return 0 if isinstance(error, PartDoneError) else 1
     except (typer.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)
     except Exception:

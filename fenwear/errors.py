@@ -82,6 +82,10 @@ class TimeUpError(Exception):
     """What was to be done within a time limit took longer."""
 
 
+class PartDoneError(FenwearError):
+    """A part of a study is done, and others are not: there is no result yet."""
+
+
 class MeshQualityError(ConvergenceError):
     """A mesh that follows the wear has an element that is no longer good enough to compute on."""
 

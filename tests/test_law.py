@@ -12,7 +12,7 @@ from fenwear.assembly import assemble
 from fenwear.law_choice import check_decided, resolve_law
 from fenwear.plausibility import system_warnings
 from fenwear.run import run_case
-from fenwear.sweeps.engines import VariantRunner
+from fenwear.sweeps.variant import VariantRunner
 
 SMALL = (
     "contact.law='auto'",
@@ -84,7 +84,7 @@ def test_what_follows_one_law_says_so() -> None:
     """Sweeps and lives are no results of a law that the case does not call for; the law given, they are."""
     case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='3 um'"])
     with pytest.raises(CaseError, match=r"contact\.law:"):
-        VariantRunner().values(case, "steady")
+        VariantRunner("steady").compute(case)
     with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken"):
         check_decided(assemble(case))
     check_decided(assemble(load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'"])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +23,9 @@ from fenwear.cli.base import (
 )
 from fenwear.errors import CaseError, InputError, StackError
 
+if TYPE_CHECKING:
+    from fenwear.life.study import StudyOptions
+
 QuantitiesOption = Annotated[
     list[str],
     typer.Option(
@@ -35,6 +38,40 @@ ListOption = Annotated[bool, typer.Option("--list", help="Print the names of the
 KeysOption = Annotated[
     list[str], typer.Option("--to", metavar="KEY", help="Key, such as wear.punch.coefficient; repeatable.")
 ]
+
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Resume in the folder: compute the missing runs.")]
+PartOption = Annotated[
+    str,
+    typer.Option(
+        metavar="I/N", help="Compute part I of N into the shared folder; by default that of a Slurm job array."
+    ),
+]
+CollectOption = Annotated[bool, typer.Option("--collect", help="Put together what all parts have computed.")]
+ScriptOption = Annotated[
+    str, typer.Option(metavar="slurm", help="Print the batch file of a job array of N parts (--part 1/N), and exit.")
+]
+ProcessesOption = Annotated[
+    int | None, typer.Option(help="Local processes; by default as many as cores, where that pays.")
+]
+
+
+def _options(
+    output: Path | None, part: str, script: str, *, resume: bool, collect: bool = False, processes: int | None = 1
+) -> StudyOptions:
+    """Return how a study computes its runs; print its batch file instead where that is asked for."""
+    from fenwear.life.study import batch_file, parse_part
+
+    found = parse_part(part)
+    if script not in ("", "slurm"):
+        raise CaseError(InputError("--script", f"expected slurm, got {script!r}"))
+    if script:
+        if found is None or output is None:
+            raise CaseError(
+                InputError("--script", "expected the number of parts, as --part 1/8, and a folder, as -o DIR")
+            )
+        show(batch_file(sys.argv[1:], found[1]))
+        raise typer.Exit
+    return {"folder": output, "part": found, "resume": resume, "collect": collect, "processes": processes}
 
 
 @app.command("verify")
@@ -114,16 +151,22 @@ def sensitivity_command(
     differences: Annotated[
         bool, typer.Option("--differences", help="Take all derivatives by differences of runs.")
     ] = False,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    output: OutputOption = None,
+    resume: ResumeOption = False,
+    part: PartOption = "",
+    collect: CollectOption = False,
+    script: ScriptOption = "",
+    processes: ProcessesOption = None,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
     """Print the derivatives of quantities of interest to keys of the case, and draw a tornado plot."""
     from fenwear.life import commands
 
+    how = _options(output, part, script, resume=resume, collect=collect, processes=processes)
     loaded = load(case, settings)
     found, folder = commands.run_sensitivity(
-        loaded, Path(case).stem, quantities, keys, spread, output, log, differences=differences
+        loaded, Path(case).stem, quantities, keys, spread, log, differences=differences, **how
     )
     text = "\n\n".join(one.text() for one in found)
     show_results(commands.as_json(found) if as_json else text, f"results in {folder}")
@@ -142,29 +185,25 @@ def calibrate_command(
     each: Annotated[
         bool, typer.Option("--each", help="Fit every file alone, and print the scatter between them.")
     ] = False,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Resume an interrupted fit from its trials in -o DIR.")
-    ] = False,
+    output: OutputOption = None,
+    resume: ResumeOption = False,
+    part: PartOption = "",
+    script: ScriptOption = "",
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
     """Fit keys of the case to measurements, with standard errors and what the data cannot determine."""
     from fenwear.life import commands
 
+    how = _options(output, part, script, resume=resume)
     loaded = load(case, settings)
+    study = (loaded, Path(case).stem, data, unknowns, baseline, log)
     if each:
-        if resume:
-            raise CaseError(InputError("--resume", "resumes the fit of all files together. Leave out --each"))
-        tests, between, folder = commands.run_calibrate_each(
-            loaded, Path(case).stem, data, unknowns, baseline, output, log
-        )
+        tests, between, folder = commands.run_calibrate_each(*study, **how)
         text = "\n".join([*(one.text() for one in tests), *between.text])
         show_results(commands.each_as_json(tests, between) if as_json else text, f"results in {folder}")
         return
-    found, folder = commands.run_calibrate(
-        loaded, Path(case).stem, data, unknowns, baseline, output, log, resume=resume
-    )
+    found, folder = commands.run_calibrate(*study, **how)
     show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 
 
@@ -193,19 +232,23 @@ def life_command(
     samples: Annotated[int, typer.Option(help="Number of samples; each is a run.")] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the sample.")] = 0,
     wanted: Annotated[str | None, typer.Option(help='Life whose reliability is computed: "1e6 cycles".')] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Resume with the samples in the folder.")] = False,
+    output: OutputOption = None,
+    resume: ResumeOption = False,
+    part: PartOption = "",
+    collect: CollectOption = False,
+    script: ScriptOption = "",
+    processes: ProcessesOption = None,
     settings: SetOption = [],  # noqa: B006
     as_json: JsonOption = False,
 ) -> None:
     """Print the life until a level, or with --scatter the distribution of the lives of many parts."""
     from fenwear.life import commands
 
+    how = _options(output, part, script, resume=resume, collect=collect, processes=processes)
     loaded = load(case, settings)
     found, folder = commands.run_life(
-        loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log,
-        resume=resume,
-    )  # fmt: skip
+        loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, log, **how
+    )
     show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
 
 
@@ -223,11 +266,12 @@ def sweep_command(
         bool, typer.Option("--zip", help="Combine the first values of all keys, the second values, and so on.")
     ] = False,
     table: Annotated[Path | None, typer.Option(help="CSV of variants: a heading of keys, then rows.")] = None,
-    processes: Annotated[
-        int | None, typer.Option(help="Local processes; by default as many as cores, where that pays.")
-    ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Compute the missing variants of the folder.")] = False,
+    output: OutputOption = None,
+    resume: ResumeOption = False,
+    part: PartOption = "",
+    collect: CollectOption = False,
+    script: ScriptOption = "",
+    processes: ProcessesOption = None,
     overwrite: OverwriteOption = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
     settings: SetOption = [],  # noqa: B006
@@ -237,13 +281,11 @@ def sweep_command(
     from fenwear.sweeps.sweep import as_json as sweep_json
     from fenwear.sweeps.sweep import run_sweep, text
 
+    how = _options(output, part, script, resume=resume, collect=collect, processes=processes)
     loaded = load(case, settings)
     if overwrite:
-        clear(output, resume=resume)
-    dataset, folder = run_sweep(
-        loaded, Path(case).stem, over, table, of, output, log,
-        zipped=zipped, resume=resume, processes=processes, quiet=quiet,
-    )  # fmt: skip
+        clear(output, resume=resume or collect or how["part"] is not None)
+    dataset, folder = run_sweep(loaded, Path(case).stem, over, table, of, log, zipped=zipped, quiet=quiet, **how)
     show_results(sweep_json(dataset) if as_json else text(dataset), f"results in {folder}")
     if (dataset["trouble"].values != "").any():
         raise typer.Exit(3)

@@ -10,7 +10,7 @@ From Python:
     life = lifetime(case, "depth 0.2 mm", fit.scatter())
 """
 
-from fenwear.life.calibrate import Calibration, between, calibrate
+from fenwear.life.calibrate import Calibration, between, calibrate, calibrate_each
 from fenwear.life.data import DataSet, Noise, Series, measured_folder, read_data
 from fenwear.life.keys import Unknown
 from fenwear.life.least_squares import LeastSquares
@@ -19,6 +19,7 @@ from fenwear.life.model import Model, Snapshot
 from fenwear.life.quantities import Quantity, evaluate, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Forward, Sensitivity, forward, sensitivity
+from fenwear.life.study import StudyOptions
 
 __all__ = [
     "Calibration",
@@ -33,9 +34,11 @@ __all__ = [
     "Sensitivity",
     "Series",
     "Snapshot",
+    "StudyOptions",
     "Unknown",
     "between",
     "calibrate",
+    "calibrate_each",
     "evaluate",
     "forward",
     "lifetime",

@@ -10,13 +10,12 @@ of the same kind, each fitted by itself, give the scatter between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
-from mpi4py import MPI
 from scipy import stats
 from scipy.optimize import OptimizeResult
 
@@ -33,9 +32,9 @@ from fenwear.life.least_squares import (
     without_baselines,
 )
 from fenwear.life.quantities import GROWING, unit_of
-from fenwear.life.runs import Trials
 from fenwear.life.scatter import Scatter
-from fenwear.parallel import on_root
+from fenwear.life.study import Study, StudyOptions, case_text, named
+from fenwear.progress import Log
 from fenwear.results.disk import finite
 
 LARGEST_CONDITION = 1e12  # of the Jacobian, beyond which the data do not tell what is fitted
@@ -193,10 +192,8 @@ def calibrate(
     unknowns: Sequence[str | Unknown],
     *,
     baseline: Sequence[str] = (),
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Callable[[str], None] = lambda message: None,
-    trials: Trials | None = None,
-    resume: bool = False,
+    progress: Log = lambda message: None,
+    **how: Unpack[StudyOptions],
 ) -> Calibration:
     """Return the unknown keys of a case that fit measurements best; collective.
 
@@ -205,23 +202,52 @@ def calibrate(
         data: What was measured.
         unknowns: Keys, with or without bounds.
         baseline: "offset" and "tilt" of each profile's trace, to be found too.
-        comm: The ranks.
         progress: Gets the stage, and the number of runs with their residual.
-        trials: Keeps the predictions of each trial, for a fit that is interrupted.
-        resume: Take those that it holds already.
+        how: Folder, parts and ranks, as `fenwear.life.StudyOptions`. Each part returns the result.
 
     Raises:
         CaseError: an unknown without influence, bounds that make no sense, or too few data.
         ConvergenceError: a run or the fit did not converge.
     """
+    return _calibrations(case, [data], unknowns, baseline, progress, how)[0]
+
+
+def calibrate_each(
+    case: Case,
+    data: Sequence[DataSet],
+    unknowns: Sequence[str | Unknown],
+    *,
+    baseline: Sequence[str] = (),
+    progress: Log = lambda message: None,
+    **how: Unpack[StudyOptions],
+) -> list[Calibration]:
+    """Return the calibration on each data set alone, as `calibrate`; collective."""
+    return _calibrations(case, [[one] for one in data], unknowns, baseline, progress, how)
+
+
+def _calibrations(
+    case: Case,
+    tests: Sequence[Sequence[DataSet]],
+    unknowns: Sequence[str | Unknown],
+    baseline: Sequence[str],
+    progress: Log,
+    how: StudyOptions,
+) -> list[Calibration]:
+    study = Study.of(how)
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
-    problem = LeastSquares(case, data, asked, baseline, comm, progress, trials)
-    about = f"{case.to_toml()} {list(data)} {asked} {list(baseline)}"
-    on_root(comm, lambda: problem.trials.begin(about, resume=resume))
-    return problem.team.lead(partial(_calibrated, problem, progress))
+    problems = [LeastSquares(case, data, asked, baseline, progress, study) for data in tests]
+    store = study.open(case, named(case_text(case), [one.key for one in problems], asked, list(baseline)))
+    found = []
+    while problems:
+        problem = problems.pop(0)  # whose systems are then free
+        if len(tests) > 1:
+            progress(f"calibrating on {problem.data[0].name}")
+        problem.store = store
+        found.append(problem.team.lead(partial(_calibrated, problem, progress)))
+    return found
 
 
-def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calibration:
+def _calibrated(problem: LeastSquares, progress: Log) -> Calibration:
     z: Array = np.zeros(len(problem.unknowns))
     _begin(problem, z)
     problem.check_influence(problem.jacobian(z), z)
@@ -287,7 +313,7 @@ def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
         tuple(not_known or hardly_known(keys, problem.data, own)),
         tuple(remarks),
         tuple(at_bound),
-        problem.model.evaluations,
+        problem.evaluations,
         weighted,
     )
 

@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
 import numpy as np
 from mpi4py import MPI
 
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
-from fenwear.life.calibrate import Calibration, between, between_as_json, calibrate
-from fenwear.life.data import read_data
-from fenwear.life.keys import parse_unknown, with_values
+from fenwear.life.calibrate import Calibration, between, between_as_json, calibrate, calibrate_each
+from fenwear.life.data import DataSet, read_data
+from fenwear.life.keys import Unknown, parse_unknown, with_values
 from fenwear.life.lifetime import Lifetime, Lives, lifetime
 from fenwear.life.model import Model
 from fenwear.life.quantities import Quantity, cycles_of, lives, of_case, parse_amount, parse_quantity, unit_of
-from fenwear.life.runs import TRIALS, Trials, everywhere
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
+from fenwear.life.study import Study, StudyOptions, in_results
 from fenwear.parallel import on_root
-from fenwear.progress import now_and_then
+from fenwear.progress import Log, now_and_then
 from fenwear.report.style import BLUE, GREY, RED, panels, reference_line
-from fenwear.results.disk import write_text, writing
+from fenwear.results.disk import replacing, write_text
 from fenwear.results.export import csv_text
-from fenwear.results.history import free_directory, make_directory, write_case
+from fenwear.results.history import make_directory, write_case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,29 +115,8 @@ def life_figure(life: Lifetime) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    with writing(path):
-        figure.savefig(path, dpi=150)
-
-
-Log = Callable[[str], None]
+Drawn: TypeAlias = Callable[[], "Figure"]
 FITTED = "fitted.toml"  # the case with the values that a calibration has found
-
-
-def _folder(output: Path | None, what: str, name: str, comm: MPI.Comm) -> Path:
-    """Return the new folder of the results."""
-
-    def make() -> Path:
-        path = output or free_directory(Path("results") / f"{what}-{name}")
-        make_directory(path)
-        return path
-
-    return on_root(comm, make)
 
 
 def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
@@ -152,31 +132,42 @@ def _counter(log: Log, what: str) -> Callable[[int, int], None]:
     return lambda done, total: (log if done == total else seldom)(f"{what} {done:,} of {total:,}")
 
 
+def _write(
+    folder: Path, comm: MPI.Comm, found: Mapping[str, Any], texts: Mapping[str, str], figures: Mapping[str, Drawn]
+) -> None:
+    """Write the tables of NAME.json, the texts and the figures of a study into its folder; collective."""
+
+    def write() -> None:
+        for name, table in found.items():
+            write_text(folder / name, json.dumps(table, indent=1))
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        for name, draw in figures.items():
+            with replacing(folder / name) as part:
+                draw().savefig(part, dpi=150, format="png")
+
+    on_root(comm, write)
+
+
 def run_sensitivity(
     case: Case,
     name: str,
     quantities: Sequence[str],
     keys: Sequence[str],
     spread: float,
-    output: Path | None,
     log: Log,
     *,
     differences: bool = False,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    **how: Unpack[StudyOptions],
 ) -> tuple[list[Sensitivity], Path]:
     """Compute sensitivities; write sensitivity.json and tornado.png; collective."""
     method: Method | None = "differences" if differences else None
+    how, folder = in_results(how, f"sensitivity-{name}")
+    comm = Study.of(how).comm
     _tell_of_stick(case, log, comm)
-    found = sensitivity(case, quantities, keys, spread=spread, method=method, comm=comm, progress=_counter(log, "keys"))
-    folder = _folder(output, "sensitivity", name, comm)
-
-    def write() -> None:
-        write_case(folder, case)
-        write_text(folder / "sensitivity.json", json.dumps([one.as_json() for one in found], indent=1))
-        if spread > 0:
-            save(tornado(found), folder / "tornado.png")
-
-    on_root(comm, write)
+    found = sensitivity(case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how)
+    figures = {"tornado.png": lambda: tornado(found)} if spread > 0 else {}
+    _write(folder, comm, {"sensitivity.json": [one.as_json() for one in found]}, {}, figures)
     return found, folder
 
 
@@ -186,34 +177,19 @@ def run_calibrate(
     files: Sequence[Path],
     unknowns: Sequence[str],
     baseline: Sequence[str],
-    output: Path | None,
     log: Log,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    *,
-    resume: bool = False,
+    **how: Unpack[StudyOptions],
 ) -> tuple[Calibration, Path]:
-    """Calibrate; write the fitted case, calibration.json, residuals and the trials of the fit; collective.
+    """Calibrate; write the fitted case, calibration.json and residuals; collective.
 
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
     """
-    asked = [parse_unknown(case, text) for text in unknowns]
-    data = on_root(comm, lambda: [read_data(path, case) for path in files])
-    for one in data:
-        log(one.listing)
-    _tell_of_stick(case, log, comm)
-    folder = _resumed(output) if resume else _folder(output, "calibrate", name, comm)
-    trials = Trials(folder / TRIALS)
-    found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log, trials=trials, resume=resume)
-
-    def write() -> None:
-        write_case(folder, case)
-        write_text(folder / FITTED, with_values(case, found.values).to_toml())
-        write_text(folder / "calibration.json", json.dumps(found.as_json(), indent=1))
-        write_text(folder / "residuals.csv", _residual_table(found))
-        save(residuals(found), folder / "residuals.png")
-
-    on_root(comm, write)
+    asked, data, how, folder = _to_calibrate(case, name, files, unknowns, log, how)
+    found = calibrate(case, data, asked, baseline=baseline, progress=log, **how)
+    texts = {FITTED: with_values(case, found.values).to_toml(), "residuals.csv": _residual_table(found)}
+    figures = {"residuals.png": lambda: residuals(found)}
+    _write(folder, Study.of(how).comm, {"calibration.json": found.as_json()}, texts, figures)
     if found.at_bound:
         raise CaseError(
             [
@@ -231,31 +207,32 @@ def run_calibrate_each(
     files: Sequence[Path],
     unknowns: Sequence[str],
     baseline: Sequence[str],
-    output: Path | None,
     log: Log,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    **how: Unpack[StudyOptions],
 ) -> tuple[list[Calibration], Scatter, Path]:
     """Calibrate every file alone; write calibration.json with the scatter between them; collective."""
+    asked, data, how, folder = _to_calibrate(case, name, files, unknowns, log, how)
+    found = calibrate_each(case, data, asked, baseline=baseline, progress=log, **how)
+    scatter = between(found)
+    figures = {
+        f"residuals_{Path(one.name).stem}.png": partial(residuals, fit) for one, fit in zip(data, found, strict=True)
+    }
+    _write(folder, Study.of(how).comm, {"calibration.json": each_as_json(found, scatter)}, {}, figures)
+    return found, scatter, folder
+
+
+def _to_calibrate(
+    case: Case, name: str, files: Sequence[Path], unknowns: Sequence[str], log: Log, how: StudyOptions
+) -> tuple[list[Unknown], list[DataSet], StudyOptions, Path]:
+    """Return unknowns, data, and options with the folder of a calibration; collective."""
     asked = [parse_unknown(case, text) for text in unknowns]
+    how, folder = in_results(how, f"calibrate-{name}")
+    comm = Study.of(how).comm
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
     for one in data:
         log(one.listing)
     _tell_of_stick(case, log, comm)
-    found = []
-    for one in data:
-        log(f"calibrating on {one.name}")
-        found.append(calibrate(case, [one], asked, baseline=baseline, comm=comm, progress=log))
-    scatter = between(found)
-    folder = _folder(output, "calibrate", name, comm)
-
-    def write() -> None:
-        write_case(folder, case)
-        write_text(folder / "calibration.json", json.dumps(each_as_json(found, scatter), indent=1))
-        for one, calibration in zip(data, found, strict=True):
-            save(residuals(calibration), folder / f"residuals_{Path(one.name).stem}.png")
-
-    on_root(comm, write)
-    return found, scatter, folder
+    return asked, data, how, folder
 
 
 def each_as_json(found: Sequence[Calibration], scatter: Scatter) -> dict[str, Any]:
@@ -286,11 +263,8 @@ def run_life(
     samples: int,
     seed: int,
     wanted: str | None,
-    output: Path | None,
     log: Log,
-    *,
-    resume: bool = False,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    **how: Unpack[StudyOptions],
 ) -> tuple[Lifetime | Lives, Path]:
     """Compute lives; write samples.csv, life.json and life.png; collective.
 
@@ -300,55 +274,35 @@ def run_life(
     scatter = Scatter() if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         scatter = scatter.and_also(parse_scatter(case, text))
+    how, folder = in_results(how, f"life-{name}")
+    study = Study.of(how)
     if not scatter.keys:
-        if resume or wanted is not None:
-            option = "--resume" if resume else "--wanted"
+        options = {"--resume": study.resume, "--collect": study.collect, "--part": study.part, "--wanted": wanted}
+        for option in (option for option, given in options.items() if given):
             message = f"expected {option} with --scatter KEY=KIND(A, B), or --from a calibration, only"
             raise CaseError(InputError(option, message))
-        return _one_life(case, name, quantities, output, log, comm)
+        return _one_life(case, quantities, folder, log, study.comm), folder
     scatter.check(case)
-    _tell_of_stick(case, log, comm)
+    _tell_of_stick(case, log, study.comm)
     level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
-    folder = _resumed(output) if resume else _folder(output, "life", name, comm)
     for line in scatter.text:
         log(line)
-    found = lifetime(
-        case, quantities, scatter, samples=samples, seed=seed, wanted=level, folder=folder,
-        resume=resume, comm=comm, progress=_counter(log, "samples"),
-    )  # fmt: skip
-
-    def write() -> None:
-        write_case(folder, case)
-        write_text(folder / "life.json", json.dumps(found.as_json(), indent=1))
-        save(life_figure(found), folder / "life.png")
-
-    on_root(comm, write)
+    counter = _counter(log, "samples")
+    found = lifetime(case, quantities, scatter, samples=samples, seed=seed, wanted=level, progress=counter, **how)
+    _write(folder, study.comm, {"life.json": found.as_json()}, {}, {"life.png": lambda: life_figure(found)})
     return found, folder
 
 
-def _one_life(
-    case: Case, name: str, quantities: Sequence[Quantity], output: Path | None, log: Log, comm: MPI.Comm
-) -> tuple[Lives, Path]:
+def _one_life(case: Case, quantities: Sequence[Quantity], folder: Path, log: Log, comm: MPI.Comm) -> Lives:
     """Return the lives until each level of a case whose keys do not scatter, and write them; collective."""
     _tell_of_stick(case, log, comm)
     asked = [of_case(one, case, "--until") for one in quantities]
-    folder = _folder(output, "life", name, comm)
+    on_root(comm, lambda: make_directory(folder))
     on_root(comm, lambda: write_case(folder, case))
-    values = everywhere(comm, lambda: [float(life) for life in lives(Model(case), asked, {})])
+    values = on_root(comm, lambda: [float(life) for life in lives(Model(case), asked, {})])
     found = Lives(tuple(one.text for one in asked), tuple(one.unit for one in asked), tuple(values))
-    on_root(comm, lambda: write_text(folder / "life.json", json.dumps(found.as_json(), indent=1)))
-    return found, folder
-
-
-def _resumed(output: Path | None) -> Path:
-    """Return the folder to resume in.
-
-    Raises:
-        CaseError: none is given.
-    """
-    if output is None:
-        raise CaseError(InputError("--resume", "needs the folder of the study to resume, as -o DIR"))
-    return output
+    _write(folder, comm, {"life.json": found.as_json()}, {}, {})
+    return found
 
 
 def _wanted(case: Case, life: str, text: str) -> float:

@@ -1,16 +1,17 @@
 """The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2.
 
-It tells what measurements cannot: unknowns and combinations of unknowns that the data leave open. Computed trials are
-kept in a file, so that an interrupted calibration resumes at any run.
+It tells what measurements cannot: unknowns and combinations of unknowns that the data leave open. The predictions of
+one point under one condition are a run of the study (`fenwear.life.study`). Ranks and parts share the runs of a point,
+and of its differences; each part computes the fit itself, with the runs of all.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-from mpi4py import MPI
 from scipy.optimize import OptimizeResult, least_squares
 
 from fenwear.arrays import Array
@@ -20,7 +21,7 @@ from fenwear.life.data import DataSet
 from fenwear.life.keys import Unknown, scaled
 from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
-from fenwear.life.runs import Trials, share
+from fenwear.life.study import Outcome, Run, Store, Study, named
 from fenwear.parallel import Team
 from fenwear.progress import Log, now_and_then
 
@@ -103,8 +104,19 @@ BASELINES = ("offset", "tilt")
 Vector: TypeAlias = Sequence[float] | Array
 
 
+def data_key(data: Sequence[DataSet]) -> str:
+    """Return a checksum of measurements."""
+    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
+        return named(list(data))
+
+
 class LeastSquares:
-    """The least-squares problem of data sets and unknowns, kept for fits to several sets of values."""
+    """The least-squares problem of data sets and unknowns, kept for fits to several sets of values.
+
+    Attributes:
+        store: Keeps the predictions.
+        evaluations: Runs computed so far.
+    """
 
     def __init__(
         self,
@@ -112,16 +124,15 @@ class LeastSquares:
         data: Sequence[DataSet],
         unknowns: Sequence[Unknown],
         baseline: Sequence[str] = (),
-        comm: MPI.Comm = MPI.COMM_WORLD,
         progress: Log = lambda message: None,
-        trials: Trials | None = None,
+        study: Study = Study(),  # noqa: B008
     ) -> None:
-        """Check the problem; computes nothing. `progress` gets the number of runs, `trials` keeps their predictions.
+        """Check the problem; computes nothing. `progress` gets the number of runs.
 
         Raises:
             CaseError: a key, bound or combination of data that makes no sense.
         """
-        self.case, self.comm, self.team = case, comm, Team.of(comm)
+        self.case, self.study, self.store, self.team = case, study, Store(), Team.of(study.comm)
         self.team.serve(self)
         self._tell = now_and_then(progress)
         self.model = Model(case)
@@ -131,7 +142,8 @@ class LeastSquares:
         self.baseline = tuple(baseline)
         self._check(unknowns)
         self.predict = Predictor(self.model, data)
-        self.trials = Trials() if trials is None else trials
+        self.key = data_key(data)
+        self.evaluations = 0
         self._jumps = 0  # how often the jumps that runs follow have changed
         self._computed = False  # whether a trial on them has a prediction
         self.observed = np.concatenate([series.values for series in self.series])
@@ -200,12 +212,13 @@ class LeastSquares:
 
         Collective, or for rank 0 that leads. Returns whether they jump otherwise than before.
         """
-        self._jumps += 1
         self._computed = False
         return bool(self.team.each(self, "keep_own_jumps", z))
 
     def keep_own_jumps(self, z: Vector) -> bool:
         """Let runs of this rank follow those jumps; return whether they differ from those before."""
+        self._jumps += 1
+        self.evaluations += len(self.predict.conditions)
         return self.predict.keep_jumps(self.values(z))
 
     def values(self, z: Vector) -> dict[str, float]:
@@ -214,22 +227,48 @@ class LeastSquares:
 
     def predicted(self, z: Vector, *, strict: bool = False) -> Array:
         """Return the predictions without baselines (n,); `strict` as of `Predictor`."""
+        self.evaluations += len(self.predict.conditions)
         return np.concatenate(self.predict(self.values(z), strict=strict))
 
+    def shared_predictions(self, points: Sequence[Array]) -> list[Outcome]:
+        """Return the predictions (n,) without baselines at fitted unknowns; collective, a run for each condition."""
+        conditions = list(self.predict.conditions)
+        runs = [
+            [Run((self.values(z), one), named(self.key, self._jumps, z.tobytes(), one), str(z)) for one in conditions]
+            for z in points
+        ]
+        before = self.store.computed
+        done = self.study.outcomes(self.predict, [run for row in runs for run in row], self.store, by_all=True)
+        self.evaluations += self.store.computed - before
+        return [self._joined([done[run.name] for run in row]) for row in runs]
+
+    def _joined(self, parts: Sequence[Outcome]) -> Outcome:
+        """Return the predictions of all series from those under each condition."""
+        trouble = next((part.trouble for part in parts if part.trouble), "")
+        if trouble:
+            return Outcome({}, trouble)
+        of = dict(zip(self.predict.conditions, (part.values["prediction"] for part in parts), strict=True))
+        found, begin = [], dict.fromkeys(of, 0)
+        for one in self.data:
+            for series in one.series:
+                end = begin[one.settings] + len(series.values)
+                found.append(of[one.settings][begin[one.settings] : end])
+                begin[one.settings] = end
+        return Outcome({"prediction": np.concatenate(found)})
+
     def _tried(self, z: Array) -> Array:
-        """Return the predictions of a trial (n,); far too large where the model rejects it, so that it is not kept."""
-        kind = f"prediction {self._jumps}"
-        known = self.trials.get(kind, z)
-        if known is not None:
-            return known
-        try:
-            found = self.trials.put(kind, z, self.predicted(z))
+        """Return the predictions of a trial (n,); far too large where the model rejects it, so that it is not kept.
+
+        Raises:
+            ConvergenceError: it is the first one on its jumps.
+        """
+        (found,) = self.team.each(self, "shared_predictions", [z])
+        if not found.trouble:
             self._computed = True
-            return found
-        except (CaseError, ConvergenceError):
-            if not self._computed:
-                raise
-            return self.trials.put(kind, z, self.observed + REFUSED * (np.abs(self.observed) + self.sigma))
+            return np.asarray(found.values["prediction"])
+        if not self._computed:
+            raise ConvergenceError(found.trouble)
+        return self.observed + REFUSED * (np.abs(self.observed) + self.sigma)
 
     def jacobian(self, z: Vector, *, central: bool = False) -> Array:
         """Return the predictions' derivatives by the fitted unknowns (n, m); collective, or for rank 0 that leads.
@@ -237,27 +276,19 @@ class LeastSquares:
         Args:
             z: The fitted unknowns.
             central: Whether by differences to both sides, for standard errors; else to one side, for half the runs.
+
+        Raises:
+            ConvergenceError: a run beside these unknowns failed.
         """
         at = np.array(z, dtype=float)
-        if central:
-            return (self.jacobian(at) + self._one_sided(at, -STEP)) / 2
-        return self._one_sided(at, STEP)
-
-    def _one_sided(self, at: Array, step: float) -> Array:
-        kind = f"derivative {self._jumps} {step}"
-        known = self.trials.get(kind, at)
-        if known is not None:
-            return known
         here = self._tried(at)
-        return self.trials.put(kind, at, np.asarray(self.team.each(self, "shared_jacobian", at, here, step)))
-
-    def shared_jacobian(self, base: Array, here: Array, step: float) -> Array:
-        """Return the derivatives by differences to the predictions `here`, one column on each rank; collective."""
-
-        def shifted(k: int) -> Array:
-            return np.asarray((self.predicted(base + step * np.eye(len(base))[k]) - here) / step)
-
-        return np.array(share(self.comm, len(base), shifted), dtype=float).T
+        steps = np.vstack([side * STEP * np.eye(len(at)) for side in ((1, -1) if central else (1,))])
+        found = self.team.each(self, "shared_predictions", list(at + steps))
+        for one in found:
+            if one.trouble:
+                raise ConvergenceError(one.trouble)
+        columns = [(one.values["prediction"] - here) / step.sum() for one, step in zip(found, steps, strict=True)]
+        return np.asarray(np.reshape(columns, (-1, *np.shape(columns[: len(at)]))).mean(axis=0).T)
 
     def check_influence(self, jacobian: Array, z: Vector) -> None:
         """Check that every unknown changes some prediction.
@@ -353,7 +384,7 @@ class LeastSquares:
 
         def residual(both: Array) -> Array:
             found = self.whitened(self.with_baselines(both) - self.observed)
-            self._tell(f"{self.model.evaluations:,} runs, residual {np.sqrt(np.mean(found**2)):.3g} sigma or units")
+            self._tell(f"{self.evaluations:,} runs, residual {np.sqrt(np.mean(found**2)):.3g} sigma or units")
             return found
 
         result = least_squares(

@@ -1,31 +1,27 @@
 """Life with scatter: samples of keys, a run for each, and what their lives have in common.
 
-Every sample is kept as soon as it is computed, so that a sampling can be resumed; samples.csv has them all in the end.
+A sampling is a study (`fenwear.life.study`), a run for each sample; samples.csv has them all in the end.
 Quantiles come with the interval of order statistics that holds them with 95 %, whatever the distribution (binomial); a
 reliability with that of Clopper and Pearson.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import chain
-from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
-from mpi4py import MPI
 from scipy import stats
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.errors import CaseError, ConvergenceError, FenwearError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.model import Model
 from fenwear.life.quantities import LIMIT, Quantity, of_case, parse_quantity
 from fenwear.life.quantities import lives as lives_until
-from fenwear.life.runs import TRIALS, Trials, everywhere, in_chunks
 from fenwear.life.scatter import Scatter
+from fenwear.life.study import Progress, Run, Study, StudyOptions, Values, case_text, named
 from fenwear.parallel import on_root
 from fenwear.results.disk import finite, write_text
 from fenwear.results.export import csv_text
@@ -216,57 +212,73 @@ def lifetime(
     seed: int = 0,
     wanted: float | None = None,
     limit: int = LIMIT,
-    folder: Path | None = None,
-    resume: bool = False,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = lambda done, total: None,
+    **how: Unpack[StudyOptions],
 ) -> Lifetime:
-    """Return the distribution of the life of parts whose keys scatter; collective, one sample on each rank.
+    """Return the distribution of the life of parts whose keys scatter; collective.
 
     Args:
         case: The problem.
         until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3"; of several, as of each named contact
             ("depth in left 0.2 mm"), a part lives until the first. A level of all contacts is also reported for each.
         scatter: Distribution of keys.
-        samples: Size n of the sample, a run for each.
+        samples: Size n of the sample, a run for each; a study may resume with more.
         seed: Of the sample.
         wanted: A life whose reliability is asked for, in the unit of the lives.
         limit: Cycles after which a level counts as never reached.
-        folder: Where samples are kept, and samples.csv in the end; None for nowhere.
-        resume: Continue with the samples that are there.
-        comm: The ranks.
         progress: Called with the numbers of samples done and of all.
+        how: Folder, parts, processes, executor and ranks, as `fenwear.life.StudyOptions`.
 
     Raises:
         CaseError: what is asked for makes no sense; the samples of the folder belong to another sampling.
         ConvergenceError: more than 5 % of the runs did not converge; theirs are kept in the folder.
         OutputError: the folder takes no file.
+        PartDoneError: other parts of the sampling are not done.
     """
+    study = Study.of(how)
     asked = _asked(case, [until] if isinstance(until, str | Quantity) else until)
     if samples < 2:
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
-    design = on_root(comm, lambda: scatter.sample(samples, seed))
+    design = on_root(study.comm, lambda: scatter.sample(samples, seed))
     model = Model(case)
-    quantities = everywhere(comm, lambda: _of_contacts(model, asked))
+    quantities = on_root(study.comm, lambda: _of_contacts(model, asked))
     names = [one.text for one in quantities]
-    kept = Trials() if folder is None else Trials(folder / TRIALS)
-    about = f"{case.to_toml()} {scatter.keys} {names} {limit} {design.tobytes().hex()}"
-    on_root(comm, lambda: kept.begin(about, resume=resume))
-    lives, failures = _run(model, quantities, scatter.keys, design, kept, limit, comm, progress)
-    if folder is not None:
+    store = study.open(case, named(case_text(case), scatter.keys, names, limit, seed))
+    runs = [Run(row, named(row.tobytes()), f"sample {k + 1}") for k, row in enumerate(design)]
+    done = study.outcomes(_Samples(model, quantities, scatter.keys, limit), runs, store, progress)
+    outcomes = [done[run.name] for run in runs]
+    unknown = np.full(len(quantities), np.nan)
+    lives = np.array([one.values.get("lives", unknown) for one in outcomes])
+    failures = {k: one.trouble for k, one in enumerate(outcomes) if one.trouble}
+    if (folder := study.folder) is not None:
         heading = ["sample", *scatter.keys, *names, "trouble"]
         table = [[k, *map(float, (*design[k], *lives[k])), failures.get(k, "")] for k in range(samples)]
-        on_root(comm, lambda: write_text(folder / SAMPLES, csv_text(heading, table)))
+        on_root(study.comm, lambda: write_text(folder / SAMPLES, csv_text(heading, table)))
 
     def summary(one: Quantity, own: Array, level: float | None) -> Lifetime:
         return _summary(one, scatter.keys, design, own, failures, level, seed)
 
     whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
     found = summary(whole, lives.min(axis=1), wanted)
-    told = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one is not asked[0]]
+    told = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one != asked[0]]
     each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in told)
     return replace(found, each=each)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Computes the lives of samples."""
+
+    model: Model
+    quantities: Sequence[Quantity]
+    keys: Sequence[str]
+    limit: int
+
+    def compute(self, given: Array) -> Values:
+        """Return the lives until each level (q,) with the keys at these values."""
+        values = dict(zip(self.keys, map(float, given), strict=True))
+        return {"lives": lives_until(self.model, self.quantities, values, self.limit)}
 
 
 def _asked(case: Case, until: Sequence[str | Quantity]) -> list[Quantity]:
@@ -304,40 +316,6 @@ def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
     if len(asked) > 1 or whole.contact or whole.at is not None or len(names) < 2:
         return list(asked)
     return [whole, *(whole.within(name) for name in names)]
-
-
-def _run(
-    model: Model,
-    quantities: Sequence[Quantity],
-    keys: Sequence[str],
-    design: Array,
-    kept: Trials,
-    limit: int,
-    comm: MPI.Comm,
-    progress: Callable[[int, int], None],
-) -> tuple[Array, dict[int, str]]:
-    """Compute what is not kept yet; return lives (n, q) and failures, which a resumed sampling tries again."""
-    lives = np.full((len(design), len(quantities)), np.nan)
-    known = on_root(comm, lambda: [kept.get("lives", row) for row in design])
-    left = [number for number, own in enumerate(known) if own is None]
-    for number in set(range(len(design))) - set(left):
-        lives[number] = known[number]
-
-    def one(number: int) -> Array:
-        values = dict(zip(keys, design[number].tolist(), strict=True))
-        return lives_until(model, quantities, values, limit)
-
-    failures: dict[int, str] = {}
-    progress(len(design) - len(left), len(design))
-    for done, outcome in enumerate(chain.from_iterable(in_chunks(comm, left, one))):
-        number = left[done]
-        if isinstance(outcome, FenwearError):
-            failures[number] = " ".join(str(outcome).split())
-        else:
-            lives[number] = outcome
-            on_root(comm, partial(kept.put, "lives", design[number], outcome))
-        progress(len(design) - len(left) + done + 1, len(design))
-    return lives, failures
 
 
 def _summary(

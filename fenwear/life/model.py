@@ -97,6 +97,9 @@ class Model:
     _runs: dict[tuple[object, ...], RunSamples] = field(default_factory=dict, repr=False)
     _states: dict[tuple[object, ...], Snapshot] = field(default_factory=dict, repr=False)
 
+    def __reduce__(self) -> tuple[type[Model], tuple[Case]]:
+        return type(self), (self.case,)  # another process assembles systems of its own
+
     def __post_init__(self) -> None:
         """Refuse a test program.
 

@@ -12,20 +12,30 @@ from fenwear.errors import CaseError, InputError
 from fenwear.life.data import DataSet, Series
 from fenwear.life.model import FREE, Course, Model, Snapshot
 from fenwear.life.quantities import Quantity, cycles_of, padded, registered_name, unit_of
+from fenwear.life.study import Values
 from fenwear.results.surfaces import at_places, rim
 
 
 class Predictor:
-    """What a model predicts for data sets: one run for each condition, on jumps that can be kept."""
+    """Predicts measurements by a model: one run for each condition, on jumps that can be kept.
+
+    Attributes:
+        model: The model.
+        data: What was measured.
+        conditions: For each condition, named by its overrides, the series that were measured under it.
+    """
 
     def __init__(self, model: Model, data: Sequence[DataSet]) -> None:
         self.model, self.data = model, list(data)
+        self.conditions: dict[tuple[str, ...], list[Series]] = {}
+        for one in self.data:
+            self.conditions.setdefault(one.settings, []).extend(one.series)
         self._courses: dict[tuple[str, ...], Course] = {}
 
     def keep_jumps(self, values: Mapping[str, float]) -> bool:
         """Let the runs from now on jump as those at these values do; return whether that is otherwise than before."""
         before, self._courses = self._courses, {}
-        self._courses = {settings: Course.of(snapshots) for settings, snapshots in self._runs(values).items()}
+        self._courses = {settings: Course.of(self._run(values, settings)) for settings in self.conditions}
         return self._courses != before
 
     def __call__(self, values: Mapping[str, float], *, strict: bool = False) -> list[Array]:
@@ -38,26 +48,23 @@ class Predictor:
         Raises:
             CaseError: a scar has outgrown the contact surface.
         """
-        runs = self._runs(values)
-        found = []
-        for one in self.data:
-            measures = self.model.cycle_measures(values, one.settings)
-            found += [_predict(series, runs[one.settings], measures, strict=strict) for series in one.series]
-        return found
+        found = {settings: iter(self._predicted(values, settings, strict=strict)) for settings in self.conditions}
+        return [next(found[one.settings]) for one in self.data for _ in one.series]
 
-    def _runs(self, values: Mapping[str, float]) -> dict[tuple[str, ...], list[Snapshot]]:
-        wanted: dict[tuple[str, ...], set[int]] = {}
-        for one in self.data:
-            measures = self.model.cycle_measures(values, one.settings)
-            stops = wanted.setdefault(one.settings, set())
-            for series in one.series:
-                stops |= {max(1, round(cycles_of((a, series.counted), *measures))) for a in np.unique(series.after)}
-        runs = {}
-        for settings, stops in wanted.items():
-            course = self._courses.get(settings, FREE)
-            last = course.last(max(stops))
-            runs[settings] = list(self.model.run(values, last, settings=settings, stops=sorted(stops), course=course))
-        return runs
+    def compute(self, given: tuple[Mapping[str, float], tuple[str, ...]]) -> Values:
+        """Return the predictions of all series under one condition (k,), for values of the keys and its overrides."""
+        return {"prediction": np.concatenate(self._predicted(*given, strict=False))}
+
+    def _predicted(self, values: Mapping[str, float], settings: tuple[str, ...], *, strict: bool) -> list[Array]:
+        measures, snapshots = self.model.cycle_measures(values, settings), self._run(values, settings)
+        return [_predict(series, snapshots, measures, strict=strict) for series in self.conditions[settings]]
+
+    def _run(self, values: Mapping[str, float], settings: tuple[str, ...]) -> list[Snapshot]:
+        measures = self.model.cycle_measures(values, settings)
+        amounts = {(float(after), one.counted) for one in self.conditions[settings] for after in np.unique(one.after)}
+        stops = sorted({max(1, round(cycles_of(amount, *measures))) for amount in amounts})
+        course = self._courses.get(settings, FREE)
+        return list(self.model.run(values, course.last(stops[-1]), settings=settings, stops=stops, course=course))
 
 
 def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[float, float], *, strict: bool) -> Array:

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 from mpi4py import MPI
@@ -33,7 +33,8 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.keys import Key, find_key, with_values
 from fenwear.life.model import Model
 from fenwear.life.quantities import NO_PATH, Path, Quantity, evaluate, of_case, parse_quantity
-from fenwear.life.runs import everywhere, share
+from fenwear.life.study import Progress, Run, Study, StudyOptions, Values, case_text, named
+from fenwear.parallel import on_root
 from fenwear.results.disk import finite
 
 WINDOWS = (0.6, 0.3, 0.1)  # T, tried until all of the window is possible
@@ -84,6 +85,7 @@ STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error
 GOOD = 1e-6  # relative error of a derivative at which the step stays
 SURELY = 0.1  # relative change of a key that a quantity without any derivative is held against
 NONE = 1e-3  # elasticity below which a derivative may have the error of this one
+NUMBERS = ("derivative", "error", "elasticity", "low", "high")
 Method = Literal["differences", "window"]
 
 
@@ -110,7 +112,7 @@ class Derivative:
     elasticity: float
     low: float
     high: float
-    method: Method
+    method: str
 
     @property
     def error_of(self) -> str:
@@ -175,10 +177,10 @@ def sensitivity(
     *,
     spread: float = 0.1,
     method: Method | None = None,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = lambda done, total: None,
+    **how: Unpack[StudyOptions],
 ) -> list[Sensitivity]:
-    """Return the sensitivities of quantities to numeric keys of a case; collective, one key on each rank.
+    """Return the sensitivities of quantities to numeric keys of a case; collective. A run of the study is one key.
 
     Args:
         case: The problem.
@@ -187,68 +189,103 @@ def sensitivity(
         spread: Relative change of each key for the tornado plot; 0 for none.
         method: By default over a window where contact or scar grows, and by differences else. Differences that are
             asked for are those of a growing contact's present nodes.
-        comm: The ranks.
-        progress: Told of the derivatives done and of all.
+        progress: Called with the numbers of keys done and of all.
+        how: Folder, parts, processes, executor and ranks, as `fenwear.life.StudyOptions`.
 
     Raises:
         CaseError: a key or a quantity that the case does not have; a key without any value beside its own.
         ConvergenceError: a state did not converge.
+        PartDoneError: other parts of the study are not done.
     """
+    study = Study.of(how)
     if not 0 <= spread < 1:
         raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
     wanted = [of_case(parse_quantity(q, names=case.names) if isinstance(q, str) else q, case) for q in quantities]
     found = [find_key(case, key, "--to") for key in keys]
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
+    for key in found:
+        _sides(case, key)
     model = Model(case)
-    bases = everywhere(comm, lambda: [evaluate(model, quantity, {}) for quantity in wanted])
+    bases = on_root(study.comm, lambda: [] if study.collect else _bases(model, wanted))
+    store = study.open(case, named(case_text(case), [one.text for one in wanted], spread, method))
+    runs = [Run(key, named(key.path), key.path) for key in found]
+    done = study.outcomes(_Derivatives(model, wanted, bases, spread, method), runs, store, progress)
+    columns = [done[run.name] for run in runs]
+    for run, column in zip(runs, columns, strict=True):
+        if column.trouble:
+            raise ConvergenceError(f"{run.title}: {column.trouble}")
+
+    def of(q: int) -> Sensitivity:
+        value = float(columns[0].values["value"][q])
+        rows = []
+        for key, one in zip(found, columns, strict=True):
+            numbers = {name: float(one.values[name][q]) for name in NUMBERS}
+            rows.append(Derivative(key.path, key.value, key.unit, method=str(one.values["method"][q]), **numbers))
+        return Sensitivity(wanted[q].text, wanted[q].unit, value, spread, tuple(rows))
+
+    return [of(q) for q in range(len(wanted))]
+
+
+def _bases(model: Model, wanted: Sequence[Quantity]) -> list[tuple[float, Path]]:
+    """Return each quantity at the keys' own values, and the path on which to compute it nearby.
+
+    Raises:
+        CaseError: a level is never reached.
+    """
+    bases = [evaluate(model, quantity, {}) for quantity in wanted]
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):
             raise CaseError(
                 InputError("--of", f"{quantity.text!r} is never reached in this case: it has no derivative")
             )
-
-    def one(k: int) -> list[Derivative]:
-        pairs = zip(wanted, bases, strict=True)
-        return [_derivative(model, quantity, base, found[k], spread, method) for quantity, base in pairs]
-
-    columns = share(comm, len(found), one, progress)
-    return [
-        Sensitivity(quantity.text, quantity.unit, value, spread, tuple(column[q] for column in columns))
-        for q, (quantity, (value, _)) in enumerate(zip(wanted, bases, strict=True))
-    ]
+    return bases
 
 
-def _derivative(
-    model: Model,
-    quantity: Quantity,
-    base: tuple[float, Path],
-    key: Key,
-    spread: float,
-    asked: Method | None,
-) -> Derivative:
-    value, path = base
-    scale = abs(value) / _step(key, 1.0)
-    along = NO_PATH if quantity.kind == "life" else path  # with a smaller key a life is longer
+@dataclass(frozen=True)
+class _Derivatives:
+    """Computes the derivatives of quantities to one key after another."""
 
-    def at(x: float, on: Path) -> float:
-        return evaluate(model, quantity, {key.path: x}, path=on)[0]
+    model: Model
+    wanted: Sequence[Quantity]
+    bases: Sequence[tuple[float, Path]]
+    spread: float
+    method: Method | None
 
-    by: Method = "differences"
-    windowed = None
-    if path.rough and asked != "differences":
-        windowed = over_window(lambda x: at(x, along), value, key.value, path.grain)
-    if windowed is not None:
-        by = "window"
-        slope, error = windowed
-    else:
-        slope, error = _differences(lambda x: at(x, path), model.case, key, scale)
-    wide = spread or (SURELY if slope == error == 0 else 0.0)
-    ends = [_end(model, quantity, key, factor) if wide > 0 else float("nan") for factor in (1 - wide, 1 + wide)]
-    if slope == error == 0 and any(abs(end - value) > GOOD * abs(value) for end in ends):
-        slope, error = _coarse(ends, value, wide * abs(key.value))
-    elasticity = slope * key.value / value if key.value != 0 and value != 0 else float("nan")
-    return Derivative(key.path, key.value, key.unit, slope, error, elasticity, ends[0], ends[1], by)
+    def compute(self, given: Key) -> Values:
+        """Return the value of each quantity (q,), the numbers of its derivative, and their method (q,)."""
+        found = [self._derivative(*one, given) for one in zip(self.wanted, self.bases, strict=True)]
+        numbers = dict(zip(NUMBERS, np.array([row for row, _ in found]).T, strict=True))
+        values, methods = [value for value, _ in self.bases], [method for _, method in found]
+        return {"value": np.array(values), "method": np.array(methods), **numbers}
+
+    def _derivative(
+        self, quantity: Quantity, base: tuple[float, Path], key: Key
+    ) -> tuple[tuple[float, float, float, float, float], Method]:
+        """Return derivative, error, elasticity, and the values at both ends of the spread; and the method."""
+        model, (value, path) = self.model, base
+        along = NO_PATH if quantity.kind == "life" else path  # with a smaller key a life is longer
+
+        def at(x: float, on: Path) -> float:
+            return evaluate(model, quantity, {key.path: x}, path=on)[0]
+
+        by: Method = "differences"
+        windowed = None
+        if path.rough and self.method != "differences":
+            windowed = over_window(lambda x: at(x, along), value, key.value, path.grain)
+        if windowed is not None:
+            by = "window"
+            slope, error = windowed
+        else:
+            slope, error = _differences(lambda x: at(x, path), model.case, key, abs(value) / _step(key, 1.0))
+        wide = self.spread or (SURELY if slope == error == 0 else 0.0)
+        low, high = [
+            _end(model, quantity, key, factor) if wide > 0 else float("nan") for factor in (1 - wide, 1 + wide)
+        ]
+        if slope == error == 0 and any(abs(end - value) > GOOD * abs(value) for end in (low, high)):
+            slope, error = _coarse((low, high), value, wide * abs(key.value))
+        elasticity = slope * key.value / value if key.value != 0 and value != 0 else float("nan")
+        return (slope, error, elasticity, low, high), by
 
 
 def _coarse(ends: Sequence[float], value: float, width: float) -> tuple[float, float]:

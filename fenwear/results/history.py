@@ -33,7 +33,7 @@ from fenwear.stack import versions
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 # What runs and sweeps leave in their folders.
 OF_RESULTS = (HISTORY, f"{HISTORY}.part", SUMMARY, CASE, "checkpoint.npz", "checkpoint", "fields", "figures",
-              "report.html", "flash", "export", "variants", "sweep.nc", "sweep.csv", "sweep.png")  # fmt: skip
+              "report.html", "flash", "export", "runs", "sweep.nc", "sweep.csv", "sweep.png")  # fmt: skip
 UNKNOWN = ("gap", "creep_depth", "creep_depth_strip")  # beyond the grid that there was; a layer has crept by 0 there
 GRID = "contact_grid"  # corner, spacing and counts, where it grows
 SECONDS_BETWEEN_WRITES = 2.0

@@ -1,8 +1,7 @@
 """Many variants of a case: keys over their values, computed side by side, in one dataset.
 
-axes: keys and their values. plan: every variant's case, and the pieces that share their set-up. evaluate: what is
-computed of one. engines: by this process, local processes or ranks. store: what is kept of each, and the dataset of
-all. picture, command: what `fenwear sweep` shows.
+plan: keys and their values, every variant's case. variant: the results of one. dataset: all of them. sweep, picture:
+the function and the command. The runs are computed and kept as of all studies, by `fenwear.life.study`.
 """
 
 from fenwear.sweeps.plan import Axis, make_axis, parse_axis, read_table

@@ -16,7 +16,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from fenwear.report.style import BLUE, GREY, RED, legend_beside, panels, run_style, shades
-from fenwear.results.disk import writing
+from fenwear.results.disk import replacing
 from fenwear.results.steps import REGIMES
 
 PICTURE = "sweep.png"
@@ -76,9 +76,8 @@ def draw(dataset: xarray.Dataset, folder: Path) -> None:
     """
     if not any(name in dataset for name in SHOWN):
         return
-    path = folder / PICTURE
-    with writing(path):
-        sweep_figure(dataset).savefig(path, dpi=150)
+    with replacing(folder / PICTURE) as part:
+        sweep_figure(dataset).savefig(part, dpi=150, format="png")
 
 
 def _chosen(dataset: xarray.Dataset) -> tuple[str, str, list[str]]:

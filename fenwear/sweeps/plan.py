@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, product
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-import fenwear
 from fenwear.assembly import Preparation, set_up_by
 from fenwear.case import Case, changed_case
 from fenwear.errors import CaseError, InputError
 from fenwear.files.table import TableError
 from fenwear.files.table import read_table as read_rows
 from fenwear.life.keys import numeric_keys, settings_of, value_of
+from fenwear.life.study import Run, case_text, named
 
 OPTION = "--over"
 MOST_OF_RANGE = 100_000
@@ -256,14 +255,12 @@ class Variant:
         settings: Its changes, as `key.path=value`.
         case: The case; that which is varied where the values do not go together.
         error: Why they do not; None where they do.
-        name: Of its kept results: the same for the same case, whatever it is swept with.
     """
 
     place: tuple[int, ...]
     settings: tuple[str, ...]
     case: Case
     error: CaseError | None = None
-    name: str = ""
 
     @property
     def possible(self) -> bool:
@@ -323,8 +320,7 @@ def make_plan(case: Case, axes: Sequence[Axis], of: str, *, zipped: bool = False
         shape = f"{count:,}" if zipped or len(lengths) == 1 else f"{' x '.join(map(str, lengths))} = {count:,}"
         raise CaseError(InputError(OPTION, f"expected at most {MOST:,} variants, got {shape}"))
     places = [(k,) * len(axes) for k in range(count)] if zipped else list(product(*map(range, lengths)))
-    files: dict[str, bytes] = {}
-    variants = [_variant(case, axes, place, kind, zipped=zipped, files=files) for place in places]
+    variants = [_variant(case, axes, place, zipped=zipped) for place in places]
     _check_values(axes, places, variants, zipped=zipped)
     coordinates = tuple(_coordinate(axis, k, places, variants) for k, axis in enumerate(axes))
     for axis, (values, _) in zip(axes, coordinates, strict=True):
@@ -334,9 +330,7 @@ def make_plan(case: Case, axes: Sequence[Axis], of: str, *, zipped: bool = False
     return Plan(kind, tuple(axes), zipped, coordinates, tuple(variants))
 
 
-def _variant(
-    case: Case, axes: Sequence[Axis], place: tuple[int, ...], of: Of, *, zipped: bool, files: dict[str, bytes]
-) -> Variant:
+def _variant(case: Case, axes: Sequence[Axis], place: tuple[int, ...], *, zipped: bool) -> Variant:
     given = {axis.key: (axis, axis.values[at]) for axis, at in zip(axes, place, strict=True)}
     own = place[:1] if zipped else place
     changes = tuple(axis.setting(value) for axis, value in given.values())
@@ -344,20 +338,7 @@ def _variant(
         changed = changed_case(case, *settings(case, given))
     except CaseError as error:
         return Variant(own, changes, case, error)
-    return Variant(own, changes, changed, name=_name(changed, of, files))
-
-
-def _name(case: Case, of: Of, files: dict[str, bytes]) -> str:
-    """Return a name that is the same for the same results; what a file of the geometry holds counts."""
-    mesh = case.resolved()["geometry"]["file"]
-    if mesh not in files:
-        try:
-            with open(mesh, "rb") as file:
-                files[mesh] = hashlib.file_digest(file, "sha256").digest()
-        except OSError:  # one of those that come with the package
-            files[mesh] = b""
-    text = f"{fenwear.__version__}\n{of}\n{case.to_toml()}"
-    return hashlib.sha256(text.encode() + files[mesh]).hexdigest()[:20]
+    return Variant(own, changes, changed)
 
 
 def _check_values(
@@ -396,27 +377,13 @@ def preparation_for(case: Case, of: Of) -> Preparation:
     return "reduced" if of == "steady" or case.run.integration == "jump" else "as set"
 
 
-def _sharing(variant: Variant, of: Of) -> tuple[str, str]:
-    """Return what two variants share: the bodies, and with them the steps of their heat."""
-    case = variant.case
-    heat = (
-        None
-        if case.heat is None
-        else (case.motion, case.heat, case.punch.boundary_of_heat, case.strip.boundary_of_heat)
-    )
-    return repr((preparation_for(case, of), *set_up_by(case))), repr(heat)
+def run_of(variant: Variant, of: Of) -> Run:
+    """Return the run of a variant, whose name is the same for the same case, whatever it is swept with.
 
-
-def in_pieces(left: Sequence[Variant], of: Of, workers: int) -> list[list[Variant]]:
-    """Return variants in pieces: those in one share their set-up. Few pieces are cut, so that no worker is idle."""
-    keys = {variant.place: _sharing(variant, of) for variant in left}
-    ordered = sorted(left, key=lambda variant: keys[variant.place])  # stable: else in the order of the sweep
-    pieces = [list(group) for _, group in groupby(ordered, key=lambda variant: keys[variant.place][0])]
-    while workers > 1 and len(pieces) < 4 * workers:
-        pieces.sort(key=len)
-        longest = pieces.pop()
-        if len(longest) < 2:
-            return [*pieces, longest]
-        half = len(longest) // 2
-        pieces += [longest[:half], longest[half:]]
-    return sorted(pieces, key=lambda piece: keys[piece[0].place])
+    Variants share the bodies, and with them the steps of their heat.
+    """
+    case, heat = variant.case, ""
+    if case.heat is not None:
+        heat = repr((case.motion, case.heat, case.punch.boundary_of_heat, case.strip.boundary_of_heat))
+    bodies = repr((preparation_for(case, of), *set_up_by(case)))
+    return Run(case, named(of, case_text(case)), ", ".join(variant.settings), (bodies, heat))

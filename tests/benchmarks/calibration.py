@@ -26,7 +26,6 @@ from scipy import stats
 from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.life import DataSet, LeastSquares, Noise, Series, Unknown, calibrate
-from fenwear.life.runs import share
 
 SMALL = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"]
 KEYS = ("wear.punch.coefficient", "wear.punch.pressure_exponent", "contact.friction")
@@ -52,7 +51,7 @@ def repeated(problem: LeastSquares, repetitions: int) -> tuple[Array, Array]:
         return result.x[:m], np.sqrt(np.diag(np.linalg.inv(result.jac.T @ result.jac))[:m])
 
     with patch.object(problem, "jacobian", return_value=jacobian):
-        found = share(problem.comm, repetitions, one)
+        found = [one(k) for k in range(repetitions)]
     return np.array([value for value, _ in found]), np.array([error for _, error in found])
 
 

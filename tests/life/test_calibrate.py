@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,7 +27,6 @@ from fenwear.life import (
     read_data,
 )
 from fenwear.life.keys import nearest_possible
-from fenwear.life.least_squares import Trials
 from tests.benchmarks.calibration import repeated
 
 BETA, LOAD, AMPLITUDE = 3.926990816987242e-8, 1e4, 1.5
@@ -299,17 +299,19 @@ def test_an_interrupted_fit_resumes_at_any_run(small: Callable[..., Case], tmp_p
     """Trials on the disk take the place of runs: the same numbers, and fewer runs the more there are."""
     after = np.array([100.0, 200.0, 300.0])
     case, data = small("example2", f"{K}=9e-8"), [volumes(after, [0.25, 0.49, 0.74], [0.01] * 3)]
-    path = tmp_path / "trials.jsonl"
-    whole = calibrate(case, data, [K], trials=Trials(path))
-    lines = path.read_text("utf-8").splitlines(keepends=True)
+    whole = calibrate(case, data, [K], folder=tmp_path / "fit")
+    files = sorted((tmp_path / "fit" / "runs").iterdir(), key=lambda file: file.stat().st_mtime_ns)
     runs = []
-    for kept in (1, len(lines) // 2, len(lines)):
-        path.write_text("".join(lines[:kept]) + lines[-1][:20], "utf-8")  # the process was killed in the last line
-        resumed = calibrate(case, data, [K], trials=Trials(path), resume=True)
+    for kept in (0, len(files) // 2, len(files)):
+        folder = tmp_path / str(kept)
+        shutil.copytree(tmp_path / "fit", folder)
+        for file in files[kept:]:
+            (folder / "runs" / file.name).unlink()
+        resumed = calibrate(case, data, [K], folder=folder, resume=True)
         assert resumed.as_json() | {"evaluations": 0} == whole.as_json() | {"evaluations": 0}
         runs.append(resumed.evaluations)
     assert whole.evaluations >= runs[0] > runs[1] > runs[2]
     with pytest.raises(CaseError, match="--resume"):
-        calibrate(case, data, [f"{K}"], baseline=[], trials=Trials(tmp_path / "other.jsonl"), resume=True)
+        calibrate(case, data, [f"{K}"], baseline=[], folder=tmp_path / "other", resume=True)
     with pytest.raises(CaseError, match="--resume"):
-        calibrate(small("example2", f"{K}=8e-8"), data, [K], trials=Trials(path), resume=True)
+        calibrate(small("example2", f"{K}=8e-8"), data, [K], folder=tmp_path / "fit", resume=True)

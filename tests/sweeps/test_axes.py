@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, load_case
+from fenwear.life.study import in_pieces
 from fenwear.sweeps import make_axis, parse_axis, read_table
-from fenwear.sweeps.plan import in_pieces, make_plan
+from fenwear.sweeps.plan import make_plan, run_of
 
 CASE = load_case("example1")
 
@@ -131,11 +132,13 @@ def test_pieces_share_their_set_up() -> None:
         parse_axis(CASE, "geometry.parameters.pin_height_1=10:40:9"),
     ]
     plan = make_plan(CASE, axes, "steady")
-    pieces = in_pieces(plan.variants, "steady", 2)
+    runs = {run_of(variant, plan.of).name: variant.place for variant in plan.variants}
+    listed = [run_of(variant, plan.of) for variant in plan.variants]
+    pieces = in_pieces(listed, 2)
     assert len(pieces) == 9
     for piece in pieces:
-        assert len({variant.place[1] for variant in piece}) == 1
-    assert sorted(v.place for piece in pieces for v in piece) == [v.place for v in plan.variants]
-    few = in_pieces([v for v in plan.variants if v.place[1] == 0], "steady", 2)
+        assert len({runs[run.name][1] for run in piece}) == 1
+    assert sorted(runs[run.name] for piece in pieces for run in piece) == list(runs.values())
+    few = in_pieces([run for run in listed if runs[run.name][1] == 0], 2)
     assert [len(piece) for piece in few] == [1] * 5
-    assert len(in_pieces(plan.variants, "steady", 1)) == 9
+    assert len(in_pieces(listed, 1)) == 9

@@ -17,10 +17,11 @@ import fenwear as package
 from fenwear import CaseError, Tribosystem, load_case, march, steady
 from fenwear.cycle import evolve
 from fenwear.errors import InterruptedRunError
-from fenwear.sweeps import engines
+from fenwear.life import study
+from fenwear.sweeps.dataset import records
 from fenwear.sweeps.picture import sweep_figure
-from fenwear.sweeps.store import records
 from fenwear.sweeps.sweep import failures, text
+from fenwear.sweeps.variant import VariantRunner
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 CASE = load_case("example1", SMALL)
@@ -129,12 +130,12 @@ def test_partial_slip_is_swept_like_sliding() -> None:
 def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """One variant that raises anything costs no other one."""
 
-    def broken(_self: object, case: package.Case, _of: str) -> dict[str, Any]:
+    def broken(_self: object, case: package.Case) -> dict[str, Any]:
         if case.contact.friction > 0.15:
             raise ZeroDivisionError("nothing to divide by")
         return {"nominal_pressure": np.array(1.0)}
 
-    monkeypatch.setattr(engines.VariantRunner, "values", broken)
+    monkeypatch.setattr(VariantRunner, "compute", broken)
     found = package.sweep(CASE, {"contact.friction": [0.1, 0.2]})
     assert found["nominal_pressure"].values.tolist()[0] == 1.0
     assert found["trouble"].values.tolist() == ["", "an error that was not foreseen: nothing to divide by"]
@@ -143,16 +144,16 @@ def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: 
 
 def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted, or with values added, only what is not there is computed; a broken file is not there."""
-    folder, computed, real = tmp_path / "out", [], engines.VariantRunner.values
+    folder, computed, real = tmp_path / "out", [], VariantRunner.compute
 
-    def counted(self: Any, case: package.Case, of: Any) -> Any:
+    def counted(self: Any, case: package.Case) -> Any:
         if len(computed) == 2 and not (folder / "sweep.nc").exists():
             raise KeyboardInterrupt
         computed.append(case.contact.friction)
-        return real(self, case, of)
+        return real(self, case)
 
-    monkeypatch.setattr(engines.VariantRunner, "values", counted)
-    with pytest.raises(InterruptedRunError, match=r"2 of 3 variants are in .*, to resume: --resume"):
+    monkeypatch.setattr(VariantRunner, "compute", counted)
+    with pytest.raises(InterruptedRunError, match=r"2 of 3 runs are in .*, to resume: --resume"):
         package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder)
     (folder / "sweep.nc").touch()
     computed.clear()
@@ -160,14 +161,14 @@ def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert computed == [0.3]
     package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.25, 0.3]}, folder=folder, resume=True)
     assert computed == [0.3, 0.25]
-    for file in (folder / "variants").iterdir():
+    for file in (folder / "runs").iterdir():
         file.write_bytes(file.read_bytes()[:100])
     again = package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder, resume=True)
     assert computed == [0.3, 0.25, 0.1, 0.2, 0.3]
     np.testing.assert_allclose(again["pressure"], whole["pressure"], rtol=1e-9, atol=1e-9)
-    with pytest.raises(CaseError, match=r"holds a sweep already.*--resume to continue"):
+    with pytest.raises(CaseError, match=r"holds a study already.*--resume to continue"):
         package.sweep(CASE, {"contact.friction": [0.1]}, folder=folder)
-    with pytest.raises(CaseError, match="holds no sweep"):
+    with pytest.raises(CaseError, match="holds no runs"):
         package.sweep(CASE, {"contact.friction": [0.1]}, folder=tmp_path / "none", resume=True)
     with pytest.raises(CaseError, match="--resume"):
         package.sweep(CASE, {"contact.friction": [0.1]}, resume=True)
@@ -188,15 +189,15 @@ def test_several_processes_start_where_that_pays(monkeypatch: pytest.MonkeyPatch
             pass
 
         def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-            future: Any = engines.Future()
+            future: Any = study.Future()
             future.set_result(function(*arguments))
             return future
 
-    monkeypatch.setattr(engines, "_processes", Here)
-    monkeypatch.setattr(engines.os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(study, "_local", Here)
+    monkeypatch.setattr(study.os, "sched_getaffinity", lambda _: {0, 1})
     quick = package.sweep(CASE, {"contact.friction": "0.1:0.3:4"}, processes=None)
     assert begun == []
-    monkeypatch.setattr(engines, "WORTH", 0.0)
+    monkeypatch.setattr(study, "WORTH", 0.0)
     slow = package.sweep(CASE, {"contact.friction": "0.1:0.3:4"}, processes=None)
     assert begun == [2]
     np.testing.assert_allclose(slow["pressure"], quick["pressure"], rtol=1e-9, atol=1e-9)
@@ -235,7 +236,7 @@ def test_command_on_processes_and_ranks(fenwear: Callable[..., Any], tmp_path: P
         assert done.returncode == 3, done.stderr
         assert "failed: contact.friction = 1.9" in done.stderr
         tables.append(json.loads(done.stdout))
-        assert {p.name for p in folder.iterdir()} == {"case.toml", "sweep.nc", "sweep.csv", "sweep.png", "variants"}
+        assert {p.name for p in folder.iterdir()} == {"case.toml", "sweep.nc", "sweep.csv", "sweep.png", "runs"}
     assert [table["failed"] for table in tables] == [2, 2]
     for one, other in zip(*(table["variants"] for table in tables), strict=True):
         for name in one:

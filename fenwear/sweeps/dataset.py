@@ -1,11 +1,8 @@
-"""Kept results of variants, and all of them as one dataset."""
+"""The outcomes of all variants as one dataset, and its files."""
 
 from __future__ import annotations
 
-import os
-import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,20 +13,20 @@ from numpy.typing import NDArray
 from fenwear.assembly.strokes import make_sliding
 from fenwear.case import Case
 from fenwear.interface import is_translation
+from fenwear.life.study import Outcome
 from fenwear.results import registry
-from fenwear.results.disk import writing
+from fenwear.results.disk import replacing
 from fenwear.results.quantity import KELVIN, RECORD, Quantity, degrees_of
-from fenwear.sweeps.plan import Of, Plan, Variant
+from fenwear.sweeps.plan import Of, Plan
 
 if TYPE_CHECKING:
     import pandas
 
-VARIANTS, DATASET, TABLE = "variants", "sweep.nc", "sweep.csv"
+DATASET, TABLE = "sweep.nc", "sweep.csv"
 SECONDS = "seconds"
 NODES = ("x", "y", "weight", "direction")  # coordinates where they are the same in all variants
 SAME = 1e-9  # of their range
 Place = tuple[int, ...]
-Values = Mapping[str, NDArray[np.float64]]
 
 
 def _other(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> Quantity:
@@ -65,52 +62,6 @@ def meaning(name: str, of: Of, case: Case) -> Quantity:
     unit, text = registry.in_model(found, on_surface=case.model.kind != "plane")
     each = name == "direction" or (found.dims and found.cycle != "last")
     return _other(name, (*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Outcome of a variant.
-
-    Attributes:
-        place: Of the variant in the sweep.
-        values: Its results; none where it failed.
-        trouble: Why it failed.
-        seconds: That it took.
-    """
-
-    place: Place
-    values: Values
-    trouble: str
-    seconds: float
-
-
-def keep(folder: Path, name: str, values: Values, seconds: float) -> None:
-    """Write the results of a variant; a file is there whole or not at all.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    path = folder / VARIANTS / f"{name}.npz"
-    part = path.with_suffix(f".{os.getpid()}.part")
-    with writing(path):
-        try:
-            with part.open("wb") as file:
-                np.savez(file, allow_pickle=False, **{**values, SECONDS: np.array(seconds)})
-            part.replace(path)
-        except OSError:
-            part.unlink(missing_ok=True)
-            raise
-
-
-def kept(folder: Path, variant: Variant) -> list[Outcome]:
-    """Return the outcome of a variant that a folder has; none where there is none that can be read."""
-    try:
-        with np.load(folder / VARIANTS / f"{variant.name}.npz", allow_pickle=False) as file:
-            values = dict(file)
-            seconds = float(values.pop(SECONDS))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return []
-    return [Outcome(variant.place, values, "", seconds)] if variant.possible else []
 
 
 def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarray.Dataset:
@@ -177,14 +128,10 @@ def write(folder: Path, dataset: xarray.Dataset) -> None:
     Raises:
         OutputError: they cannot be written.
     """
-    path, part = folder / DATASET, folder / f"{DATASET}.part"
-    with writing(path):
+    with replacing(folder / DATASET) as part:
         dataset.to_netcdf(part, engine="h5netcdf")
-        part.replace(path)
-    path, part = folder / TABLE, folder / f"{TABLE}.part"
-    with writing(path):
+    with replacing(folder / TABLE) as part:
         records(dataset).to_csv(part, index=False)
-        part.replace(path)
 
 
 def records(dataset: xarray.Dataset) -> pandas.DataFrame:

@@ -18,12 +18,21 @@ exactly so for linear wear and one contact zone, as the shapes of the loads diff
 different zones leave some of the wear uneven.
 
 In partial slip the shape is that of `fenwear.stick.final`: the stick zone carries all of the load, nothing else wears.
+
+A shape may also be asked for a pressure p of the first contact. Where p > 0 the gap is zero, so that with the
+compliance S(tau) under friction tau, the gap g_load of the loads and the present gap g_0
+
+    depth = -H a - (S(tau) p + g_load + g_0),
+
+where the rigid motion a leaves the least to take off. Where p = 0 the depth keeps the surfaces apart. The pressure must
+balance the loads on each rigid mode, E(tau) p + F = 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import linprog
@@ -31,15 +40,20 @@ from scipy.optimize import linprog
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.assembly.variants import with_case
-from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.contact_surface import ContactSurface, profiled
+from fenwear.case.bodies import Profile
+from fenwear.case.csv_table import read_profile
+from fenwear.case.dependence import parse_expression
 from fenwear.cycle import SteadyState, steady
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.interface import is_translation
 from fenwear.stick.final import FinalShape
 from fenwear.stick.records import TimeStepRecords
 
 ALLOWED = 0.1  # of the pressure scale: what a deviation of the size of the tolerance changes the pressure by
 ROUNDED = 1e-12  # of the largest depth: what rounding leaves of none
+UNBALANCED = 0.01  # of what a pressure carries: what is corrected of it
 PROBE = 1e-3  # of the elastic gap under the pressure scale: a deviation that is small
 
 
@@ -50,10 +64,10 @@ class InitialShape:
     Attributes:
         surface: The punch's contact surface.
         depth: To be taken off it at its nodes (n,), mm; 0 somewhere, and never less.
-        states: The steady state of each load; in partial slip the final shape.
+        states: The steady state of each load; in partial slip the final shape; none for a wanted pressure.
         largest_pressure: On that shape, of each load, MPa; NaN with heat.
-        left_to_run_in: Largest difference between the first cycle's pressures on that shape and the steady ones, over
-            the pressure scale, of each load; NaN with heat, where the first cycle is colder.
+        left_to_run_in: Largest difference between the first cycle's pressures on that shape and the steady ones, or
+            those wanted, over the pressure scale, of each load; NaN with heat, where the first cycle is colder.
         uneven_wear: Largest deviation of the wear in all loads together from a rigid motion, over the largest wear;
             NaN with heat, 0 in partial slip, where nothing wears.
         tolerance: Amplitude of a wave once over the contact that changes the pressure by a tenth of its scale, mm.
@@ -103,6 +117,84 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     tolerance = min(_tolerance(one, goal, depth) for one, goal in zip(systems, goals, strict=True))
     largest = tuple(float(p.max()) for p in first)
     return InitialShape(systems[0].pair.punch, depth, states, largest, tuple(left), uneven, tolerance)
+
+
+def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
+    """Return the shape of the punch whose first contact has a pressure; collective.
+
+    A pressure that misses the balance by less than a hundredth is corrected in proportion to itself.
+
+    Args:
+        system: The assembled problem, of gross sliding without heat.
+        pressure: At the contact nodes (n,), MPa.
+
+    Raises:
+        CaseError: the pressure is negative somewhere or nowhere positive, the loads do not balance it, or material
+            would have to be added; the system sticks, or has heat.
+        ConvergenceError: the contact on the shape did not converge.
+    """
+    if system.sticks or system.case.heat is not None:
+        what = "contact.law" if system.sticks else "heat"
+        raise CaseError(InputError(what, "a shape for a pressure is of gross sliding without heat"))
+    if not (np.isfinite(pressure).all() and pressure.min() >= 0 and pressure.any()):
+        raise CaseError(InputError("--pressure", "expected numbers of zero or more, and some above zero"))
+    interface, ratio, unworn = system.interfaces[0], system.friction_ratios()[0], system.unworn()
+    goal = _balanced(system, pressure, ratio)
+    forces = (interface.pair.normal + ratio) * (goal * interface.pair.weights)[:, None]
+    shape = -(interface.apply(forces)[:, 0] + interface.load_gap + system.gap(0, unworn))
+    pressed = goal > 0
+    depth = np.maximum(shape - _least_motion(system, shape, pressed), 0.0)
+    found = system.phase_contact((0,)).solve(system.gap(0, replace(unworn, punch=depth))).pressure[0]
+    off = float(np.abs(found - goal).max() / pressure_scale(system, goal[None]))
+    tolerance = _tolerance(system, goal[None], depth)
+    return InitialShape(system.pair.punch, depth, (), (float(found.max()),), (off,), np.nan, tolerance)
+
+
+def _balanced(system: Tribosystem, pressure: Array, ratio: Array) -> Array:
+    """Return a pressure (n,) that balances the loads exactly, from one that nearly does.
+
+    Raises:
+        CaseError: it does not; names each rigid mode with what the pressure carries, and what it must.
+    """
+    rigid, thickness = system.interfaces[0].rigid, system.bodies.punch.thickness
+    balance = rigid.equilibrium(ratio)
+    carried, needed = balance @ pressure, -rigid.resultant
+    allowed = UNBALANCED * np.abs(balance) @ pressure
+    problems = [
+        InputError(
+            "--pressure",
+            f"the pressure carries {thickness * has:.6g} {unit} along {name}; loads and friction need "
+            f"{thickness * must:.6g} {unit}",
+        )
+        for name, has, must, most in zip(rigid.mode_names, carried, needed, allowed, strict=True)
+        if abs(has - must) > most and (unit := "N" if is_translation(name) else "N mm")
+    ]
+    if problems:
+        raise CaseError(problems)
+    shares = (pressure[:, None] * rigid.rigid_normal) / np.abs(rigid.rigid_normal).max(axis=0)
+    return np.asarray(pressure + shares @ np.linalg.solve(balance @ shares, needed - carried))
+
+
+def pressure_at(surface: ContactSurface, text: str) -> Array:
+    """Return the pressures at the nodes of a surface (n,), MPa, by a CSV file or an expression in x, y, z.
+
+    Raises:
+        CaseError: the file cannot be read, or does not reach over the surface; the expression is none.
+    """
+    path = Path(text)
+    if path.suffix == ".csv" or path.is_file():
+        table = read_profile(path, "--pressure", {"pressure": "MPa"})
+        try:
+            return np.asarray(profiled(surface, Profile.model_construct(**table)).profile)
+        except CaseError as error:
+            raise CaseError([InputError("--pressure", problem.message) for problem in error.problems]) from None
+    place = dict(zip("xyz" if surface.dim == 3 else "xz", surface.x.T, strict=True))
+    try:
+        return np.asarray(parse_expression(text)(place) + np.zeros(len(surface.weights)))
+    except (ValueError, KeyError) as error:
+        raise CaseError(
+            InputError("--pressure", f"expected a CSV file or an expression of the place: {error}")
+        ) from None
 
 
 def _under(system: Tribosystem, factor: float) -> Tribosystem:

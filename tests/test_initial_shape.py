@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import nnls
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
-from fenwear.initial_shape import initial_shape
+from fenwear.initial_shape import initial_shape, pressure_at, shape_for_pressure
 from fenwear.results.export import TRIANGLE, profile_of, with_shape
 from fenwear.stick.records import TimeStepRecords
 
@@ -178,7 +178,7 @@ def test_bad_files(tmp_path: Path) -> None:
     """A column without a unit, and one that nobody knows."""
     for text, message in (("x (mm),depth\n0,0\n1,0\n", "column 'depth': has no unit"),
                           ("x (mm),heigth (um)\n0,0\n1,0\n", "column 'heigth': not known.*did you mean 'height'"),
-                          ("x (mm),y (mm)\n0,0\n1,0\n", "expected the columns x and depth")):  # fmt: skip
+                          ("x (mm),y (mm)\n0,0\n1,0\n", "expected the columns x and depth or height")):  # fmt: skip
         (tmp_path / "profile.csv").write_text(text)
         (tmp_path / "case.toml").write_text('base = "example1"\nstrip.profile = {file = "profile.csv"}\n')
         with pytest.raises(CaseError, match=f"strip.profile.file: .*{message}"):
@@ -190,3 +190,70 @@ def test_bad_loads(assembled: Callable[..., Tribosystem], loads: Any) -> None:
     """A share or factor that is not positive."""
     with pytest.raises(CaseError, match="--load: expected positive numbers"):
         initial_shape(assembled("example2", *SMALL), loads)
+
+
+def wanted(system: Tribosystem, name: str) -> Any:
+    """Return a pressure that no flat surface has, and that balances the loads: lowest in the middle, and zero there."""
+    rigid, ratio = system.interfaces[0].rigid, system.friction_ratios()[0]
+    s = system.pair.punch.places
+    s = (2 * s - s.min(axis=0) - s.max(axis=0)) / np.ptp(s, axis=0)
+    form = 1 + (s**2).sum(axis=1)
+    if name != "ring-on-ring":
+        form = np.where((s**2).sum(axis=1) < 0.05, 0.0, form)
+    shares = form[:, None] * rigid.rigid_normal
+    return shares @ np.linalg.solve(rigid.equilibrium(ratio) @ shares, -rigid.resultant)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("example1", (*SMALL, "contact.friction=0.3")),
+        ("ring-on-ring", RING),
+        ("pin-on-disc", ("geometry.degree=1", "geometry.order=1")),
+        ("ball-on-flat", ("geometry.degree=1", "geometry.order=1", "grid.nodes=17")),
+    ],
+)
+def test_a_wanted_pressure(assembled: Callable[..., Tribosystem], name: str, settings: tuple[str, ...]) -> None:
+    """A punch made so has that pressure in its first contact, at every node: plane with friction, ring, solid, grid."""
+    system = assembled(name, *settings)
+    pressure = wanted(system, name)
+    assert pressure.min() >= 0
+    shape = shape_for_pressure(system, pressure)
+    assert shape.depth.min() >= 0
+    own = made_with(system, shape.depth)
+    found = own.phase_contact((0,)).solve(own.gap(0, own.unworn())).pressure[0]
+    np.testing.assert_allclose(found, pressure, rtol=0, atol=1e-8 * pressure.max())
+
+
+def test_pressures_that_balance_forbids(assembled: Callable[..., Tribosystem]) -> None:
+    """Named are the rigid modes, with what the pressure carries and what it must; a small rest is corrected."""
+    system = assembled("example1", *SMALL)
+    ratio, rigid, x = system.friction_ratios()[0], system.interfaces[0].rigid, system.pair.x
+    with pytest.raises(CaseError, match=r"lambda_F; loads and friction need 10000 N") as failure:
+        shape_for_pressure(system, pressure_at(system.pair.punch, "20 + 0.2*x"))
+    assert f"carries {20 * 600:g} N along lambda_F" in str(failure.value)
+    assert "N mm along lambda_M" in str(failure.value)
+    with pytest.raises(CaseError, match="--pressure: expected numbers of zero or more"):
+        shape_for_pressure(system, x)
+    with pytest.raises(CaseError, match="--pressure: expected a CSV file or an expression"):
+        pressure_at(system.pair.punch, "20 +")
+    exact = wanted(system, "example1")
+    near = shape_for_pressure(system, 1.003 * exact)
+    assert near.largest_pressure[0] == pytest.approx(exact.max(), rel=1e-8)
+    np.testing.assert_allclose(rigid.equilibrium(ratio) @ exact, -rigid.resultant, rtol=1e-9)
+
+
+def test_a_wanted_pressure_of_a_file(fenwear: Callable[..., Any], tmp_path: Path) -> None:
+    """The command reads the table, and says how exactly the pressure is met."""
+    r = np.linspace(20, 30, 9)
+    (tmp_path / "c.csv").write_text(
+        "r (mm),pressure (MPa)\n" + "".join(f"{a},{2000 / (2 * np.pi * 10 * a)}\n" for a in r)
+    )
+    options = [word for setting in RING for word in ("--set", setting)]
+    done = fenwear("shape", "ring-on-ring", *options, "--pressure", "c.csv", "-o", "made", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["loads"][0]["left_to_run_in"] < 1e-8
+    assert {one.name for one in (tmp_path / "made").iterdir()} == {"case.toml", "profile.csv", "surface.stl"}
+    wrong = fenwear("shape", "ring-on-ring", *options, "--pressure", "40", "-o", "wrong", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert "loads and friction need 2000 N" in wrong.stderr

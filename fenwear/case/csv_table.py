@@ -10,7 +10,8 @@ from typing import Any
 from fenwear.errors import CaseError, InputError
 from fenwear.files.table import TableError, check_names, heading, known_units, read_table
 
-OF_PROFILE = {"x": "mm", "r": "mm", "s": "mm", "y": "mm", "z": "mm", "depth": "mm", "height": "mm"}
+AXES = dict.fromkeys(("x", "r", "s", "y", "z"), "mm")
+DEPTHS = {"depth": "mm", "height": "mm"}
 PLACES = (("x",), ("r",), ("s",), ("x", "y"), ("x", "y", "z"))
 
 
@@ -83,27 +84,28 @@ def headings(row: Sequence[str], columns: Mapping[str, str]) -> tuple[list[str],
     return [head.name for head in heads], [head.unit for head in heads]
 
 
-def read_profile(path: Path, key: str) -> dict[str, Any]:
+def read_profile(path: Path, key: str, measured: Mapping[str, str] = DEPTHS) -> dict[str, Any]:
     """Return the table of a profile in a CSV file: the points of its rows, mm, and along what they go.
 
     Args:
         path: Of the file; each heading has its unit, as in "depth (um)"; height is minus the depth.
         key: Of the case, for messages.
+        measured: Units of the columns that may be measured, of which the file has one.
 
     Raises:
         CaseError: it cannot be read; names column and row.
     """
-    table = read_csv(path, key, OF_PROFILE, least=2)
+    table = read_csv(path, key, {**AXES, **measured}, least=2)
     names = table.names
-    places = [name for name in names if name not in ("depth", "height")]
+    places = [name for name in names if name not in measured]
     if tuple(sorted(places)) not in PLACES or len(places) + 1 != len(names):
-        expected = "x and depth (or height), r and depth of rings, s and depth along a curve, or x, y, (z) and depth"
-        raise table.wrong(f"expected the columns {expected}")
+        what = " or ".join(measured)
+        raise table.wrong(f"expected the columns x and {what}, r of rings, s along a curve, or x, y, (z) of solids")
     order = [names.index(name) for name in sorted(places)]
-    measured = next(k for k, name in enumerate(names) if name not in places)
-    sign = 1.0 if names[measured] == "depth" else -1.0
+    (at,) = (k for k, name in enumerate(names) if name not in places)
+    sign = -1.0 if names[at] == "height" else 1.0
     along = "arc" if "s" in places else "x"
-    points = [[*(row[k] for k in order), sign * row[measured] + 0.0] for row in table.rows]
+    points = [[*(row[k] for k in order), sign * row[at] + 0.0] for row in table.rows]
     return {"points": points, "along": along}
 
 

@@ -380,12 +380,16 @@ def shape_command(
             help="Factor of all loads, and its share of the sliding; repeatable, for loads that take turns.",
         ),
     ] = [],  # noqa: B006
+    pressure: Annotated[
+        str,
+        typer.Option(metavar="FILE|EXPR", help="Pressure of the first contact, MPa: a table, or 20*(1-(x/30)**2)."),
+    ] = "",
     as_json: JsonOption = False,
 ) -> None:
-    """Find the shape to machine: that of the steady state (of a program: in its last step), without run-in."""
+    """Find the shape to machine: that of the steady state (of a program: in its last step), or for a pressure."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import at_step
-    from fenwear.initial_shape import initial_shape
+    from fenwear.initial_shape import initial_shape, pressure_at, shape_for_pressure
     from fenwear.law_choice import resolve_law
     from fenwear.parallel import on_root
     from fenwear.results.export import write_shape
@@ -393,9 +397,12 @@ def shape_command(
     law_state = resolve_law(load(case, settings), log, heat="none")
     loaded, system = law_state.case, at_step(law_state.system)
     wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
-    if not system.sticks:
-        system = with_reduced_heat(system, keep=True)
-    shape = initial_shape(system, wanted)
+    if pressure:
+        if loads:
+            raise CaseError(InputError("--pressure", "is that of the case's loads: leave out --load"))
+        shape = shape_for_pressure(system, pressure_at(system.pair.punch, pressure))
+    else:
+        shape = initial_shape(system if system.sticks else with_reduced_heat(system, keep=True), wanted)
     on_root(system.comm, lambda: write_shape(output, loaded, shape))
     rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
     known = [{"largest_pressure": pressure, "left_to_run_in": left} for pressure, left in rows]
@@ -414,6 +421,8 @@ def _shape_text(case: str, wanted: list[tuple[float, float]], shape: InitialShap
         ("largest pressure once worn in (MPa)", [float(state.pressure.max()) for state in shape.states]),
         ("largest difference of both, of the pressure scale (%)", [100 * round(x, 6) for x in shape.left_to_run_in]),
     ]
+    if not shape.states:
+        rows[1:] = [("largest difference from the pressure wanted, of its scale (%)", rows[2][1])]
     lines = [
         f"shape to machine for {case}: {1e3 * shape.depth.max():.4g} µm deep",
         f"made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale",

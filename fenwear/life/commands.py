@@ -143,7 +143,7 @@ def _write(
         for name, text in texts.items():
             write_text(folder / name, text)
         for name, draw in figures.items():
-            with replacing(folder / name) as part:
+            with replacing(folder / name, shared=True) as part:
                 draw().savefig(part, dpi=150, format="png")
 
     on_root(comm, write)

@@ -158,7 +158,7 @@ class Store:
         self._known[name] = outcome
         if self.folder is not None:
             extra = {"trouble": np.array(outcome.trouble), "seconds": np.array(outcome.seconds)}
-            with replacing(self._path(self.folder, name)) as part, part.open("wb") as file:
+            with replacing(self._path(self.folder, name), shared=True) as part, part.open("wb") as file:
                 np.savez(file, allow_pickle=False, **outcome.values, **extra)
         return outcome
 

@@ -33,13 +33,17 @@ def writing(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
     """Give the path of a new file, which takes the place of an older one as a whole.
+
+    Args:
+        path: Of the file.
+        shared: Whether other processes may write it at the same time.
 
     Raises:
         OutputError: it cannot be written; the older one stays.
     """
-    part = path.with_name(f"{path.name}.part")
+    part = path.with_name(f"{path.name}.{uuid4().hex}.part" if shared else f"{path.name}.part")
     with writing(path):
         try:
             part.unlink(missing_ok=True)  # a killed run may have left half of one
@@ -68,29 +72,13 @@ def finite(data: Any) -> Any:
     return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Yield the path of a new file, which takes the place of an older one as a whole, whoever else writes it, too.
-
-    Raises:
-        OutputError: it cannot be written; the older one stays.
-    """
-    part = path.with_name(f"{path.name}.{uuid4().hex[:8]}.part")
-    with writing(path):
-        try:
-            yield part
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-
-
 def write_text(path: Path, text: str) -> None:
     """Write a text file that takes the place of an older one as a whole.
 
     Raises:
         OutputError: it cannot be written; the older one stays.
     """
-    with replacing(path) as part:
+    with replacing(path, shared=True) as part:
         part.write_text(text, "utf-8")
 
 

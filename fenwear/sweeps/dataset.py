@@ -128,9 +128,9 @@ def write(folder: Path, dataset: xarray.Dataset) -> None:
     Raises:
         OutputError: they cannot be written.
     """
-    with replacing(folder / DATASET) as part:
+    with replacing(folder / DATASET, shared=True) as part:
         dataset.to_netcdf(part, engine="h5netcdf")
-    with replacing(folder / TABLE) as part:
+    with replacing(folder / TABLE, shared=True) as part:
         records(dataset).to_csv(part, index=False)
 
 

@@ -76,7 +76,7 @@ def draw(dataset: xarray.Dataset, folder: Path) -> None:
     """
     if not any(name in dataset for name in SHOWN):
         return
-    with replacing(folder / PICTURE) as part:
+    with replacing(folder / PICTURE, shared=True) as part:
         sweep_figure(dataset).savefig(part, dpi=150, format="png")
 
 

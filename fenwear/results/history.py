@@ -182,7 +182,11 @@ def clear_directory(path: Path) -> None:
         CaseError: it holds other files too, or cannot be removed.
     """
     try:
-        others = [one.name for one in path.iterdir() if one.name not in OF_RESULTS and one.suffix != ".part"] if path.is_dir() else []
+        others = (
+            [one.name for one in path.iterdir() if one.name not in OF_RESULTS and one.suffix != ".part"]
+            if path.is_dir()
+            else []
+        )
         if others:
             message = f"{path} holds {', '.join(sorted(others)[:5])}, which fenwear did not write. Remove the folder."
             raise CaseError(InputError("--overwrite", message))

@@ -1,4 +1,4 @@
-"""The numerical uncertainty of what a run tells: how far depth, volume, pressure and temperature may be from the limit.
+"""The numerical uncertainty of a run's end: how far depth, volume, pressure and temperature may be from the limit.
 
 In the words of ASME V&V 20 the error of a number against a measurement has parts of the input, the model and the
 numerics; here it is the last of these alone, u_num, estimated after the run (solution verification, V&V 10). Each
@@ -6,9 +6,9 @@ source is a contribution of its own, and their sum bounds what they come to toge
 
     mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements; of a
                  contact grid, with every second or fourth of its nodes;
-    wear steps   of marched half-cycles by what they wear; of jumps by their own errors, which go on from jump to jump
-                 (`fenwear.cycle.jump`), in the run that the mesh is compared with, by their fields; temperatures by
-                 half of what the last cycle changes at least, as jumps see whole cycles;
+    wear steps   of marched half-cycles by what they wear; of jumps by their own errors, which continue from jump to
+                 jump (`fenwear.cycle.jump`), in the run that the mesh is compared with, by their fields; temperatures
+                 by half of what the last cycle changes at least, as jumps see whole cycles;
     positions    of the strip in a half-cycle, from the same run with half as many;
     following    of meshes that follow the wear, from the same run in which they follow half as often;
     heat steps   what halving them changes of the contact's temperatures;
@@ -25,8 +25,8 @@ of the coarser one and r = H / h, the ratio of the distances of their nodes (P. 
 Contact limits the order: displacements of quadratic elements and better have q = 3/2 where the edges of contact are
 free (Z. Belhachmi, F. Ben Belgacem, Math. Comp. 72, 2003), pressures, whose slope there is infinite, q = 1 whatever the
 degree. So depths, volumes and temperatures are taken to have 3/2; pressures, and what is largest at an edge, where the
-limit may be a singularity or a step that wear has left, 1. What the coarser run cannot see, errors of the model, of the
-friction and wear coefficients, is no part of it.
+limit may be a singularity or a step that wear has left, 1. Errors of the model and of the friction and wear
+coefficients, which the coarser run cannot show, are no part of it.
 """
 
 from fenwear.accuracy.contributions import (

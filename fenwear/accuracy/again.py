@@ -100,7 +100,7 @@ class Coarser:
 
     Attributes:
         case: Itself.
-        ratio: How many times as far apart its nodes are; 1 where there is nothing coarser.
+        ratio: Ratio of its node spacing to that of the run; 1 where there is nothing coarser.
         grid: Its grid, where it has one that stays.
     """
 
@@ -186,12 +186,12 @@ def in_longer_jumps(case: Case) -> Case:
 def set_up(case: Case, system: Tribosystem, by: Coarser) -> Tribosystem:
     """Return the bodies of a case; where its curved elements are too coarse, those with straight ones; collective.
 
-    What answers on any grid is not made again for a coarser one.
+    Operators that answer on any grid are shared with a coarser one.
 
     Args:
         case: The run's on other elements.
         system: Of the run, whose steps of slip it takes.
-        by: What it is coarser by.
+        by: The coarser case and its ratio.
 
     Raises:
         CaseError: neither goes.

@@ -1,4 +1,4 @@
-"""The numbers of a run's end whose uncertainty is told, and whether they are those of an edge."""
+"""The numbers of a run's end that get an uncertainty, and whether they lie at an edge."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAME = 1e-4  # of the surface's extent: nodes that are one
 
 
 class Quantity(NamedTuple):
-    """What a number is: a quantity of the registry, of a body, of a half-cycle or of the whole contact.
+    """The meaning of a number: a quantity of the registry, of a body, of a half-cycle or of the whole contact.
 
     Attributes:
         name: Of the quantity.

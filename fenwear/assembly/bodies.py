@@ -77,7 +77,7 @@ class Bodies:
         punch, strip: Elasticity.
         heat: Conduction in both; none without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
-        moved: How far the contact nodes have moved for it.
+        moved: Displacements of the contact nodes for it.
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
         densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
         warmed: Temperatures of this rank's own nodes of both that the materials' properties are taken at (owned,)
@@ -110,7 +110,7 @@ class Bodies:
 
     @property
     def last_resorts(self) -> list[str]:
-        """What is to be said of elements that had better be others."""
+        """Warnings of elements of a poor kind."""
         return [
             f"geometry.degree: the {body.body.name} has tetrahedra of degree 1. They are too stiff: "
             "pressures of a small contact are wrong by a sixth. Set geometry.degree = 2, or mesh with hexahedra"
@@ -120,12 +120,12 @@ class Bodies:
 
     @property
     def remarks(self) -> list[str]:
-        """What is to be said of the bodies before anything is computed with them."""
+        """Warnings of the bodies before anything is computed with them."""
         return [*self.last_resorts, *self.swallowed_loads, *self.tilted_maps]
 
     @property
     def tilted_maps(self) -> list[str]:
-        """What is to be said of rough surfaces whose tilt is higher than their roughness."""
+        """Warnings of rough surfaces whose tilt is higher than their roughness."""
         texts = []
         for body in (self.punch, self.strip):
             heights, grid = body.surface.heights, body.surface.grid
@@ -145,7 +145,7 @@ class Bodies:
 
     @property
     def swallowed_loads(self) -> list[str]:
-        """What is to be said of loads where supports hold what they push: nothing else feels them."""
+        """Warnings of loads where supports hold the motion that they push: nothing else feels them."""
         texts = []
         for body in (self.punch, self.strip):
             least = max(np.abs(body.given).max(initial=0.0), SWALLOWED * body.acting)
@@ -194,7 +194,7 @@ def build_bodies(
         fresh: Mesh them even where their meshes are kept on disk.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong, such as a missing group.
+        CaseError: a property of the geometry is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
     check_operators(case)
@@ -310,7 +310,7 @@ def _moved(
 def edges_of(bodies: Bodies, surface: ContactSurface) -> Edges:
     """Return the distances from the edges of a contact on the punch's surface.
 
-    What both bodies end at, held square to it alone, is a plane of symmetry, beyond which the contact goes on.
+    A plane at which both bodies end, held square to it alone, is one of symmetry: the contact continues beyond it.
     """
     size, surfaces = surface.extent(), (surface, bodies.strip.surface)
     planes = []

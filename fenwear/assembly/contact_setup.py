@@ -49,7 +49,7 @@ class Clock:
     Attributes:
         half_cycles: Before it.
         time: s.
-        slid: How far the motions before it went, mm or rad.
+        slid: Distance of the motions before it, mm or rad.
     """
 
     half_cycles: int = 0
@@ -72,7 +72,7 @@ class ContactSetup:
         rigid: The same in the middle position under the mean loads.
         passes: Whether the strip's material moves past the punch's; not where nodes stick and it stays opposite.
         passage: Where the punch is on a strip that conducts and passes under it to and fro; None where none does.
-        remedies: What had to be solved in another way.
+        remedies: Descriptions of parts solved in another way.
         clock: When its motion began.
     """
 
@@ -126,7 +126,7 @@ class ContactSetup:
 
     @property
     def names(self) -> Names:
-        """What the bodies are called."""
+        """Names of the bodies."""
         return self.case.names
 
     @property
@@ -173,7 +173,7 @@ class ContactSetup:
 
     @cached_property
     def sliding_ratio(self) -> Array:
-        """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
+        """Sliding of each node in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
         return self._rates(1.0)
 
     def _rates(self, power: float) -> Array:
@@ -186,7 +186,7 @@ class ContactSetup:
 
     @cached_property
     def path(self) -> Array:
-        """What each node slides in each phase (phases, n), mm."""
+        """Sliding of each node in each phase (phases, n), mm."""
         return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.sliding_ratio
 
     @cached_property
@@ -265,7 +265,7 @@ class ContactSetup:
 
     @cached_property
     def layers(self) -> Layers:
-        """What lies between the surfaces.
+        """Layers between the surfaces.
 
         Raises:
             CaseError: a value of it is not positive somewhere, the modulus of rough surfaces is missing, or the
@@ -307,7 +307,7 @@ class ContactSetup:
         Args:
             wear: Of these phases.
             phases: Their numbers.
-            evolution: What they do to the states that laws remember; None where there are none.
+            evolution: Their change of the states that laws remember; None where there are none.
             conditions: Of the phases, which debris may be lost by; by default those of the mean pressure.
         """
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
@@ -343,7 +343,7 @@ class ContactSetup:
         """Return no depths, with the states of laws that cycles at conditions of the phases leave as they are.
 
         Raises:
-            ConvergenceError: a state goes on as long as it slides.
+            ConvergenceError: a state changes as long as it slides.
         """
         unworn = self.unworn()
         return self.layers.with_held(unworn, self.evolution(conditions).rest(self.layers.held(unworn)))

@@ -37,7 +37,7 @@ class CreepTangent(NamedTuple):
 
     Attributes:
         opened: Gap by a state (n, state).
-        stay, seen: What is left of its changes at the end of the phase, and as the contact sees them (state,).
+        stay, seen: Shares of its changes that remain at the end of the phase, and that the contact sees (state,).
         by_pressure, seen_by_pressure: State at the end, and as the contact sees it, by the pressures (state, n).
     """
 
@@ -56,7 +56,7 @@ class Creep:
         members: The bodies and the layer that creep.
         durations: Of the phases of the motion (m,), s.
         courses: Loads over those of the middle, at even times of each phase (m, 2 k + 1).
-        interfaces: What the surfaces answer at once in each phase.
+        interfaces: Elastic compliance of the surfaces in each phase.
         moved: Displacement of punch and strip by moved supports alone in each phase (q, d), mm.
         middle: A phase in the middle of a half-cycle.
     """
@@ -70,7 +70,7 @@ class Creep:
 
     @cached_property
     def cycles(self) -> list[RetardedCycle]:
-        """What a cycle does to each member."""
+        """Change of each member over a cycle."""
         return [member.retardation.over(self.durations, self.courses) for member in self.members]
 
     @cached_property
@@ -133,7 +133,7 @@ class Creep:
 
     @cached_property
     def grown(self) -> tuple[Interface, ...]:
-        """What the surfaces answer in each phase of a march, creep within it and all."""
+        """Compliance of the surfaces in each phase of a march, including the creep within it."""
         if not self.creeps:
             return self.interfaces
         known: dict[tuple[float, ...], Interface] = {}
@@ -302,7 +302,7 @@ def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
 
 @dataclass(frozen=True)
 class CreepStage:
-    """What creep does to the contact of all phases in one implicit step, or in the end.
+    """Effect of creep on the contact of all phases in one implicit step, or in the end.
 
     Attributes:
         creep: All that creeps.
@@ -354,7 +354,7 @@ def creep_of(
 
     Args:
         placed: The bodies.
-        operators: How both answer, under the mean of their loads.
+        operators: Compliance of both, under the mean of their loads.
         interfaces: Both joined in each phase.
         on_material: Returns them joined in a phase with what the strip's own material answers, wherever it is.
     """

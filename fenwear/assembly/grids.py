@@ -165,7 +165,7 @@ def surface_on(name: str, grid: RegularGrid, outward: float, depth: Array) -> Co
         name: Of the body.
         grid: Its nodes.
         outward: 1.0 where the normal out of the body points along its axis, else -1.0.
-        depth: How deep the body's surface lies below the grid (n,), mm.
+        depth: Depth of the body's surface below the grid (n,), mm.
     """
     x, every = grid.points, np.arange(len(grid.points))
     normals = np.zeros_like(x)

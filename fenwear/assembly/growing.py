@@ -1,10 +1,10 @@
 """Contact grids that grow: around the first contact as fine as asked for, wider with the scar, and coarser.
 
 All grids of a run are parts of lattices through one point, the middle of the largest: a wider one has the nodes of
-the one before, a coarser one every second of them. What is known at nodes stays there, nothing is interpolated, and
-depths are multiplied by what keeps the worn volume, 1 but for the square of a spacing over the contact's width.
-Nothing is factored again: half-spaces answer anywhere, and what a finite body does besides is known over the largest.
-The stages of a program go on with the grid of the one before; each begins with room for what its loads bring together.
+the one before, a coarser one every second of them. Values at nodes stay there, nothing is interpolated, and depths are
+multiplied by a factor that keeps the worn volume, 1 but for the square of a spacing over the contact's width. Nothing
+is factored again: half-spaces answer anywhere, and what a finite body does besides is known over the largest. The
+stages of a program continue with the grid of the stage before; each begins with room for what its loads bring together.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The laws of contact by their names: each sets up bodies, steps over half-cycles and cycles, and finds their end.
 
 A law is registered here by its name in a case, `contact.law`, as the module that has it as `LAW`, or as an object by
-`register_contact_law`; nothing else in this package names one. What they share is the loop (`cycle.driver`), the state
+`register_contact_law`; nothing else in this package names one. They share the loop (`cycle.driver`), the state
 (`cycle.state`), blocks, runs and results. What differs beyond their steps they answer themselves: the questions are
 those of `ContactLaw`.
 """
@@ -54,7 +54,7 @@ def register_contact_law(name: str, law: Any) -> None:
 
 
 class ContactLaw(Protocol):
-    """What a law of contact answers.
+    """The interface of a law of contact.
 
     Attributes:
         name: By which cases have it; systems have it as their `law`.
@@ -77,7 +77,7 @@ class ContactLaw(Protocol):
         """Return the system of another case of the same set-up and law, sharing what the change leaves; collective."""
 
     def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could go on alone: no temperatures, no contact on all displacements."""
+        """Return whether every rank could continue alone: no temperatures, no contact on all displacements."""
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa: the scale of gaps."""
@@ -98,7 +98,7 @@ class ContactLaw(Protocol):
     def half_cycles(
         self, system: Tribosystem, watch: Callable[[], bool], loading: Callable[[float], float], *, implicit: bool
     ) -> Any:
-        """Return the `cycle.driver.Step` that goes on by a half-cycle."""
+        """Return the `cycle.driver.Step` that advances by a half-cycle."""
 
     def jumps(
         self,
@@ -107,4 +107,4 @@ class ContactLaw(Protocol):
         watch: Callable[[], bool],
         loading: Callable[[float], float],
     ) -> Any:
-        """Return the `cycle.driver.Step` that goes on by as many cycles as the tolerance allows."""
+        """Return the `cycle.driver.Step` that advances by as many cycles as the tolerance allows."""

@@ -3,7 +3,7 @@
 In how many positions of each half-cycle the strip passes under the punch, where a case leaves that open.
 
 Each position is a contact of its own, and what it wears lies where the strip's material is then. Positions that are
-further apart than contact nodes leave steps in the strip's scar: what wears it is a comb, not a sliding pressure. An
+further apart than contact nodes leave steps in the strip's scar: its wear is a comb, not that of a sliding pressure. An
 uneven strip that stood still would leave its imprint in the punch.
 """
 
@@ -166,7 +166,7 @@ def place_case_bodies(case: Case, bodies: Bodies, sliding: Sliding | None = None
     Args:
         case: The problem.
         bodies: Built from it.
-        sliding: How they slide; by default as the case has it, in as many positions as contact nodes ask for.
+        sliding: Their sliding; by default as the case has it, in as many positions as contact nodes ask for.
     """
     made = sliding or make_sliding(case)
     placed = place(bodies, made, case)

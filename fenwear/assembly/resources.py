@@ -1,7 +1,7 @@
-"""What the set-up of a system asks of memory, known from the sizes of the meshes before it is spent.
+"""Memory that the set-up of a system needs, from the sizes of the meshes before it is used.
 
-The sizes of sparse factors follow those of nested dissection (`fenwear.bodies.factor.entries`). What comes of the
-patterns of force is dense, n by n contact nodes.
+The sizes of sparse factors follow those of nested dissection (`fenwear.bodies.factor.entries`). Results of the patterns
+of force are dense, n by n contact nodes.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ NO_FACTOR = "nothing is factored"
 
 @dataclass(frozen=True)
 class Resources:
-    """What the set-up of both bodies and of their contact asks for: an estimate.
+    """Memory for the set-up of both bodies and of their contact: an estimate.
 
     Attributes:
-        bodies: What is set up.
+        bodies: The part that is set up.
         nodes: Contact nodes.
         memory: Of all ranks at the end of the set-up and in the first half-cycles, bytes.
     """

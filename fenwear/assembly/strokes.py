@@ -1,4 +1,4 @@
-"""How the counter-body slides by a case, and that it stays in its surface."""
+"""The sliding of the counter-body by a case, which stays in its surface."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ FACET = 0.1  # the same at a single node, beside facets of no regular form
 
 @dataclass(frozen=True)
 class Sliding:
-    """How the counter-body slides, and what that does to both surfaces.
+    """The sliding of the counter-body, with its effect on both surfaces.
 
     Attributes:
         motion: The phases of a cycle.
         field: The velocity of the counter-body over the contact.
         friction: The law of friction.
         wear: The wear laws of punch and strip; `NoWear` where a body does not wear.
-        track: What closes the track that a strip which wears runs on: its length, mm, or 2 pi rad; None for none.
+        track: Closure of the track that a wearing strip runs on: its length, mm, or 2 pi rad; None for none.
         to_and_fro: Whether the strip's worn track passes to and fro under the punch.
     """
 

@@ -86,8 +86,8 @@ class Tribosystem(ContactSetup):
         interface: The condensed interface in the middle position, under the mean loads.
         interfaces: The same in each phase.
         exchange: The bodies' temperatures over the phases; isothermal without heat, or where it was not asked for.
-        law_state: What the law of contact has prepared of it, where it needs more.
-        creep: What bodies and layer creep.
+        law_state: Parts that the law of contact has prepared.
+        creep: Creep of bodies and layer.
     """
 
     condensed: Condensed
@@ -104,13 +104,13 @@ class Tribosystem(ContactSetup):
 
     @cached_property
     def layers(self) -> Layers:
-        """What lies between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
+        """Layers between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
         found = super().layers
         return found if found.hardness == np.inf else replace(found, softness=SOFT * self.interface.elastic_length)
 
     @property
     def replicated(self) -> bool:
-        """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
+        """Whether every rank could continue alone: no temperatures of all nodes, no contact on all displacements."""
         return bool(self.contact_law.replicated(self))
 
     def led(self, function: Callable[[], T]) -> T:
@@ -149,7 +149,7 @@ class Tribosystem(ContactSetup):
         Args:
             phase: Its number.
             worn: Depths at its start, what lies between and what has crept.
-            passing: Whether what has crept goes on over the phase, in a march; else it is left out.
+            passing: Whether creep continues over the phase, in a march; else it is left out.
         """
         found = super().gap(phase, worn)
         return found + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else found

@@ -3,8 +3,9 @@
 Materials' properties that depend on the temperature: when they have changed, and the bodies with those of now.
 
 Within the steps properties are fields that stay, each at the temperature of its own node at the end of the cycle that
-they were taken from. When at some node one has changed by more than a tolerance the bodies are made anew with those of
-the temperatures of now, on the same meshes. So they follow what is slow: their swing within a cycle is left out.
+they were taken from. When at some node one has changed by more than a tolerance the bodies are made again with
+properties at the present temperatures, on the same meshes. So they follow what is slow: their swing within a cycle is
+left out.
 """
 
 from __future__ import annotations
@@ -51,14 +52,14 @@ def assemble(
         case: The problem.
         comm: The ranks.
         followed: Worn depths that the meshes follow; by default they are as they were made.
-        heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
+        heat: Preparation of the heat of the motion, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
         fresh: Mesh and condense the bodies and reduce their heat again, even where all that is kept on disk.
         warmed: Temperatures of this rank's own nodes that the materials' properties are taken at; by default the
             initial one.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
     law: ContactLaw = law_named(case.contact.law)
@@ -97,7 +98,7 @@ def place_case(
         warmed: Temperatures that the materials' properties are taken at.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
     return place_case_bodies(case, build_bodies(case, comm, followed, warmed))

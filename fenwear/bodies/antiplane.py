@@ -2,7 +2,7 @@
 
 Nothing changes along y, so that u_y(x, z) obeys div(G grad u_y) = 0 on its own: pressure, gap and
 wear stay as they are without it. In rings u_y is the displacement around the axis, and its shear strains are
-u_y,r - u_y / r and u_y,z. What supports a body in the plane is taken to hold it along y, too; a ring without supports
+u_y,r - u_y / r and u_y,z. Supports of a body in the plane hold it along y, too; a ring without supports
 is taken to be held from turning where it is loaded.
 """
 

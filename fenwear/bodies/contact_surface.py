@@ -67,7 +67,7 @@ class ContactSurface:
         contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
         grid: Of a surface that is a regular grid and no trace of a mesh; else None.
-        sag: How deep the mesh lies below a grid at its nodes (n,), mm, a part of the profile; one zero without a grid.
+        sag: Depth of the mesh below a grid at its nodes (n,), mm, a part of the profile; one zero without a grid.
         made: The same as its mesh was made, where that has followed the wear since; else None.
         heights: Of a topography on it (n,), mm; one zero without.
     """
@@ -100,7 +100,7 @@ class ContactSurface:
 
     @cached_property
     def rounds(self) -> tuple[list[Round], NDArray[np.int64]]:
-        """What is round of it, as its mesh was made, and which of it each trace node is on, -1 for none (N,)."""
+        """Its round parts as meshed, and the part that each trace node is on, -1 for none (N,)."""
         if self.made is not None:
             return self.made.rounds
         number = np.full(len(self.trace), -1)
@@ -163,7 +163,7 @@ class ContactSurface:
 
     @cached_property
     def extension(self) -> csr_array:
-        """What takes values at the pressure nodes to the trace nodes (N, n): linear on triangles.
+        """Interpolation from the pressure nodes to the trace nodes (N, n): linear on triangles.
 
         Elsewhere only a node on the axis of rings has no pressure: it takes its neighbour's value.
         """
@@ -422,7 +422,7 @@ def _check_apart(body: BodyMesh, nodes: Sequence[NDArray[np.int64]]) -> None:
 def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degree: int) -> NDArray[np.int64]:
     """Return the order (f, k) that brings the nodes of each facet to those of the reference element.
 
-    Edges that elements share may run either way in the numbering: nodes are told by their place.
+    Edges that elements share may run either way in the numbering: nodes are identified by their place.
     """
     reference = _lagrange(cell, degree).points
     x = points[local]

@@ -1,4 +1,4 @@
-"""What a finite body does at its contact otherwise than a half-space: smooth, on a few points.
+"""The difference of a finite body's compliance at its contact from a half-space's: smooth, on a few points.
 
 Under a force F_i at a point y_i of the contact a body moves by U_i + u_i: by what a half-space of the contact's
 material does (Boussinesq, Cerruti; in the plane Flamant), and a correction. As the first leaves tractions T_i on the
@@ -8,7 +8,7 @@ other boundaries Gamma, moves supports, and does not know other materials C behi
     u_i = g_i = -U_i where supports hold:
 
 no load on the contact itself, so that u_i is smooth there as long as other boundaries are away, and a coarse mesh is
-enough. How a correction moves another point of the contact follows from Betti's theorem on u_i and U_j, without values
+enough. The displacement of another point of the contact follows from Betti's theorem on u_i and U_j, without values
 at the contact: with K for the mesh without supports,
 
     F_j . u_i(y_j) = r_j . u_i + r_i . U_j - (K u_i - r_i) . g_j,
@@ -20,7 +20,7 @@ none, and what goes on beside it nearly in its plane bears them more and more up
 contact likewise, F_j . u(y_j) = f . (U_j + u_j).
 
 Points are Chebyshev's of the first kind over the contact grid, and polynomials through them take the correction in
-between: L C L^T for forces on the grid. How fast the coefficients of the polynomials fall tells whether they may.
+between: L C L^T for forces on the grid. The decay of the polynomials' coefficients shows whether they may.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class Correction:
         response: Displacement at each point along each direction, from unit forces at each (m, a, m, d), mm.
         fields: Displacement of this rank's own degrees of freedom from unit forces at each point along each direction
             (owned, m, a), mm: what loads do on them they do to the contact.
-        uneven: How much of the response was not symmetric, at most, mm/N, in the plane mm/(N/mm).
+        uneven: Largest asymmetry of the response, mm/N, in the plane mm/(N/mm).
         moments: Of the tractions that unit forces at the points leave on the body, about what guides hold (m, d, g): of
             the forces themselves, but for quadrature.
         guided: What the body answers to its guides, their rotations and what their couples move at the points

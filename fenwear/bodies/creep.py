@@ -127,7 +127,7 @@ class RetardedCycle:
 
     @cached_property
     def decays(self) -> Array:
-        """What is left of y after each phase, e (m, terms)."""
+        """Share of y that remains after each phase, e (m, terms)."""
         return np.asarray(np.exp(-self.durations[:, None] / self.of.times))
 
     @cached_property
@@ -143,7 +143,7 @@ class RetardedCycle:
 
     @cached_property
     def seen_decays(self) -> Array:
-        """What is left of the y at the start of a phase as its contact sees it (m, terms)."""
+        """Share of the y at the start of a phase that its contact sees (m, terms)."""
         seen = np.where(self.varies, 0.5, 1.0) * self.durations
         return np.asarray(np.exp(-seen[:, None] / self.of.times))
 
@@ -162,7 +162,7 @@ class RetardedCycle:
 
     @cached_property
     def left(self) -> Array:
-        """What each y at the start of a phase opens as its contact sees it (m, terms)."""
+        """Gap that each y at the start of a phase opens for its contact (m, terms)."""
         return self.of.compliances * self.seen_decays
 
     @cached_property
@@ -172,13 +172,13 @@ class RetardedCycle:
 
     @cached_property
     def _kept(self) -> Array:
-        """What is left of the y at the start of a cycle as the contact of each phase sees it (m, terms)."""
+        """Share of the y at the start of a cycle that the contact of each phase sees (m, terms)."""
         begins = np.cumsum(self.durations) - self.durations
         return np.asarray(np.exp(-begins[:, None] / self.of.times)) * self.seen_decays
 
     @cached_property
     def _given(self) -> Array:
-        """What each v_i has given to y as the contact of each phase sees it (phases, i, terms)."""
+        """Part of y from each v_i that the contact of each phase sees (phases, i, terms)."""
         ends, phases = np.cumsum(self.durations), np.arange(len(self.durations))
         since = (ends - self.durations)[:, None] - ends  # from the end of phase i to the begin of a phase
         later = np.exp(-np.maximum(since, 0.0)[:, :, None] / self.of.times)
@@ -195,7 +195,7 @@ class RetardedCycle:
 
     @cached_property
     def repeating(self) -> Array:
-        """What each v_i adds by creep after each phase of cycles that repeat, in the end (phases, i)."""
+        """Final creep from each v_i after each phase of cycles that repeat (phases, i)."""
         found = self._kept[:, None] * self.lasting + self._given
         return np.asarray(found @ self.of.compliances)
 

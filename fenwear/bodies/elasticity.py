@@ -39,11 +39,11 @@ BY_SIZE = Setup()
 
 @dataclass(frozen=True)
 class Reach:
-    """How far the grid of a contact surface may grow.
+    """Largest extent of the grid of a contact surface.
 
     Attributes:
         grid: The largest, of any spacing.
-        reading: What takes values at the trace nodes of the mesh to its nodes (n, N_mesh).
+        reading: Interpolation from the trace nodes of the mesh to its nodes (n, N_mesh).
     """
 
     grid: RegularGrid
@@ -69,14 +69,14 @@ class ElasticBody:
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
         acting: Sum of the loads' sizes, N: of a moment, whose resultant is none, too.
-        swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
+        swallowed: Part of it that acts where supports hold that component (d,), N: it reaches nothing else.
         operator: Name of how its contact surface answers to forces.
-        creep: How its compliance grows under load; None where it does not.
+        creep: Growth of its compliance under load; None where it does not.
         surface: The contact surface: the trace of the mesh, or a grid of its own (see `lay_grid`).
         meshed: The trace of the mesh.
         reading: Of a grid, what takes values at the trace nodes of the mesh to its nodes (N, N_mesh); else None.
-        reach: How far that grid may grow; None where it stays.
-        setup: How it is condensed.
+        reach: Largest extent of that grid; None where it stays.
+        setup: Way of its condensation.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class ElasticBody:
             law: Its material.
             degree: Of the displacement.
             thickness: Of a plane model, mm; 1 for whole rings and solids.
-            setup: How it is condensed; by default as its size says.
+            setup: Way of its condensation; by default as its size says.
 
         Raises:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
@@ -193,8 +193,8 @@ class ElasticBody:
 
         Args:
             surface: The grid.
-            reading: What takes values at the trace nodes of the mesh to it (N, N_mesh).
-            reach: How far it may grow, for which this is the reading, too; None where it stays.
+            reading: Interpolation from the trace nodes of the mesh (N, N_mesh).
+            reach: Its largest extent, which this reads, too; None where it stays.
             mortar: Makes the same by integrals, for a body that is condensed in the end, where its contact decides.
         """
         self.surface, self.reading, self.mortar = surface, reading, mortar
@@ -277,7 +277,7 @@ class ElasticBody:
 
     @property
     def guide_answer(self) -> GuideAnswer | None:
-        """What the body answers to its guides, solved for once; None without; collective at first use."""
+        """Response of the body to its guides, solved for once; None without; collective at first use."""
         if self.guides is None:
             return None
         if not self._answers:
@@ -310,7 +310,7 @@ class ElasticBody:
 
     @cached_property
     def boundary(self) -> Boundary:
-        """What this rank's cells share with others and with the contact surface; collective at first use."""
+        """Unknowns that this rank's cells share with others and with the contact surface; collective at first use."""
         return Boundary(self.space, self.surface_dofs)
 
     @property

@@ -211,7 +211,7 @@ def factored(
 
 
 class Solver(Protocol):
-    """What solves for right-hand sides of a matrix, on a rank of its own or on all: made and asked together."""
+    """Solver for right-hand sides of a matrix, on one rank or on all: made and asked together."""
 
     comm: MPI.Comm
     owner: int

@@ -6,7 +6,7 @@ The first is singular, exact, and the same everywhere: products go by fast Fouri
 any number of nodes. The second is what the body does otherwise (supports, sides, bottom, layers below, free rigid
 motions): smooth while the contact is away from other boundaries, so that a few tens of points and a mesh that is coarse
 at the contact give it (`correction`). Where it is not, the coefficients of its polynomials do not fall, and it is
-refused. Nothing of the set-up depends on the number of contact nodes.
+rejected. Nothing of the set-up depends on the number of contact nodes.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ class FineBody(GridOperator):
         grid: Where the correction is known: the contact's grid, or how far it may grow.
         correction: Between its points.
         weights: L, from values at the points to the nodes.
-        unresolved: What the correction's polynomials leave out, over the half-space's mean compliance over the grid.
+        unresolved: Rest that the correction's polynomials leave out, over the half-space's mean compliance over the
+            grid.
         loaded: Displacement of each point by the loads (m, d), mm.
     """
 

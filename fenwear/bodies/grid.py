@@ -75,7 +75,7 @@ class RegularGrid:
 
     @cached_property
     def weights(self) -> Array:
-        """What of the plane belongs to each node (n,), mm or mm²: half as much on the rim."""
+        """Part of the plane that belongs to each node (n,), mm or mm²: half as much on the rim."""
         whole = np.ones(1)
         for step, count in zip(self.spacing, self.counts, strict=True):
             own = np.full(count, step)
@@ -107,7 +107,7 @@ class RegularGrid:
         """Return a grid of every so manieth node of this one, in its middle as far as there is one.
 
         Args:
-            every: How many times as far apart nodes are.
+            every: Ratio of the node spacings.
             less: Spacings that it ends before this one at each end.
         """
         left = [(count - 1) % every // 2 + less * every for count in self.counts]
@@ -137,7 +137,7 @@ class RegularGrid:
     def sharing(self, other: RegularGrid) -> csr_array:
         """Return what puts forces at another grid's nodes on those here (n, n_other), their sum and moment kept.
 
-        What lies beyond this grid comes to its rim, without its moment.
+        Forces beyond this grid move to its rim, without their moment.
         """
         points = [
             np.clip((low + step * np.arange(count) - first) / own, 0, last - 1)

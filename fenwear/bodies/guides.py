@@ -7,9 +7,9 @@ With the rotation R that a guide takes, and the couple B that it holds it by,
     K u = f - B y,    B^T u = 0,    y = R^T f,    R^T B = 1.
 
 B is spread over the whole body as its inertia against turning would be, so that it dents nothing: M A (A^T M A)^-1 e,
-M the mass of unit density, A all rigid motions and e the rotation about the guide's axis. It has no resultant. What is
-held is the mean rotation that such forces work on: what couples do and what they hold agree (Maxwell and Betti).
-With K^-1 of supports that take the same rotation up at a few nodes, which y leaves unloaded,
+M the mass of unit density, A all rigid motions and e the rotation about the guide's axis. It has no resultant. Guides
+hold the mean rotation that such forces work on: what couples do and what they hold agree (Maxwell and Betti). With K^-1
+of supports that take the same rotation up at a few nodes, which y leaves unloaded,
 
     u = K^-1 f - (K^-1 B) y - R (x - Z y),    x = (K^-1 B)^T f,    Z = B^T K^-1 B:
 
@@ -68,7 +68,7 @@ class Guides:
 
 @dataclass(frozen=True)
 class GuideAnswer:
-    """What a body answers to its guides.
+    """Response of a body to its guides.
 
     Attributes:
         guides: Of the body.
@@ -99,9 +99,9 @@ def make_guides(space: fem.FunctionSpace, weight: Any, loaded: ufl.Measure | Non
 
     Args:
         space: Of the displacement.
-        weight: What one unit of the mesh's volume stands for.
+        weight: Volume of a unit of the mesh's volume.
         loaded: The surfaces on which loads act; None without loads.
-        parts: What supports leave of each part.
+        parts: Motions of each part that supports leave free.
     """
     comm, rotations, couples = space.mesh.comm, list[Array](), list[Array]()
     volume = ufl.dx(domain=space.mesh)

@@ -1,7 +1,7 @@
 """A body that is large against its contact, as an elastic half-space, in the plane a half-plane; without a mesh.
 
-Each node of a regular grid has a rectangle, in the plane a strip, over which its force is spread evenly. What that
-displaces is known in closed form, and depends on the distance of two nodes alone: products go by fast Fourier
+Each node of a regular grid has a rectangle, in the plane a strip, over which its force is spread evenly. Its
+displacements are known in closed form, and depend on the distance of two nodes alone: products go by fast Fourier
 transforms, numbers are looked up. With r the distance, q the tractions, u_z into the body, G and nu of the material,
 
     2 pi G u = ((1 - nu) / r + nu x x / r^3) q,    (1 - nu) / r q_z,    -+ (1/2 - nu) x / r^2 between both
@@ -15,7 +15,7 @@ transforms, numbers are looked up. With r the distance, q the tractions, u_z int
 
 It leaves out all of the body that is not near the contact: supports and other boundaries, the curvature of the surface,
 and what loads displace. That is of the order of the contact's width over the distance of the next boundary, and over
-the radius. What the finite body does otherwise is smooth at the contact: another operator could add it.
+the radius. The difference of the finite body is smooth at the contact: another operator could add it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What takes long to compute, kept on disk under a key of all that it follows from, for the next start.
+"""Results that take long to compute, kept on disk for the next start under a key of all their inputs.
 
 Files are written under another name and then renamed, so that no other process sees a part of one. A file that cannot
 be read is computed again. A file that cannot be written is mentioned once: it saves time and decides nothing.
@@ -90,7 +90,7 @@ def known(comm: MPI.Comm, parts: Callable[[], Iterable[object]], *, fresh: bool 
 
     Args:
         comm: The ranks.
-        parts: Returns all of this rank that it follows from: arrays, or what has a text that tells all of it.
+        parts: Returns all of this rank that it follows from: arrays, or objects whose text is complete.
         fresh: Whether to take nothing that is kept.
 
     Raises:
@@ -120,7 +120,7 @@ class Kept:
     Attributes:
         comm: The ranks.
         path: Of the file; None where nothing is kept.
-        arrays: What is kept there; None unless every rank has its own.
+        arrays: The kept results; None unless every rank has its own.
     """
 
     comm: MPI.Comm

@@ -54,10 +54,10 @@ def stress(eps: Any, lmbda: Any, mu: Any) -> Any:
 
 
 class ElasticLaw(Protocol):
-    """How a body answers to a displacement and to a temperature, linear in both, in UFL.
+    """The response of a body to a displacement and to a temperature, linear in both, in UFL.
 
     Attributes:
-        kind: The model that it belongs to: it tells the strain, the rigid modes and what volumes stand for.
+        kind: The model that it belongs to: it gives the strain, the rigid modes and the measure of volumes.
     """
 
     @property

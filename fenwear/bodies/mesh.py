@@ -233,7 +233,7 @@ def write_msh(
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
 
     Args:
-        geometry: What to mesh.
+        geometry: The geometry to mesh.
         folder: Of the case file.
         path: The .msh file.
         kind: Of the model; None for the one that the file's elements or shapes are of.
@@ -483,7 +483,7 @@ def _parameters(geometry: Geometry, path: Path, known: Mapping[str, float]) -> d
 
 
 def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
-    """Return the parameters that the .geo file defines by DefineConstant, and refuse others."""
+    """Return the parameters that the .geo file defines by DefineConstant, and reject others."""
     if path.suffix != ".geo":
         return []
     known = sorted(constants(path))

@@ -1,4 +1,4 @@
-"""How surfaces of bodies answer to forces: operators.
+"""The response of bodies' surfaces to forces: operators.
 
 An operator takes forces on the nodes of a contact surface to displacements of the same nodes. It is asked for products,
 for some of its numbers and for its diagonal, never for an array made in advance: what stands behind it, numbers in
@@ -27,7 +27,7 @@ from fenwear.errors import CaseError, InputError
 
 
 class SurfaceOperator(Protocol):
-    """What forces on q patterns of a contact surface do to them, per thickness.
+    """Displacements of q patterns of a contact surface by forces on them, per thickness.
 
     Displacements are those along a directions of each pattern: along all d axes, or along one alone, the normal of the
     contact, where no other is ever asked for.
@@ -163,7 +163,7 @@ def _decided(request: Request) -> SurfaceOperator | None:
     """Return how a body on a grid answers as the fine one, where it may; else let it be condensed; collective.
 
     Raises:
-        CaseError: it is none, and its grid grows, which no condensed body goes with.
+        CaseError: it is none, and its grid grows, which no condensed body supports.
     """
     elastic, key = request.elastic, f"{request.elastic.body.name}.operator"
     try:

@@ -61,7 +61,7 @@ def part_boxes(mesh: Mesh, part: NDArray[np.int64], count: int) -> Array:
     Args:
         mesh: The mesh.
         part: Number of the part of each cell (cells,).
-        count: How many parts there are.
+        count: Number of parts.
     """
     boxes = np.tile(np.array([[np.inf] * 3, [-np.inf] * 3]), (count, 1, 1))
     corners = mesh.geometry.x[geometry_dofmap(mesh)[: len(part)]]

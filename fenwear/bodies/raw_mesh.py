@@ -1,6 +1,6 @@
 """The mesh of one body as gmsh has made it, in arrays: kept on disk, and read by dolfinx as a model of gmsh is read.
 
-What a mesh must be is checked before it is distributed: later, bad elements end in crashes or in wrong numbers.
+A mesh is checked before it is distributed: later, bad elements end in crashes or in wrong numbers.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class GmshView:
 
     @property
     def mesh(self) -> GmshView:
-        """What gmsh has under this name."""
+        """The group of gmsh with this name."""
         return self
 
     def getPhysicalGroups(self, dim: int = -1) -> list[tuple[int, int]]:  # noqa: N802

@@ -1,4 +1,4 @@
-"""How the contact surfaces of bodies answer to forces on them, each body solved on ranks of its own.
+"""The response of bodies' contact surfaces to forces on them, each body solved on ranks of its own.
 
 Where the surface is small against the body, the Schur complement S of its degrees of freedom has all of
 the answer, (K^-1)_ss = S^-1. Else each column of forces is solved for: sparse right-hand sides, of which
@@ -28,7 +28,7 @@ SURFACE_SHARE = 10  # entries of the factor for each of the Schur complement, fr
 
 @dataclass(frozen=True)
 class Request:
-    """What a body is to be condensed onto.
+    """Unknowns that a body is condensed onto.
 
     Attributes:
         elastic: The body.

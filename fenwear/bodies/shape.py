@@ -85,7 +85,7 @@ def follow_wear(movable: MovableSurface, depth: Array, into: Array, held: Sequen
         held: Points that keep their place, such as pins, mm.
 
     Returns:
-        How far the pressure nodes have moved along `into` (n,), mm: the depth as far as the geometry's
+        Displacements of the pressure nodes along `into` (n,), mm: the depth as far as the geometry's
         polynomials reach, which may be of a lower degree.
 
     Raises:

@@ -34,7 +34,7 @@ class Boundary:
         present: Which local blocks of degrees of freedom the cells have (n,).
         numbers: Global numbers of the boundary's degrees of freedom, ascending (b,).
         local: The same by their local numbers.
-        size: How many all ranks have together; infinite where a rank has nothing else.
+        size: Number on all ranks together; infinite where a rank has nothing else.
     """
 
     def __init__(self, space: fem.FunctionSpace, surface: Numbers) -> None:

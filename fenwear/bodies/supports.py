@@ -1,4 +1,4 @@
-"""How a body is held: the components that its supports take, and the rigid modes that they leave."""
+"""Supports of a body: the components that its supports take, and the rigid modes that they leave."""
 
 from __future__ import annotations
 

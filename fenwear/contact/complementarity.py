@@ -1,4 +1,4 @@
-"""How far a contact is from Signorini's conditions p >= 0, gap >= 0, p gap = 0, whatever its solver says of itself.
+"""Distance of a contact from Signorini's conditions p >= 0, gap >= 0, p gap = 0, measured apart from its solver.
 
 Balances of force, volume and energy hold where these do not: a body pressed into the other one carries its load, too.
 The error of a node is abs(min(p / P, gap / G)), which is zero where all three conditions hold and nowhere else; the

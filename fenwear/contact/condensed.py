@@ -7,7 +7,7 @@ For every phase of the motion (a sliding direction d) and every contact node:
 
 tau the traction of friction over the pressure, g the gap of the unloaded bodies with their
 loads' effect and the worn depth. A `WearCompliance` adds to the gaps of all phases what their own pressures
-open, such as the wear of the step they belong to, and to those of each phase what gives way under its own.
+open, such as the wear of the step they belong to, and to those of each phase its compliance under its own.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class ContactState:
 
 @dataclass(frozen=True)
 class SlidingContact:
-    """What slides in one phase.
+    """Sliding in one phase.
 
     Attributes:
         interface: The surfaces opposite each other, under the loads of the phase.
@@ -73,7 +73,7 @@ class SlidingContact:
 
 
 class WearCompliance(Protocol):
-    """What the phases' own pressures add to every phase's gap."""
+    """Addition of the phases' own pressures to every phase's gap."""
 
     def opening(self, pressure: Array) -> Array:
         """Return the added gap (m, n), mm, from the pressures (m, n)."""
@@ -92,7 +92,7 @@ class WearCompliance(Protocol):
 
     @property
     def curved(self) -> bool:
-        """Whether something gives way by a law that is not linear."""
+        """Whether a layer has a compliance that is not linear."""
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
@@ -121,7 +121,7 @@ class CondensedContact:
     """The inequality on the condensed interface, with unknown (p, a) for each phase.
 
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
-    PETSc's absolute tolerances mean the same for every case. Phases meet in what wears in the step only: where
+    PETSc's absolute tolerances mean the same for every case. Phases meet in the wear of the step only: where
     there are many, one small elimination for each of them takes the place of one of all. Where both bodies are
     convolutions on a grid no matrix is made. On several ranks rank 0 solves it.
 
@@ -188,7 +188,7 @@ class CondensedContact:
     def _take(self, phases: Iterable[int]) -> None:
         """Take the friction of phases: their rigid motions, balances, and compliances on a grid.
 
-        On a grid products are of one friction: that of the first mean. What differs from it is found by iterations.
+        On a grid products are of one friction: that of the first mean. The difference from it is found by iterations.
         """
         for k in phases:
             interface, ratio = self.phases[k].interface, self._ratios[k]
@@ -250,7 +250,7 @@ class CondensedContact:
 
         Args:
             mu: By the pressure (n,), MPa.
-            bare: What of tau is there without mu (n, d).
+            bare: Part of tau without mu (n, d).
             along: Tau of a unit of mu (n, d).
         """
         n = self.shape[1]
@@ -301,7 +301,7 @@ class CondensedContact:
 
     @property
     def _linear(self) -> Operator:
-        """The derivative of the residual without what wears in the step."""
+        """The derivative of the residual without the wear of the step."""
         if self._elastic is None:
             if self.gridded and self._coupling is None:
                 elastic: Operator = GriddedPhases(self._grid)
@@ -351,7 +351,7 @@ class CondensedContact:
         return self._operator
 
     def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
-        """Return the derivative with what wears at a pressure (m, n), on a grid."""
+        """Return the derivative with the wear at a pressure (m, n), on a grid."""
         assert self._wearing is not None
         parts = *self._wearing.by_body(pressure), self._wearing.layer(pressure)
         slopes = Opened(*(0.0 if one is None else scale * one for one in parts))
@@ -379,7 +379,7 @@ class CondensedContact:
         Args:
             gap: Gap of the undeformed bodies, initial gap and worn depth together, (n,) or (m, n), mm.
             start: Where Newton starts, such as the same phases one cycle ago; by default full contact.
-            wearing: What the step wears: adds what the pressures themselves open.
+            wearing: The wear of the step: adds what the pressures themselves open.
             coupling: Gap of each phase's nodes from each phase's pressures (m, n, m, n), mm/MPa, on
                 top of the elastic compliance: what the heat of these pressures opens.
 

@@ -4,7 +4,7 @@ The pressures p_k of m phases open by a wave of wave number q
 
     g_k = s p_k + sum over j of (a_j + t_k b_j conj(t_j)) p_j,
 
-with s the symbol of the bodies' compliance and of what gives way in each phase, a_j what is worn at the punch's nodes
+with s the symbol of the compliance of bodies and layers in each phase, a_j what is worn at the punch's nodes
 by unit pressures, b_j what is worn off the strip's material, and t_k the symbol that takes values on the strip where it
 is in phase k to the punch's nodes. For every wave that is s times the identity and two products more,
 
@@ -39,7 +39,7 @@ MARGIN = 1.0  # of a box: the period of what is solved, which does not end
 
 @dataclass(frozen=True)
 class Passing:
-    """How a node of the punch reads depths on the strip where it is, and how what wears below it is put there.
+    """Weights by which a node of the punch reads depths of the strip, and puts the wear below it there.
 
     Attributes:
         read: Numbers that the values are taken by (k,).
@@ -169,7 +169,7 @@ class Patch:
     """The inverse on an endless grid, restricted to the nodes in contact, with rigid motions.
 
     Args:
-        endless: The grid, with what wears on it.
+        endless: The grid, with its wear.
         modes: H (m, r, ...) in the box, zero where no node is in contact and where a motion is not asked for.
         balance: E (m, r, ...), likewise; a number that it is times H.
 

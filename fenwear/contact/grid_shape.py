@@ -34,10 +34,10 @@ RESTART, RESTARTS = 60, 10
 
 @dataclass(frozen=True)
 class GridShape(ShapeRows):
-    """What contact and equilibrium give, linear in the unknowns and scaled.
+    """Residual of contact and equilibrium, linear in the unknowns and scaled.
 
     Attributes:
-        grid: What multiplies with S_k of all phases.
+        grid: Product with S_k of all phases.
         modes: H (n, r), the gap that each rigid mode opens.
         balances: E_k (m, r, n), what each node's pressure puts on each mode.
     """
@@ -100,7 +100,7 @@ class WornGrid:
 
 
 class _Near:
-    """What is near the inverse of the rows and columns of some unknowns.
+    """Approximate inverse of the rows and columns of some unknowns.
 
     Args:
         of: The derivative.

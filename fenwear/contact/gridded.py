@@ -38,7 +38,7 @@ SLIGHT = 1e-2  # of pressures: what brings them into balance
 
 
 class Opened(NamedTuple):
-    """What unit pressures open besides the bodies, over the phases' nodes (m, n); 0 for nothing.
+    """Gap that unit pressures open besides the bodies, over the phases' nodes (m, n); 0 for nothing.
 
     Attributes:
         common: At their own nodes of the punch, in every phase.
@@ -81,7 +81,7 @@ class PhasesGrid:
 
     @cached_property
     def passing(self) -> list[Passing]:
-        """How the node in the middle reads the strip, and what wears below it is put there, in each phase."""
+        """Weights by which the node in the middle reads the strip, and puts the wear below it there, in each phase."""
         middle = int(np.abs(self.places - np.array(self.shape) / 2).sum(axis=1).argmin())
         punch, strip = self.pairs[0].punch, self.pairs[0].strip
         far = int(np.abs(self.places - self.places[middle]).sum(axis=1).argmax())
@@ -101,7 +101,7 @@ class PhasesBox:
     """Products of all phases on a box of the grid.
 
     Args:
-        grid: What they are of.
+        grid: Their system.
         box: The box.
     """
 
@@ -135,7 +135,7 @@ class PhasesBox:
 
     @cached_property
     def _strip(self) -> tuple[csr_array, csr_array]:
-        """What all phases put on the strip, and what all read there, over the places of the box."""
+        """Sums of all phases' weights, to put on the strip and to read there, over the places of the box."""
         box, pairs = self.box, self.grid.pairs
         nodes, size = len(box.nodes), int(np.prod(box.counts))
         there = csr_array((np.ones(nodes), (np.arange(nodes), box.at)), shape=(nodes, size))
@@ -161,7 +161,7 @@ class GriddedPhases:
 
     Args:
         grid: The phases.
-        opened: What unit pressures open besides the bodies; by default nothing.
+        opened: Gap that unit pressures open besides the bodies; by default nothing.
     """
 
     def __init__(self, grid: PhasesGrid, opened: Opened = NOTHING) -> None:
@@ -208,13 +208,13 @@ class GriddedPhases:
     def improved(self, x: Array, f: Array, enough: float, below: float) -> Array:
         """Return a solution of the inequality, better by some digits, from one with pressures >= 0.
 
-        The change is looked for on a box around what touches: f is what changes are worth there.
+        The change is solved for on a box around the contact: f is what changes are worth there.
 
         Args:
             x: Unknowns.
             f: Their residual.
             enough: The norm of it that need not be less.
-            below: How far below zero gaps may be.
+            below: Largest negative gap that is allowed.
 
         Raises:
             LinAlgError: nothing touches, or the loads are not balanced by what does.
@@ -255,7 +255,7 @@ class _Change:
 
     Args:
         on: The box.
-        slopes: What opens besides in it.
+        slopes: Gap that opens besides in it.
         before: Pressures (m, ...).
         gaps: Of them (m, ...).
         forces: That are not balanced (m, r).
@@ -266,7 +266,7 @@ class _Change:
         self.before, self.gaps, self.forces = before, gaps, forces
 
     def solve(self, enough: float, below: float) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return the changes of pressures (m, ...) and motions (m, r), and what touches, sets of nodes in turn."""
+        """Return the changes of pressures (m, ...) and motions (m, r), and the sets of nodes in contact in turn."""
         least = -self.before
         p, a = np.zeros_like(self.before), np.zeros_like(self.forces)
         gaps, forces = self.gaps, self.forces
@@ -300,13 +300,13 @@ class _Closed:
 
     Args:
         on: The box.
-        slopes: What opens besides in it.
+        slopes: Gap that opens besides in it.
         closed: Whether a node touches in each phase (m, ...).
         rigid: Whether a motion is free (m, r).
         before: Of another set of nodes: what opens besides is taken from there.
 
     Raises:
-        LinAlgError: the loads are not balanced by what touches.
+        LinAlgError: the nodes in contact do not balance the loads.
     """
 
     def __init__(

@@ -46,7 +46,7 @@ class Factor:
     """The factor of the free rows and columns of an operator.
 
     Attributes:
-        operator: What is factored.
+        operator: The matrix that is factored.
         key: Which of all are free, as bytes.
         free: Their numbers; a slice where all are free.
         solve: The solution operator.
@@ -94,7 +94,7 @@ class Inequality:
         residual: Returns F(x) (size,).
         jacobian: Returns dF/dx as an operator; the same object as before where it has not changed.
         prefix: Of the PETSc options.
-        name: What is solved, for error messages.
+        name: Name of the problem, for error messages.
         rounding: Returns how large the parts are that the residual adds up, which leave that much rounding; asked for
             where Newton's method has not come to `TOLERANCE` at once.
 

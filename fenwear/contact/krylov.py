@@ -45,8 +45,8 @@ def flexible(
         precondition: That with a matrix near its inverse.
         b: Right-hand side (size,).
         accuracy: Residual over the right-hand side that ends it.
-        restart: Iterations after which it begins anew.
-        restarts: How often.
+        restart: Iterations after which it restarts.
+        restarts: Number of restarts.
         kept: One where products are those of the system, else zero; directions are zero there.
 
     Returns:

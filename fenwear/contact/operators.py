@@ -51,7 +51,7 @@ class Approximate(Protocol):
             x: Unknowns within their bounds.
             f: Their residual.
             enough: The norm of it that need not be less.
-            below: How far below zero it may be at the bounds.
+            below: Largest negative value that is allowed at the bounds.
 
         Raises:
             LinAlgError: there are none.
@@ -81,7 +81,7 @@ class Updating:
         entries: Returns the numbers of some rows and columns.
 
     Attributes:
-        base: What was eliminated last.
+        base: The last elimination.
     """
 
     def __init__(self, entries: Callable[[Indices, Indices], Array]) -> None:
@@ -183,7 +183,7 @@ def eliminate(matrix: Array) -> Solve:
 def _equilibrated(matrix: Array) -> Solve:
     """Return the same by a matrix whose rows and columns are scaled to 1.
 
-    Where steps wear far more than bodies give way, as rigid ones do, a pivot of the balance of forces is small against
+    Where steps wear far more than bodies deform, as with rigid ones, a pivot of the balance of forces is small against
     the wear of a node, and no rounding.
     """
     row = 1 / np.maximum(np.abs(matrix).max(axis=1), TINY)

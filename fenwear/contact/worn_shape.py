@@ -39,7 +39,7 @@ def worn_by(wear: Sequence[csr_array], pressure: Array) -> Array:
 
 
 class ShapeRows(ABC):
-    """The rows of all unknowns, without what wears.
+    """The rows of all unknowns, without wear.
 
     Attributes:
         modes: H (n, r), the gap that each rigid mode opens.
@@ -57,7 +57,7 @@ class ShapeRows(ABC):
 
     @property
     def size(self) -> int:
-        """How many unknowns there are."""
+        """Number of unknowns."""
         m, n, r = self.shape
         return (m + 1) * n + m * r
 
@@ -90,7 +90,7 @@ class ShapeRows(ABC):
 
 @dataclass(frozen=True)
 class ShapeEquations(ShapeRows):
-    """What contact and equilibrium give, linear in the unknowns and scaled.
+    """Residual of contact and equilibrium, linear in the unknowns and scaled.
 
     Attributes:
         compliances: S_k of each phase (n, n); phases may share one array.
@@ -233,10 +233,10 @@ class ByShape:
 
 
 class _Reduced:
-    """What is left for GMRES once pressures and rigid modes are eliminated: the thermal gaps, the shape, lambda.
+    """The rest for GMRES once pressures and rigid modes are eliminated: the thermal gaps, the shape, lambda.
 
     Args:
-        derivative: What is solved.
+        derivative: The problem that is solved.
         touching: The pressures that are free (m, n).
         shaped: The shapes that are free (n,).
 

@@ -5,9 +5,9 @@ Forces f on the punch's nodes, and their reactions on the strip, move the punch'
     j_i = sum over k of G_ik f_k,    G = G_punch + R^T (X G_strip X^T) R,
 
 with the transfer X of a strip that passes under the punch and the turn R of its place; a layer between them that closes
-in proportion to its pressure adds its closure along e_n to the node's own entry. What is asked for are components
-of j: along e_n alone in gross sliding, along e_n and the tangents where nodes stick. A square matrix comes of it by the
-tractions that go with the unknowns: a pressure with its friction, or one along each axis of the contact frame.
+in proportion to its pressure adds its closure along e_n to the node's own entry. Components of j are computed: along
+e_n alone in gross sliding, along e_n and the tangents where nodes stick. A square matrix comes of it by the tractions
+of the unknowns: a pressure with its friction, or one along each axis of the contact frame.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ SOME = 64  # nodes whose rows tell the scale of gaps where no numbers are in mem
 class Interface:
     """Two bodies in contact, an operator from nodal forces to the relative displacement of their surfaces.
 
-    In gross sliding gap = S(tau) p + H a + g_load + g_0 + w. What bodies answer by numbers is made when it is first
-    asked for, and kept; others are asked each time.
+    In gross sliding gap = S(tau) p + H a + g_load + g_0 + w. Arrays of the bodies' compliance are made at their first
+    use, and kept; others are asked each time.
 
     Attributes:
         rigid: H, F, the nodes and the transfer.
-        punch: How it answers at its pressure nodes.
+        punch: Its response at its pressure nodes.
         strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.

@@ -1,7 +1,6 @@
 """The compliance of two bodies on one grid: the convolutions of both, areas of nodes, and what lies between.
 
-Where both answer on the nodes of the same regular grid, and the tractions that go with the unknowns are the same
-everywhere,
+Where both answer on the nodes of the same regular grid, and the tractions of the unknowns are equal everywhere,
 
     S x = C w x + c x_0,
 
@@ -137,7 +136,7 @@ class Box:
 
     @property
     def size(self) -> int:
-        """How many places there are."""
+        """Number of places."""
         return int(np.prod(self.counts))
 
     def holds(self, places: NDArray[np.int64]) -> bool:
@@ -169,7 +168,7 @@ def _padded(count: int) -> int:
 
 
 class Boxes(Generic[T]):
-    """What is made of boxes of a grid; the last one is kept as long as it is not much too large.
+    """Parts of boxes of a grid; the last one is kept as long as it is not much too large.
 
     Args:
         places: Of the nodes (n, axes).
@@ -230,7 +229,7 @@ class OnBox:
 
 
 class _Smooth:
-    """What one body does besides in several phases, on a box."""
+    """Additional response of one body in several phases, on a box."""
 
     def __init__(self, parts: Sequence[Smooth]) -> None:
         m = len(parts)
@@ -280,7 +279,7 @@ class FrameBox(OnBox):
 
     @cached_property
     def _inverses(self) -> list[Kernel]:
-        """The waves of the inverse, and where tangents give way besides by each of `STIFF`."""
+        """The waves of the inverse, and of those with the additional compliance of each of `STIFF`."""
         found = []
         for stiff in (0.0, *STIFF):
             symbol, tangents = self._endless[1].copy(), range(1, self.d)
@@ -294,7 +293,7 @@ class FrameBox(OnBox):
         Each wave by itself; restricted to nodes in contact, near what these have.
 
         Args:
-            fields: Where nothing gives way besides (d, ...).
+            fields: Without additional compliance (d, ...).
             stiff: Where tangents do, by each of `STIFF` (k, d, ...).
         """
         parts = [(waves, part[None]) for waves, part in zip(self._inverses, (fields, *stiff), strict=True)]
@@ -311,7 +310,7 @@ def on_one_grid(
         axes: That displacements are asked for along (n, a, d).
         traction: On the punch by units of the unknowns (n, d, b), and as much on the strip.
         weights: Areas of the nodes (n,).
-        local: What a layer between them closes by unit pressures (n,), scaled as the tractions are.
+        local: Closure of a layer between them by unit pressures (n,), scaled as the tractions are.
         known: Tables that were made, by the traction: they are the same in every place.
     """
     operators = [body.convolution for body in bodies if isinstance(body, GridOperator)]

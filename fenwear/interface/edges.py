@@ -1,4 +1,4 @@
-"""How far nodes of a contact are from its edge: where the surfaces part, or the punch's surface ends.
+"""Distance of a contact's nodes from its edge: where the surfaces part, or the punch's surface ends.
 
 Between a node that touches and one that does not the edge is half-way. Distances are straight lines, no longer than the
 surface is wide.
@@ -47,7 +47,7 @@ class Edges:
         return np.asarray(cKDTree(rim).query(self._x)[0])
 
     def distance(self, touching: Mask) -> Array:
-        """Return the distance of nodes from the edge (n,), mm, where these nodes touch; 0 where they do not."""
+        """Return the nodes' distance from the edge (n,), mm, where these nodes touch; 0 where they do not."""
         key = touching.tobytes()
         if key not in self._known:
             if len(self._known) == KEPT:

@@ -20,7 +20,7 @@ def is_translation(mode: str) -> bool:
 
 @dataclass(frozen=True)
 class RigidEquilibrium:
-    """What the equilibrium of the rigid modes needs of the interface; no elasticity in it.
+    """Data of the interface for the equilibrium of the rigid modes; no elasticity in it.
 
     sum of w_i p_i (e_n + tau)_i . m_i + F = 0 for each mode's relative motion m of the surfaces, per
     thickness in the plane; tau is the traction of friction on the punch over the pressure.
@@ -30,7 +30,7 @@ class RigidEquilibrium:
         motion: m (n, d, modes), the motion of the punch's surface against the strip's by each rigid mode.
         resultant: F = R^T f of the loads (modes,), N/mm and N; in a solid N and N mm.
         mode_names: Names of the rigid modes, lambda_F and lambda_M for a tilting punch; lambda_Fx along x.
-        of_punch: How many of them are the punch's; they come first.
+        of_punch: Number of the punch's; they come first.
     """
 
     pair: ContactPair
@@ -88,7 +88,7 @@ class RigidEquilibrium:
 
     @property
     def approach(self) -> Array | None:
-        """How the loads' translation of each part moves its nodes against the other body (n, d); None without.
+        """Motion of each part's nodes against the other body by the loads' translation (n, d); None without.
 
         Of each part against the resultant of the loads on it along its translations.
         """

@@ -31,7 +31,7 @@ def common_normal(punch: ContactSurface, strip: Array) -> Array:
 def contact_frame(normal: Array) -> Array:
     """Return e_n and the tangents of each node (n, d, d), by rows, for e_n (n, d).
 
-    The first tangent lies along x as far as it can; in the plane it goes on around curves, in a solid it lies along y
+    The first tangent lies along x as far as it can; in the plane it continues around curves, in a solid it lies along y
     where the normal is nearly that of x.
     """
     if normal.shape[1] == 2:

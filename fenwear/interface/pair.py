@@ -3,8 +3,8 @@
 Pressure and gap live at the punch's pressure nodes. With the weights w_i the force of a node is w_i p_i,
 so that each node is one complementarity pair. The contact frame has its normal e_n into the punch, on
 the strip's surface opposite each node as the strip lies there, along which it slides; where the surfaces
-stick it is half-way between the normals of both (`frame`). What acts on one body acts on the other the
-other way, on curved surfaces and in every place.
+stick it is half-way between the normals of both (`frame`). A traction on one body acts on the other the opposite way,
+on curved surfaces and in every place.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class ContactPair:
     def opposite(self) -> Array:
         """Where the strip's surface is opposite each node, before any deformation and wear (n, d), mm.
 
-        What the strip's material slides there is what slides: a flat block's ends are farther from a ring's axis
+        Sliding of the strip's material there: a flat block's ends are farther from a ring's axis
         than the ring is.
         """
         return self.punch.x - self.initial_gap[:, None] * self.normal

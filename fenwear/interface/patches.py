@@ -3,8 +3,8 @@
 A flat or gently curved contact is one patch, seen along the axis that it looks along. A full bore is four, a cup five:
 seen from the axis of the bore or the middle of the cup through the sides of a square or cube around it, so that points
 of both surfaces that lie behind each other along the normal do so in every patch. Both faces of a disc between pads are
-two, seen along the axis. Straight edges stay straight both ways. What is integrated over facets is added up over the
-patches; a node where two of them meet has a part in each.
+two, seen along the axis. Straight edges stay straight both ways. Integrals over facets are added up over the patches; a
+node where two of them meet has a part in each.
 """
 
 from __future__ import annotations

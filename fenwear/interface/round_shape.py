@@ -29,7 +29,7 @@ from fenwear.interface.transfer import dual_means
 
 @dataclass(frozen=True)
 class RoundShape:
-    """What round surfaces are besides their facets, at the punch's pressure nodes; zero where the strip is not round.
+    """Depth of round surfaces below their facets, at the punch's pressure nodes; zero where the strip is not round.
 
     Attributes:
         turned: To be added to the normal of the facets (n, d).

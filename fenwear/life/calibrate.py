@@ -1,4 +1,4 @@
-"""Calibration: keys of a case from measurements, by least squares, with what the data cannot tell, and their scatter.
+"""Calibration: keys of a case from measurements, by least squares, with the limits of the data, and their scatter.
 
 Minimised is chi^2 = sum ((prediction - value) / sigma)^2 over the unknown keys and, for every profile, the
 offset and tilt of the trace where they are asked for. The covariance is (J^T J)^-1, J the Jacobian
@@ -69,7 +69,7 @@ class Trace:
 
     Attributes:
         name: Of the data set.
-        series: What was measured.
+        series: Measured values.
         predicted: By the model, with offset and tilt of the trace (k,).
         offset, tilt: Of the trace: mm, and mm/mm about its middle; NaN where they were not asked for.
     """
@@ -97,8 +97,8 @@ class Calibration:
         traces: Every series with its prediction.
         noise: Standard deviation of a measurement over its sigma, or where none was given in internal units.
         degrees_of_freedom: Measurements less unknowns.
-        not_known: What the data cannot tell, in sentences.
-        remarks: What else is to be said.
+        not_known: Limits of the data, in sentences.
+        remarks: Further remarks.
         at_bound: Keys whose value is at a bound.
         evaluations: Runs computed.
         jacobian: Of the weighted residuals by the fitted unknowns and baselines (n, m + baselines).
@@ -199,7 +199,7 @@ def calibrate(
 
     Args:
         case: The problem; its values of the unknowns are where the fit starts.
-        data: What was measured.
+        data: Measured values.
         unknowns: Keys, with or without bounds.
         baseline: "offset" and "tilt" of each profile's trace, to be found too.
         progress: Gets the stage, and the number of runs with their residual.
@@ -268,7 +268,7 @@ def _calibrated(problem: LeastSquares, progress: Log) -> Calibration:
 def _begin(problem: LeastSquares, z: Array) -> bool:
     """Run the model where a round of the fit begins, and return whether it jumps otherwise than in the round before.
 
-    What fails there is told with the values.
+    Errors there name the values.
     """
     try:
         return problem.keep_jumps(z)
@@ -281,7 +281,7 @@ def _begin(problem: LeastSquares, z: Array) -> bool:
 
 
 def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
-    """Return the result in the unknowns' own units, with what the data cannot tell."""
+    """Return the result in the unknowns' own units, with the limits of the data."""
     m, n = len(problem.unknowns), len(problem.observed)
     z, lines, weighted = result.x[:m], result.x[m:], np.asarray(result.jac)
     free = np.array([not _at_bound(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
@@ -319,7 +319,7 @@ def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
 
 
 def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask, errors: Array) -> list[str]:
-    """Return what the data cannot tell of their scatter, where their files do not say of which kind it is."""
+    """Return a remark where the files do not state the kind of scatter, and the data do not show it."""
     remarks: list[str] = []
     added, m, begin = [], len(free), 0
     both = np.column_stack([result.jac, result.fun])

@@ -127,7 +127,7 @@ def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
 
 
 def _counter(log: Log, what: str) -> Callable[[int, int], None]:
-    """Return what tells of progress: first, last, and now and then."""
+    """Return the report of progress: first, last, and now and then."""
     seldom = now_and_then(log)
     return lambda done, total: (log if done == total else seldom)(f"{what} {done:,} of {total:,}")
 

@@ -15,7 +15,7 @@ depth, scar_width, friction or temperature; sigma belongs to the measured column
 with a column after. Measurements scatter in one of three ways:
 
     independent      each row has an error of its own, with the standard deviation sigma;
-    adds up          a specimen is weighed and goes on: the increments since the row before are independent. sigma is
+    adds up          a specimen is weighed and runs again: the increments since the row before are independent. sigma is
                      that of an increment; without it their variance grows with the sliding between the rows;
     alike over l     the roughness of a profile: neighbours have the correlation exp(-|x - x'| / l).
 
@@ -49,7 +49,7 @@ FEW, SMOOTH = 20, 1.5  # rows that say little of their scatter; von Neumann's ra
 
 @dataclass(frozen=True)
 class Noise:
-    """How the errors of a series depend on each other.
+    """Dependence of the errors of a series on each other.
 
     Attributes:
         kind: Of the module's docstring; "" where the file does not say, which counts as independent.
@@ -147,11 +147,11 @@ class Series:
         body: punch or strip.
         x: Places of a profile (k,), mm; None for what is one number at a time.
         after: Amount of sliding of each measurement (k,): cycles, mm or s.
-        counted: What that is: cycles, distance or time.
+        counted: Its meaning: cycles, distance or time.
         values: (k,), in the internal unit.
         sigma: Standard deviations (k,); None where the file gives none.
         rows: Lines of the file (k,).
-        noise: How the errors depend on each other.
+        noise: Dependence of the errors on each other.
     """
 
     quantity: str
@@ -176,7 +176,7 @@ class Series:
 
     @property
     def places(self) -> Array:
-        """What it is drawn over: the places of a profile, else the amounts of sliding (k,)."""
+        """Its horizontal axis: the places of a profile, else the amounts of sliding (k,)."""
         return self.after if self.x is None else self.x
 
     @property
@@ -191,13 +191,13 @@ class Series:
 
 @dataclass(frozen=True)
 class DataSet:
-    """What one file holds.
+    """Contents of a file.
 
     Attributes:
         name: Of the file.
         settings: Overrides `key.path=value` of the case it was measured under.
         series: One of each profile and of each column.
-        listing: What was read, in lines.
+        listing: Description of the data, in lines.
     """
 
     name: str
@@ -211,7 +211,7 @@ def read_data(path: str | Path, case: Case) -> DataSet:
 
     Args:
         path: Of the file.
-        case: What it belongs to.
+        case: Its condition.
 
     Raises:
         CaseError: the file cannot be read, or what it holds is wrong; names column and row.

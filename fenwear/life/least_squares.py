@@ -1,6 +1,6 @@
 """The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2.
 
-It tells what measurements cannot: unknowns and combinations of unknowns that the data leave open. The predictions of
+Limits of measurements are found: unknowns and combinations of unknowns that the data leave open. The predictions of
 one point under one condition are a run of the study (`fenwear.life.study`). Ranks and parts share the runs of a point,
 and of its differences; each part computes the fit itself, with the runs of all.
 """
@@ -58,7 +58,7 @@ def not_determined(keys: Sequence[str], relative: Array) -> list[str]:
 
 
 def hardly_known(keys: Sequence[str], data: Sequence[DataSet], own: Array) -> list[str]:
-    """Return the pairs that one condition tells apart by the finest details of its data only.
+    """Return the pairs that the data of one condition can hardly separate.
 
     By all columns of the Jacobian, also those of unknowns at a bound: a pair that wanders there is one.
     """
@@ -306,7 +306,7 @@ class LeastSquares:
             raise CaseError(problems)
 
     def cannot_tell(self, z: Vector | None = None) -> list[str]:
-        """Return which unknowns these data cannot tell apart, before any fit; collective.
+        """Return the unknowns that these data cannot separate, before any fit; collective.
 
         Only the places and conditions of the data count, not their values: a plan of a measurement will do.
         """

@@ -53,7 +53,7 @@ class Lives:
     """Lives of one part, whose keys do not scatter.
 
     Attributes:
-        quantities: What was counted.
+        quantities: Unit of the lives.
         units: Of the lives; "" for cycles.
         values: The lives; infinite where a level is never reached.
     """
@@ -82,14 +82,14 @@ class Lifetime:
     """Lives of a sample.
 
     Attributes:
-        quantity: What was counted.
+        quantity: Unit of the lives.
         unit: Of the lives.
         keys: That scatter.
         samples: Their values (n, d), in internal units.
         lives: (n,); infinite where the level is never reached, NaN where a run did not converge.
         quantiles: Of the lives; those of level q are reached before by a share q of the parts.
         reliability: Share of parts that live as long as was wanted; None if that was not asked for.
-        failures: What went wrong, by its sample.
+        failures: Errors, by sample.
         seed: Of the sample.
         each: Of the levels that were asked for, and of the named contacts; empty for one level of one contact. The
             lives above are then those until the first of all.

@@ -187,7 +187,7 @@ class Model:
 
         Args:
             values: Of keys, in their internal units.
-            cycles: How many at most.
+            cycles: Largest number.
             settings: Overrides `key.path=value` besides.
             stops: Cycles at whose end a jump ends in any case.
             course: Of another run, which this one is to follow, or `FREE`.

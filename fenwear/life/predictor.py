@@ -1,4 +1,4 @@
-"""What a model predicts for the conditions and places of measurements."""
+"""Predictions of a model for the conditions and places of measurements."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ class Quantity:
 
     @property
     def of_strip(self) -> str:
-        """How the names of what is the strip's end."""
+        """Suffix of the strip's names."""
         return "_strip" if self.body == "strip" else ""
 
     def of_snapshot(self, snapshot: Snapshot) -> float:
@@ -395,7 +395,7 @@ def cycles_of(amount: tuple[float, str], distance: float, period: float) -> floa
 
 @dataclass(frozen=True)
 class Path:
-    """How a quantity is computed again for other values, so that its values are smooth.
+    """The way to compute a quantity for other values, so that its values are smooth.
 
     Attributes:
         course: Of the run; `FREE` of what is not one.
@@ -424,7 +424,7 @@ def evaluate(
 
     Args:
         model: The case.
-        quantity: What is wanted.
+        quantity: The quantity.
         values: Of keys, in their internal units.
         settings: Overrides besides.
         path: Of an evaluation nearby.

@@ -1,7 +1,7 @@
 """Derivatives of quantities of interest to keys of a case, and quantities as a function of keys.
 
-Derivatives are central differences of steady states, or of runs with the same jumps, whose meshes, grids and properties
-of materials are made anew after the same half-cycles. Every difference is taken with two steps, h and h / 2, and
+Derivatives are central differences of steady states, or of runs with the same jumps, whose meshes, grids and material
+properties are updated after the same half-cycles. Every difference is taken with two steps, h and h / 2, and
 extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; its error is |D(h/2) - D(h)|, of the coarser order. Where it is
 too large the step is reduced. The error is that of this step alone: not of the mesh, the positions and the jumps, which
 are those of the value itself (`run` has them as numerical uncertainty). A derivative and an error of exactly zero are
@@ -51,7 +51,7 @@ def over_window(
         function: Of the key, for any other value.
         value: At the key's own value.
         key: That value.
-        grain: What a value may change by unnoticed, as one that is counted in nodes: where it has not changed by more
+        grain: Largest unnoticed change of a value, as of one that is counted in nodes: where it has not changed by more
             over the window, it may have by so much.
     """
     if key == 0.0 or value == 0.0:
@@ -91,14 +91,14 @@ Method = Literal["differences", "window"]
 
 @dataclass(frozen=True)
 class Derivative:
-    """How a quantity changes with a key.
+    """Derivatives of a quantity by a key.
 
     Attributes:
         key: Its path.
         key_value: In `key_unit`.
         key_unit: The internal one.
         derivative: Of the quantity, in its unit over the key's.
-        error: What two steps differ by, or what a fit over a window leaves open, in the same unit; see `error_of`.
+        error: Difference of two steps, or error of a fit over a window, in the same unit; see `error_of`.
         elasticity: Relative change of the quantity over that of the key; NaN where one of them is zero.
         low, high: The quantity with the key smaller and larger by the spread; NaN where that is not possible.
         method: differences, or window.
@@ -116,7 +116,7 @@ class Derivative:
 
     @property
     def error_of(self) -> str:
-        """What the error contains: the roughness of the mesh over a window, or the step of the difference alone."""
+        """Contents of the error: the roughness of the mesh over a window, or the step of the difference alone."""
         return "mesh over a window" if self.method == "window" else "step of the difference"
 
 
@@ -369,8 +369,8 @@ class Forward:
 
     Attributes:
         case: The case.
-        quantities: What is wanted.
-        keys: What they are functions of.
+        quantities: The quantities.
+        keys: Keys that they depend on.
     """
 
     case: Case

@@ -429,6 +429,8 @@ def problem(seed: int) -> tuple[Problem, str]:
     if ask not in WITH_FEATURES:
         return made, ask
     features, changes = drawn(dice, _scales(made))
+    if made.kind in ("program", "rings") and "contact.hardness" in changes:  # whose loads are up to twice as large
+        changes["contact.hardness"] = f"{4 * made.pressure} MPa"
     if ask in images and "heat" in made.tables:  # a reduced operator is as near as its tolerance
         fine = {"heat.reduction_tolerance": 1e-7} if "track" in made.tables["heat"] else {"heat.operator": "full"}
         changes |= fine

@@ -154,15 +154,18 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
         totals: What is added otherwise.
         lost: Depths worn meanwhile.
     """
-    if not system.coated:
-        return totals
+    return with_worn(system, totals, lost, [bool(coating.any()) for coating in system.coatings])
+
+
+def with_worn(system: ContactSetup, totals: Totals, lost: WornDepths, counts: Sequence[bool] = (True, True)) -> Totals:
+    """Return totals with the worn volume and mass of the bodies that count by these depths."""
     sums = totals.sums.copy()
     rows = zip(
-        ("punch", "strip"), system.coatings, (system.pair.weights, system.pair.strip.weights),
-        (lost.punch, lost.strip), system.bodies.densities, strict=True,
+        ("punch", "strip"), counts, (system.pair.weights, system.pair.strip.weights), (lost.punch, lost.strip),
+        system.bodies.densities, strict=True,
     )  # fmt: skip
-    for body, coating, weights, depth, density in rows:
-        if coating.any():
+    for body, counted, weights, depth, density in rows:
+        if counted:
             areas, first = system.bodies.punch.thickness * weights, SUMS.index(f"volume_{body}")
             mass = np.nan if density is None else float(MILLIGRAM * (areas * density) @ depth)
             sums[first : first + 2] = float(areas @ depth), mass

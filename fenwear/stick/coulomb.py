@@ -37,7 +37,7 @@ from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.gross_sliding import LAW as SLIDING
 from fenwear.cycle.state import RunState
-from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
+from fenwear.cycle.totals import SUMS, Totals, approach, with_worn
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.motion import Motion, make_motion
@@ -554,16 +554,4 @@ class Meter:
 
     def with_wear(self, totals: Totals, worn: WornDepths) -> Totals:
         """Return the totals with the volumes and masses of these depths."""
-        sums, pair = totals.sums.copy(), self.system.pair
-        for body, depth, weights, density in zip(
-            ("punch", "strip"),
-            (worn.punch, worn.strip),
-            (pair.weights, pair.strip.weights),
-            self.system.bodies.densities,
-            strict=True,
-        ):
-            area = self.thickness * weights
-            sums[SUMS.index(f"volume_{body}")] = area @ depth
-            mass = np.nan if density is None else float(MILLIGRAM * (area * density) @ depth)
-            sums[SUMS.index(f"mass_{body}")] = mass
-        return Totals(sums, totals.energy, totals.pressure)
+        return with_worn(self.system, totals, worn)

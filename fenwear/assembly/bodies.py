@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly.grids import lay_grids
-from fenwear.assembly.strokes import make_sliding
+from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.bodies.contact_surface import ContactSurface, profiled
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic, nodal_function
@@ -26,10 +26,12 @@ from fenwear.case.names import ROLES, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
-from fenwear.interface import pair
+from fenwear.interface import ContactPair, pair
 from fenwear.interface.edges import Edges
 from fenwear.parallel import release
-from fenwear.sliding.coating import coating_thickness
+from fenwear.sliding.coating import coating_thickness, coatings_of
+from fenwear.sliding.friction import regions_opposite
+from fenwear.sliding.local_laws import LocalLaws
 from fenwear.sliding.wear import WornDepths
 
 ALL_WAYS = 0.1  # mean of the unit normals of a surface below which it looks all ways, as a bore does
@@ -320,3 +322,16 @@ def edges_of(bodies: Bodies, surface: ContactSurface) -> Edges:
         if shared and any(all(abs(end[side] - place) < FLAT * size for end in ends) for side in (0, 1)):
             planes.append((axis, place))
     return Edges(surface, rings=bodies.punch.law.kind == "axisymmetric", planes=planes)
+
+
+def laws_of(bodies: Bodies, pair: ContactPair, sliding: Sliding, case: Case) -> LocalLaws:
+    """Return friction and wear of each node of a pair of surfaces.
+
+    Raises:
+        CaseError: a coating's thickness is negative somewhere.
+    """
+    regions, contact = regions_opposite(bodies.regions, pair), sliding.friction.contact
+    friction = replace(sliding.friction, split=regions[0].split(contact.friction))
+    edges = edges_of(bodies, pair.punch) if contact.asks("edge", sliding.wear) else None
+    coatings = coatings_of(pair, sliding.wear)
+    return LocalLaws(friction, sliding.wear, coatings, regions, case.initial_temperature, edges)

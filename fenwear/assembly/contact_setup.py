@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly.bodies import Bodies, edges_of
+from fenwear.assembly.bodies import Bodies, laws_of
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.shape import element_height
@@ -26,13 +26,13 @@ from fenwear.interface import (
     RigidEquilibrium,
 )
 from fenwear.interface.edges import Edges
-from fenwear.interface.placement import in_model, in_space
+from fenwear.interface.placement import in_model
 from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, conductance_of, layers_of
 from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
-from fenwear.sliding.coating import coatings_of, covering
 from fenwear.sliding.field import SlidingField, node_rates
-from fenwear.sliding.friction import ContactConditions, Friction, Regions, any_split, regions_opposite
+from fenwear.sliding.friction import ContactConditions, Friction, any_split
+from fenwear.sliding.local_laws import LocalLaws
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
@@ -135,9 +135,18 @@ class ContactSetup:
         return self.sliding.motion
 
     @cached_property
+    def laws(self) -> LocalLaws:
+        """Friction and wear of each node.
+
+        Raises:
+            CaseError: a coating's thickness is negative somewhere.
+        """
+        return laws_of(self.bodies, self.pair, self.sliding, self.case)
+
+    @cached_property
     def friction(self) -> Friction:
         """The law of friction."""
-        return replace(self.sliding.friction, split=self._regions[0].split(self.sliding.friction.contact.friction))
+        return self.laws.friction
 
     @property
     def pair(self) -> ContactPair:
@@ -224,7 +233,7 @@ class ContactSetup:
             a, b = law.speed_exponent, law.pressure_exponent
             rates = self.sliding_ratio if a == b else self._rates(a / b)
             slid.append(self.motion.sliding(a)[:, None] * rates**a)
-        split = any_split(self._regions, self.sliding.wear)
+        split = any_split(self.laws.regions, self.sliding.wear)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings, split)
 
     @property
@@ -254,14 +263,10 @@ class ContactSetup:
         """Whether a body is."""
         return any(thickness.any() for thickness in self.coatings)
 
-    @cached_property
+    @property
     def coatings(self) -> tuple[Array, Array]:
-        """Thickness of the coatings of punch and strip at their own contact nodes, mm; 0 without.
-
-        Raises:
-            CaseError: it is negative somewhere.
-        """
-        return coatings_of(self.pair, self.sliding.wear)
+        """Thickness of the coatings of punch and strip at their own contact nodes, mm; 0 without."""
+        return self.laws.coatings
 
     @cached_property
     def layers(self) -> Layers:
@@ -382,12 +387,12 @@ class ContactSetup:
 
     def asks(self, name: str) -> bool:
         """Return whether friction, wear or the loss of debris depends on a variable of coefficients."""
-        return self.friction.contact.asks(name, self.sliding.wear)
+        return self.laws.asks(name)
 
-    @cached_property
+    @property
     def edges(self) -> Edges | None:
         """Distances from the edge of the contact; None where nothing depends on them."""
-        return edges_of(self.bodies, self.pair.punch) if self.asks("edge") else None
+        return self.laws.edges
 
     @cached_property
     def mode_lengths(self) -> Array:
@@ -428,15 +433,6 @@ class ContactSetup:
         return WornDepths(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     @cached_property
-    def _places(self) -> tuple[tuple[Array, Array], ...]:
-        """Where the nodes are on the punch and on the strip's material in each phase, and in the middle at last."""
-        found = []
-        for facing in (*self.pairs, self.pair):
-            x = facing.punch.x
-            found.append((in_space(x), in_space(facing.material_place.points_back(x))))
-        return tuple(found)
-
-    @cached_property
     def _speeds(self) -> tuple[Array, ...]:
         """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
         motion, pair = self.motion, self.pair
@@ -453,11 +449,6 @@ class ContactSetup:
     def _initial(self) -> Array:
         """The initial temperature at the nodes (n,), K."""
         return np.full(len(self.pair.weights), self.initial_temperature)
-
-    @cached_property
-    def _regions(self) -> tuple[Regions, Regions]:
-        """The regions of punch and strip at the contact nodes."""
-        return regions_opposite(self.bodies.regions, self.pair)
 
     def slid_after(self, half_cycles: float) -> float:
         """Return how far the motion has gone after half-cycles from the start of the run, mm or rad; or cycles."""
@@ -487,31 +478,22 @@ class ContactSetup:
             cycle: Of the pressures of all phases, by `SlidingWays.shear`; by default they are not known.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
-        none, initial = self._none, self._initial
         slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[max(phase, 0)]
         pair = (*self.pairs, self.pair)[phase]
-        depths: tuple[Array, Array] = none, none
-        if worn is not None:
-            depths = worn.punch, pair.wear_interpolation @ worn.strip if self.strip_wears else none
-        edge = None
-        if self.edges is not None:
-            if touching is None:
-                touching = np.full(len(none), True) if pressure is None else pressure > 0
-            edge = self.edges.distance(touching)
-        return ContactConditions(
-            np.full(len(none), self.rigid.mean_pressure) if pressure is None else pressure,
-            self._speeds[phase],
-            (initial, initial) if temperatures is None else temperatures,
-            self._places[phase],
-            depths,
-            slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
-            self._regions,
-            self.ways.shear(None) if cycle is None else cycle,
-            self.layers.known(pair, worn),
-            covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
-            self.layers.facing(pair, worn),
-            edge,
-            self.friction.friction_temperature,
+        if pressure is None:
+            pressure = self._none + self.rigid.mean_pressure
+            touching = pressure >= 0 if touching is None else touching
+        return self.laws.conditions(
+            pair,
+            pressure,
+            speed=self._speeds[phase],
+            temperatures=temperatures,
+            worn=worn,
+            slid=slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
+            states=self.layers.known(pair, worn),
+            debris=self.layers.facing(pair, worn),
+            touching=touching,
+            cycle=self.ways.shear(None) if cycle is None else cycle,
         )
 
     def friction_ratio(self, direction: int, pressure: Array | None = None) -> Array:
@@ -572,7 +554,7 @@ class ContactSetup:
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
         found = self._optimum(direction, zone, None)
-        for _ in range(OF_SIDES if any(len(one.mixed) for one in self._regions) else 0):
+        for _ in range(OF_SIDES if any(len(one.mixed) for one in self.laws.regions) else 0):
             found = self._optimum(direction, zone, found.pressure)
         return found
 

@@ -23,7 +23,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.interface.frame import common_normal, unit
 from fenwear.interface.overlap import ChartedSurface, Patch
 from fenwear.interface.patches import folds, patches, radius_of
-from fenwear.interface.placement import HERE, ZERO, Placement
+from fenwear.interface.placement import HERE, ZERO, Placement, in_space
 from fenwear.interface.round_shape import round_shape
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
@@ -65,6 +65,11 @@ class ContactPair:
     def material_place(self) -> Placement:
         """Where the strip's material is."""
         return self.placement if self.passed is None else self.passed
+
+    @cached_property
+    def places(self) -> tuple[Array, Array]:
+        """Where the contact nodes are on the punch and on the strip's material (n, 3) each, mm."""
+        return in_space(self.punch.x), in_space(self.material_place.points_back(self.punch.x))
 
     @property
     def x(self) -> Array:

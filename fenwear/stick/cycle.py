@@ -22,6 +22,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers.memory import Held
 from fenwear.sliding.field import Screw
+from fenwear.sliding.local_laws import LocalLaws, LocalWear
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StepStart, StickHeat, coupled_step
 from fenwear.stick.increment import advance
@@ -31,7 +32,6 @@ from fenwear.stick.position import LoadEffect, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.records import TimeStepRecords, record
 from fenwear.stick.state import Imposed, PartialSlipState, StickState
-from fenwear.stick.wear import LocalLaws, LocalWear
 
 T = TypeVar("T")
 MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change

@@ -18,6 +18,7 @@ from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.interface import ContactPair
 from fenwear.layers.step import LayerEvolution, LayerStep
+from fenwear.sliding.local_laws import BodyRate, LocalWear
 from fenwear.sliding.wear import BodyWear, CoatedWear, PhasesWear, WornDepths
 from fenwear.stick.creep import CreepNear, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
@@ -25,7 +26,6 @@ from fenwear.stick.losses import StepSlips, slips_of
 from fenwear.stick.position import Position
 from fenwear.stick.records import FrettingCycle
 from fenwear.stick.state import PartialSlipState
-from fenwear.stick.wear import BodyRate, LocalWear
 
 
 @dataclass(frozen=True)

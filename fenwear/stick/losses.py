@@ -20,6 +20,7 @@ from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
 from fenwear.sliding.coating import CoatedBody, Shares, left_of, shares
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.local_laws import LocalLaws, LocalWear
 from fenwear.sliding.ways import CycleShear, SlidingWays
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
@@ -27,7 +28,6 @@ from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.program import Program
 from fenwear.stick.records import TimeStepRecords
 from fenwear.stick.state import PartialSlipState
-from fenwear.stick.wear import LocalLaws, LocalWear
 
 
 class StepSlips(NamedTuple):

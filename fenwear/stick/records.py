@@ -8,13 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fenwear.arrays import Array, Mask
+from fenwear.sliding.local_laws import LocalWear
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import surface_strain
 from fenwear.stick.program import TimeStep
 from fenwear.stick.state import PartialSlipState
-from fenwear.stick.wear import LocalWear
 
 
 @dataclass(frozen=True)

@@ -18,22 +18,19 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly import Bodies, build_bodies, make_sliding
-from fenwear.assembly.bodies import edges_of
+from fenwear.assembly.bodies import laws_of
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import memory_size
-from fenwear.sliding.coating import coatings_of
 from fenwear.sliding.field import Screw
-from fenwear.sliding.friction import regions_opposite
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.losses import CoatedBodies
 from fenwear.stick.program import Program, far_enough, make_program, passes, steps_of
 from fenwear.stick.records import TimeStepRecords
-from fenwear.stick.wear import LocalLaws
 
 MOST_PASSING = 3000  # nodes of a grid under which a strip passes
 
@@ -114,12 +111,7 @@ def unheated_problem(
         condensed=condensed,
     )
     middle = interface.middle
-    regions = regions_opposite(bodies.regions, middle.pair)
-    initial = case.initial_temperature
-    coatings = coatings_of(middle.pair, sliding.wear)
-    edges = edges_of(bodies, middle.pair.punch) if case.contact.asks("edge", sliding.wear) else None
-    friction = replace(sliding.friction, split=regions[0].split(sliding.friction.contact.friction))
-    laws = LocalLaws(friction, sliding.wear, coatings, regions, initial, edges)
+    laws = laws_of(bodies, middle.pair, sliding, case)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     layers = interface.layers
     conditions = laws.conditions(

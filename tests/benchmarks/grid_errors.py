@@ -22,11 +22,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bodies"))
 from test_fine import on_layer
 
 from fenwear.arrays import Array
+from fenwear.sliding.local_laws import BodyRate, LocalWear
 from fenwear.stick import Imposed, StickState, advance, untouched
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape
 from fenwear.stick.interface import OppositeBodies
-from fenwear.stick.wear import BodyRate, LocalWear
 from fenwear_verify.half_space_stick import Elastic, on_grid
 from fenwear_verify.stick_solids import RIGID, to_and_fro
 

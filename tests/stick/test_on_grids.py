@@ -14,6 +14,7 @@ from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.interface import compliance
+from fenwear.sliding.local_laws import BodyRate, LocalWear
 from fenwear.stick import Imposed, StickState, advance, untouched
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape
@@ -23,7 +24,6 @@ from fenwear.stick.jump import first_cycle, jumped
 from fenwear.stick.products import CLOSE, GridStep
 from fenwear.stick.records import FrettingCycle
 from fenwear.stick.setup import partial_slip_problem
-from fenwear.stick.wear import BodyRate, LocalWear
 from fenwear_verify.half_space_stick import Elastic, on_grid
 from fenwear_verify.stick_solids import to_and_fro
 

@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 
 from fenwear.arrays import Array, Mask
+from fenwear.sliding.local_laws import BodyRate, LocalWear
 from fenwear.stick import Imposed, StickState, advance, untouched
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape, stick_zone
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.jump import first_cycle, jumped
 from fenwear.stick.program import Program, TimeStep
-from fenwear.stick.wear import BodyRate, LocalWear
 from fenwear_verify.half_space_stick import Elastic, half_spaces
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, verification
 

@@ -1,8 +1,9 @@
-"""Friction and wear by local slip: depth = beta~ p^b v^a of each node, both bodies; v = abs(slip) over its step's time.
+"""Friction and wear of each node by its own conditions, in gross sliding and in slip.
 
-Coefficients may depend on the conditions of each node: its pressure and temperature, the speed of its slip, how deep
-it is worn and how far it has slipped. Friction is that of the pressure at the end of a time step, of the temperature
-and depth at its start and of the speed in the step before; wear is that of the step itself.
+By local slip depth = beta~ p^b v^a of each node of both bodies, with v = abs(slip) over its step's time. Coefficients
+may depend on the conditions of each node: its pressure and temperature, the speed of its slip, how deep it is worn and
+how far it has slipped. Friction is that of the pressure at the end of a time step, of the temperature and depth at its
+start and of the speed in the step before; wear is that of the step itself.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from fenwear.arrays import Array, Mask
 from fenwear.case import WearLaw
 from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
-from fenwear.interface.placement import in_space
 from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions, Friction, Regions, any_split
 from fenwear.sliding.pressure_law import PressureLaw
@@ -137,13 +137,13 @@ class LocalLaws:
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
             cycle: What the last cycle tells of cross-shear and mean pressure; None before the first.
         """
-        none, x = np.zeros_like(pressure), pair.punch.x
+        none = np.zeros_like(pressure)
         initial = np.full_like(pressure, self.initial)
         return ContactConditions(
             pressure,
             speed,
             (initial, initial) if temperatures is None else temperatures,
-            (in_space(x), in_space(pair.placement.points_back(x))),
+            pair.places,
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             none if slid is None else slid,
             self.regions,

@@ -197,14 +197,10 @@ def calibrate_command(
 
     how = _options(output, part, script, resume=resume)
     loaded = load(case, settings)
-    study = (loaded, Path(case).stem, data, unknowns, baseline, log)
-    if each:
-        tests, between, folder = commands.run_calibrate_each(*study, **how)
-        text = "\n".join([*(one.text() for one in tests), *between.text])
-        show_results(commands.each_as_json(tests, between) if as_json else text, f"results in {folder}")
-        return
-    found, folder = commands.run_calibrate(*study, **how)
-    show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
+    table, text, folder = commands.run_calibrate(
+        loaded, Path(case).stem, data, unknowns, baseline, log, each=each, **how
+    )
+    show_results(table if as_json else text, f"results in {folder}")
 
 
 @app.command("life")

@@ -15,8 +15,8 @@ from mpi4py import MPI
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
 from fenwear.life.calibrate import Calibration, between, between_as_json, calibrate, calibrate_each
-from fenwear.life.data import DataSet, read_data
-from fenwear.life.keys import Unknown, parse_unknown, with_values
+from fenwear.life.data import read_data
+from fenwear.life.keys import parse_unknown, with_values
 from fenwear.life.lifetime import Lifetime, Lives, lifetime
 from fenwear.life.model import Model
 from fenwear.life.quantities import Quantity, cycles_of, lives, of_case, parse_amount, parse_quantity, unit_of
@@ -132,16 +132,12 @@ def _counter(log: Log, what: str) -> Callable[[int, int], None]:
     return lambda done, total: (log if done == total else seldom)(f"{what} {done:,} of {total:,}")
 
 
-def _write(
-    folder: Path, comm: MPI.Comm, found: Mapping[str, Any], texts: Mapping[str, str], figures: Mapping[str, Drawn]
-) -> None:
-    """Write the tables of NAME.json, the texts and the figures of a study into its folder; collective."""
+def _write(folder: Path, comm: MPI.Comm, files: Mapping[str, Any], figures: Mapping[str, Drawn]) -> None:
+    """Write texts, tables as JSON, and figures of a study into its folder; collective."""
 
     def write() -> None:
-        for name, table in found.items():
-            write_text(folder / name, json.dumps(table, indent=1))
-        for name, text in texts.items():
-            write_text(folder / name, text)
+        for name, content in files.items():
+            write_text(folder / name, content if isinstance(content, str) else json.dumps(content, indent=1))
         for name, draw in figures.items():
             with replacing(folder / name, shared=True) as part:
                 draw().savefig(part, dpi=150, format="png")
@@ -167,7 +163,7 @@ def run_sensitivity(
     _tell_of_stick(case, log, comm)
     found = sensitivity(case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how)
     figures = {"tornado.png": lambda: tornado(found)} if spread > 0 else {}
-    _write(folder, comm, {"sensitivity.json": [one.as_json() for one in found]}, {}, figures)
+    _write(folder, comm, {"sensitivity.json": [one.as_json() for one in found]}, figures)
     return found, folder
 
 
@@ -178,53 +174,18 @@ def run_calibrate(
     unknowns: Sequence[str],
     baseline: Sequence[str],
     log: Log,
+    *,
+    each: bool = False,
     **how: Unpack[StudyOptions],
-) -> tuple[Calibration, Path]:
-    """Calibrate; write the fitted case, calibration.json and residuals; collective.
+) -> tuple[dict[str, Any], str, Path]:
+    """Calibrate, every file alone with the scatter between them if `each`; write the results; collective.
+
+    Returns:
+        The table that `life --from` reads, the text, and the folder.
 
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
     """
-    asked, data, how, folder = _to_calibrate(case, name, files, unknowns, log, how)
-    found = calibrate(case, data, asked, baseline=baseline, progress=log, **how)
-    texts = {FITTED: with_values(case, found.values).to_toml(), "residuals.csv": _residual_table(found)}
-    figures = {"residuals.png": lambda: residuals(found)}
-    _write(folder, Study.of(how).comm, {"calibration.json": found.as_json()}, texts, figures)
-    if found.at_bound:
-        raise CaseError(
-            [
-                InputError(f"--unknown {key}", "the best fit lies beyond its bound. Widen the bounds; the fit so far "
-                        f"is in {folder}")
-                for key in found.at_bound
-            ]
-        )  # fmt: skip
-    return found, folder
-
-
-def run_calibrate_each(
-    case: Case,
-    name: str,
-    files: Sequence[Path],
-    unknowns: Sequence[str],
-    baseline: Sequence[str],
-    log: Log,
-    **how: Unpack[StudyOptions],
-) -> tuple[list[Calibration], Scatter, Path]:
-    """Calibrate every file alone; write calibration.json with the scatter between them; collective."""
-    asked, data, how, folder = _to_calibrate(case, name, files, unknowns, log, how)
-    found = calibrate_each(case, data, asked, baseline=baseline, progress=log, **how)
-    scatter = between(found)
-    figures = {
-        f"residuals_{Path(one.name).stem}.png": partial(residuals, fit) for one, fit in zip(data, found, strict=True)
-    }
-    _write(folder, Study.of(how).comm, {"calibration.json": each_as_json(found, scatter)}, {}, figures)
-    return found, scatter, folder
-
-
-def _to_calibrate(
-    case: Case, name: str, files: Sequence[Path], unknowns: Sequence[str], log: Log, how: StudyOptions
-) -> tuple[list[Unknown], list[DataSet], StudyOptions, Path]:
-    """Return unknowns, data, and options with the folder of a calibration; collective."""
     asked = [parse_unknown(case, text) for text in unknowns]
     how, folder = in_results(how, f"calibrate-{name}")
     comm = Study.of(how).comm
@@ -232,12 +193,21 @@ def _to_calibrate(
     for one in data:
         log(one.listing)
     _tell_of_stick(case, log, comm)
-    return asked, data, how, folder
-
-
-def each_as_json(found: Sequence[Calibration], scatter: Scatter) -> dict[str, Any]:
-    """Return what `fenwear calibrate --each --json` prints; `fenwear life --from` reads it."""
-    return {**between_as_json(found), "scatter": list(scatter.text), "tests": [one.as_json() for one in found]}
+    if each:
+        fits = calibrate_each(case, data, asked, baseline=baseline, progress=log, **how)
+        scatter = between(fits)
+        table = {**between_as_json(fits), "scatter": list(scatter.text), "tests": [fit.as_json() for fit in fits]}
+        pictures = [(f"residuals_{Path(one.name).stem}.png", fit) for one, fit in zip(data, fits, strict=True)]
+        _write(folder, comm, {"calibration.json": table}, {file: partial(residuals, fit) for file, fit in pictures})
+        return table, "\n".join([*(fit.text() for fit in fits), *scatter.text]), folder
+    fit = calibrate(case, data, asked, baseline=baseline, progress=log, **how)
+    table = fit.as_json()
+    texts = {FITTED: with_values(case, fit.values).to_toml(), "residuals.csv": _residual_table(fit)}
+    _write(folder, comm, {"calibration.json": table, **texts}, {"residuals.png": lambda: residuals(fit)})
+    if fit.at_bound:
+        message = f"the best fit lies beyond its bound. Widen the bounds; the fit so far is in {folder}"
+        raise CaseError([InputError(f"--unknown {key}", message) for key in fit.at_bound])
+    return table, fit.text(), folder
 
 
 def _residual_table(found: Calibration) -> str:
@@ -277,7 +247,7 @@ def run_life(
     how, folder = in_results(how, f"life-{name}")
     study = Study.of(how)
     if not scatter.keys:
-        options = {"--resume": study.resume, "--collect": study.collect, "--part": study.part, "--wanted": wanted}
+        options = {"--resume": study.resume, "--collect": study.collect, "--wanted": wanted}
         for option in (option for option, given in options.items() if given):
             message = f"expected {option} with --scatter KEY=KIND(A, B), or --from a calibration, only"
             raise CaseError(InputError(option, message))
@@ -289,7 +259,7 @@ def run_life(
         log(line)
     counter = _counter(log, "samples")
     found = lifetime(case, quantities, scatter, samples=samples, seed=seed, wanted=level, progress=counter, **how)
-    _write(folder, study.comm, {"life.json": found.as_json()}, {}, {"life.png": lambda: life_figure(found)})
+    _write(folder, study.comm, {"life.json": found.as_json()}, {"life.png": lambda: life_figure(found)})
     return found, folder
 
 
@@ -300,17 +270,15 @@ def _one_life(case: Case, quantities: Sequence[Quantity], folder: Path, log: Log
     on_root(comm, lambda: make_directory(folder))
     on_root(comm, lambda: write_case(folder, case))
     values = on_root(comm, lambda: [float(life) for life in lives(Model(case), asked, {})])
-    found = Lives(tuple(one.text for one in asked), tuple(one.unit for one in asked), tuple(values))
-    _write(folder, comm, {"life.json": found.as_json()}, {}, {})
+    found = Lives(tuple(asked), tuple(values))
+    _write(folder, comm, {"life.json": found.as_json()}, {})
     return found
 
 
 def _wanted(case: Case, life: str, text: str) -> float:
     """Return a wanted life in the unit of the lives."""
-    amount = parse_amount(text, "--wanted")
     measures = Model(case).cycle_measures()
-    factor = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}[life]
-    return cycles_of(amount, *measures) * factor
+    return cycles_of(parse_amount(text, "--wanted"), *measures) / cycles_of((1.0, life), *measures)
 
 
 def as_json(found: Sequence[Sensitivity]) -> dict[str, Any]:

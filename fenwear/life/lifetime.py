@@ -53,27 +53,25 @@ class Lives:
     """Lives of one part, whose keys do not scatter.
 
     Attributes:
-        quantities: Unit of the lives.
-        units: Of the lives; "" for cycles.
+        quantities: Levels that the lives count to.
         values: The lives; infinite where a level is never reached.
     """
 
-    quantities: tuple[str, ...]
-    units: tuple[str, ...]
+    quantities: tuple[Quantity, ...]
     values: tuple[float, ...]
 
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints and life.json holds."""
-        rows = zip(self.quantities, self.units, self.values, strict=True)
-        lives = [{"quantity": text, "unit": unit or "cycles", "value": value} for text, unit, value in rows]
+        rows = zip(self.quantities, self.values, strict=True)
+        lives = [{"quantity": one.text, "unit": one.unit or "cycles", "value": value} for one, value in rows]
         return {"lives": finite(lives)}
 
     def text(self) -> str:
         """Return a line for each."""
-        rows = zip(self.quantities, self.units, self.values, strict=True)
+        rows = zip(self.quantities, self.values, strict=True)
         return "\n".join(
-            f"{text}: {value:.6g} {unit or 'cycles'}" if np.isfinite(value) else f"{text}: never"
-            for text, unit, value in rows
+            f"{one.text}: {value:.6g} {one.unit or 'cycles'}" if np.isfinite(value) else f"{one.text}: never"
+            for one, value in rows
         )
 
 

@@ -506,11 +506,9 @@ def _until(
         passed += np.array([rows[-1][1] for rows in taken]) >= levels
         run.append(snapshot)
     made = Path(Course.of(run), edge_moved(run))
-    factors = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}
-    found = [
-        crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)
-    ]
-    return np.array(found), made
+    counted = np.array([cycles_of((1.0, one.life), *measures) for one in quantities])
+    cycles = [crossing(np.array(rows), level) for rows, level in zip(taken, levels, strict=True)]
+    return np.array(cycles) / counted, made
 
 
 def crossing(taken: Array, level: float) -> float:

@@ -20,7 +20,8 @@ roughness of the mesh: its standard error times Student's factor, and by what c_
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any, Literal, Unpack
 
 import numpy as np
@@ -363,7 +364,6 @@ def _differences(function: Callable[[float], float], case: Case, key: Key, scale
 KEPT = 64  # Jacobians
 
 
-@dataclass
 class Forward:
     """Quantities of interest of a case as a function of its keys.
 
@@ -373,14 +373,10 @@ class Forward:
         keys: Keys that they depend on.
     """
 
-    case: Case
-    quantities: Sequence[Quantity]
-    keys: Sequence[Key]
-    _model: Model = field(init=False)
-    _jacobians: dict[tuple[float, ...], Array] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self._model = Model(self.case)
+    def __init__(self, case: Case, quantities: Sequence[Quantity], keys: Sequence[Key]) -> None:
+        self.case, self.quantities, self.keys = case, quantities, keys
+        self._model = Model(case)
+        self._kept = lru_cache(KEPT)(self._derivatives)
 
     def values(self, given: Sequence[float]) -> list[float]:
         """Return the quantities at values of the keys (k,).
@@ -397,15 +393,12 @@ class Forward:
         Raises:
             CaseError, ConvergenceError: as `values`.
         """
-        at = tuple(given)
-        if at not in self._jacobians:
-            case = with_values(self.case, self._named(given))
-            paths = [key.path for key in self.keys]
-            found = sensitivity(case, self.quantities, paths, spread=0, comm=MPI.COMM_SELF)
-            if len(self._jacobians) >= KEPT:
-                self._jacobians.clear()
-            self._jacobians[at] = np.array([[row.derivative for row in one.derivatives] for one in found])
-        return self._jacobians[at]
+        return self._kept(tuple(given))
+
+    def _derivatives(self, given: tuple[float, ...]) -> Array:
+        case, paths = with_values(self.case, self._named(given)), [key.path for key in self.keys]
+        found = sensitivity(case, self.quantities, paths, spread=0, comm=MPI.COMM_SELF)
+        return np.array([[row.derivative for row in one.derivatives] for one in found])
 
     def _named(self, given: Sequence[float]) -> dict[str, float]:
         return {key.path: float(value) for key, value in zip(self.keys, given, strict=True)}

@@ -155,7 +155,7 @@ def _map(figure: Figure, ax: Axes, values: xarray.DataArray, first: str, second:
     colours: dict[str, Any] = {"cmap": "viridis"}
     if values.name == "regime":  # a map of fretting
         colours = {"cmap": ListedColormap([BLUE, GREY, RED]), "vmin": -0.5, "vmax": len(REGIMES) - 0.5}
-    mesh = ax.pcolormesh(_edges(x), _edges(y), values.transpose(second, first).values, **colours)
+    mesh = ax.pcolormesh(x, y, values.transpose(second, first).values, shading="nearest", **colours)
     bar = figure.colorbar(mesh, ax=ax, label=label)
     if values.name == "regime":
         bar.set_ticks(range(len(REGIMES)), labels=REGIMES)
@@ -168,14 +168,6 @@ def _map(figure: Figure, ax: Axes, values: xarray.DataArray, first: str, second:
             scale("log")
     ax.set_xlabel(_axis_label(values, first))
     ax.set_ylabel(_axis_label(values, second))
-
-
-def _edges(places: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """Return the edges of the cells around places on an axis (n + 1,), on a logarithmic one of equal ratios."""
-    scale, back = (np.log, np.exp) if _even_ratios(places) else (np.asarray, np.asarray)
-    at = np.asarray(scale(places), dtype=float)
-    half = np.diff(at) / 2 if len(at) > 1 else np.full(1, 0.5)
-    return np.asarray(back(np.concatenate([[at[0] - half[0]], at[:-1] + half[: len(at) - 1], [at[-1] + half[-1]]])))
 
 
 def _even_ratios(places: np.ndarray[Any, Any]) -> bool:

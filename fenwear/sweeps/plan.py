@@ -212,32 +212,16 @@ def _number(value: Value) -> float | None:
 
 
 def value_at(case: Case, key: str) -> tuple[Value, str]:
-    """Return what a case has at a key, and its unit; "" where it has nothing."""
+    """Return the value of a case at a key, and its unit; "" where it has none."""
+    if (number := numeric_keys(case).get(key)) is not None:
+        return number.value, number.unit
     place: Any = case.resolved()
-    for name in key.split("."):
-        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
-            place = place[int(name)]
-        elif isinstance(place, dict) and name in place:
-            place = place[name]
-        else:
-            return "", ""
-    if isinstance(place, str):
-        number, _, unit = place.partition(" ")
-        try:
-            return float(number), unit
-        except ValueError:
-            return place, ""
-    if isinstance(place, bool):
-        return str(place).lower(), ""
-    return (place, "") if isinstance(place, int | float) else (_words(place), "")
-
-
-def _words(place: Any) -> str:
-    if isinstance(place, list):
-        return "[" + ", ".join(map(_words, place)) + "]"
-    if isinstance(place, dict):
-        return "{" + ", ".join(f"{name} = {_words(value)}" for name, value in place.items()) + "}"
-    return str(place)
+    try:
+        for name in key.split("."):
+            place = place[int(name) if isinstance(place, list) else name]
+    except (KeyError, IndexError, TypeError, ValueError):
+        return "", ""
+    return (place if type(place) is int else str(place)), ""
 
 
 Of = Literal["steady", "optimum", "run"]

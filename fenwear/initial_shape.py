@@ -14,8 +14,9 @@ p_k(omega) = p_k - S_k^-1 (omega - omega_k), which wear the contact evenly in al
 
     omega = sum of w_k omega_k,
 
-exactly so for linear wear and one contact zone, as the shapes of the loads differ by elasticity alone. Loads that reach
-different zones leave some of the wear uneven.
+exactly so for linear wear and one contact zone, as the shapes of the loads differ by elasticity alone. Elsewhere
+iterations begin there: where all loads together wear w more than evenly, and on average k times their mean pressure,
+S w / k is taken off, with S the gap by unit pressures, until the wear is even.
 
 In partial slip the shape is that of `fenwear.stick.final`: the stick zone carries all of the load, nothing else wears.
 
@@ -45,6 +46,7 @@ from fenwear.case.bodies import Profile
 from fenwear.case.csv_table import read_profile
 from fenwear.case.dependence import parse_expression
 from fenwear.cycle import SteadyState, steady
+from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import is_translation
@@ -54,6 +56,7 @@ from fenwear.stick.records import TimeStepRecords
 ALLOWED = 0.1  # of the pressure scale: what a deviation of the size of the tolerance changes the pressure by
 ROUNDED = 1e-12  # of the largest depth: what rounding leaves of none
 UNBALANCED = 0.01  # of what a pressure carries: what is corrected of it
+EVEN = 1e-9  # unevenness of the wear in several loads together that ends their iterations
 PROBE = 1e-3  # of the elastic gap under the pressure scale: a deviation that is small
 
 
@@ -108,8 +111,9 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     goals = [_steady_pressures(state) for state in states]
     first, uneven = [np.full_like(goal, np.nan) for goal in goals], np.nan
     if system.case.heat is None:
+        depth = depth if len(loads) == 1 else _evened(systems, shares, depth)
         first = [_pressures(one, depth) for one in systems]
-        uneven = 0.0 if system.sticks else _uneven(systems, shares, first)
+        uneven = 0.0 if system.sticks else _uneven(systems, shares, first)[0]
     left = [
         float(np.abs(p - goal).max() / pressure_scale(one, goal))
         for one, p, goal in zip(systems, first, goals, strict=True)
@@ -210,8 +214,33 @@ def _depth(system: Tribosystem, states: Sequence[SteadyState | FinalShape], shar
     shapes = [state.depth if isinstance(state, FinalShape) else state.closest_shape for state in states]
     pressed = np.any([_steady_pressures(state).any(axis=0) for state in states], axis=0)
     mean = shares @ np.array(shapes)
-    depth = mean if system.sticks else mean - _least_motion(system, mean, pressed)
+    return mean if system.sticks else _least(system, mean, pressed)
+
+
+def _least(system: Tribosystem, shape: Array, pressed: Mask) -> Array:
+    """Return a shape less the rigid motion that leaves the least of it (n,), mm."""
+    depth = shape - _least_motion(system, shape, pressed)
     return np.where(depth > ROUNDED * depth.max(), depth, 0.0)
+
+
+def _evened(systems: Sequence[Tribosystem], shares: Array, start: Array) -> Array:
+    """Return the shape next to one on which all loads together wear evenly (n,), mm; collective.
+
+    Raises:
+        ConvergenceError: none is found.
+    """
+    system = systems[0]
+    compliance = system.interface.compliance(np.mean(system.friction_ratios(), axis=0))
+
+    def advance(depth: Array) -> tuple[Array, tuple[Array, Mask], bool]:
+        pressures = [_pressures(one, depth) for one in systems]
+        uneven, rest, total = _uneven(systems, shares, pressures)
+        carried = shares @ np.array([p.sum(axis=0) for p in pressures])
+        off = compliance.apply(rest * (carried.sum() / total.sum()))
+        return depth + off, (depth, carried > 0), uneven < EVEN
+
+    failure = "no shape that all loads wear evenly was found: give loads that are less apart; it did not converge"
+    return _least(system, *fixed_point(advance, start, lambda *_: False, failure, team=system.team))
 
 
 def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
@@ -248,13 +277,13 @@ def _pressures(system: Tribosystem, depth: Array) -> Array:
     return np.array([system.phase_contact((k,)).solve(system.gap(k, worn)).pressure[0] for k in phases])
 
 
-def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> float:
-    """Return how far the wear in all loads together is from a rigid motion, over the largest wear."""
+def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> tuple[float, Array, Array]:
+    """Return how far the wear in all loads together is from a rigid motion, over its largest, by node, and it (n,)."""
     worn = [share * one.phases_wear.opening(p)[0] for one, share, p in zip(systems, shares, pressures, strict=True)]
     total, pressed = np.sum(worn, axis=0), np.any([p.any(axis=0) for p in pressures], axis=0)
-    modes = systems[0].rigid.rigid_normal[pressed]
-    rest = total[pressed] - modes @ np.linalg.lstsq(modes, total[pressed], rcond=None)[0]
-    return float(np.abs(rest).max() / total.max())
+    modes, rest = systems[0].rigid.rigid_normal[pressed], np.zeros_like(total)
+    rest[pressed] = total[pressed] - modes @ np.linalg.lstsq(modes, total[pressed], rcond=None)[0]
+    return float(np.abs(rest).max() / total.max()), rest, total
 
 
 def _tolerance(system: Tribosystem, goal: Array, depth: Array) -> float:

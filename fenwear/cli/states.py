@@ -364,9 +364,6 @@ def _optimum_text(system: ContactSetup, found: dict[str, Optimum], of_step: str)
     return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(found), rows)])
 
 
-SAME = 1e-6  # of the pressure scale
-
-
 @app.command("shape")
 def shape_command(
     case: CaseArgument,
@@ -428,10 +425,6 @@ def _shape_text(case: str, wanted: list[tuple[float, float]], shape: InitialShap
         f"made within ± {1e3 * shape.tolerance:.3g} µm, pressures are within a tenth of their scale",
         columns_text([f"load {factor:g}:{share:g}" for factor, share in wanted], rows),
     ]
-    if shape.uneven_wear > SAME:
-        lines.append(
-            f"the loads reach different zones: their wear together is uneven by {100 * shape.uneven_wear:.2g} %"
-        )
     return "\n".join(lines)
 
 

@@ -10,7 +10,7 @@ pressures near the edges of the contact are far from that; how near they are is 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import comb
 
 import numpy as np
@@ -99,7 +99,32 @@ COEFFICIENTS_FAIL = (
     "the coefficients of friction and wear and the pressure they depend on did not converge. Use a weaker dependence "
     "on p, or a smoother table"
 )
+_Contact = tuple[ContactState, HeatState | None, HalfCycleHeat | None]
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
+
+
+@dataclass(frozen=True)
+class _Begin:
+    """The begin of a phase.
+
+    Attributes:
+        temperature: Of both bodies.
+        worn: Depths.
+        before: The same phase one cycle ago; None in the first cycle.
+        start: Where its contact is looked for; None from nothing.
+        near: Pressures there (n,), MPa: even ones where none are known. By edges of the contact those nodes touch that
+            carry one, as in a cycle ago: they do not go to and fro.
+        half_cycles: Done since the start of the run, in its middle.
+        cycle: Cross-shear and pressures a cycle ago; None in the first cycle.
+    """
+
+    temperature: HeatState
+    worn: WornDepths
+    before: ContactState | None
+    start: ContactState | None
+    near: Array
+    half_cycles: float
+    cycle: CycleShear | None
 
 
 @dataclass(frozen=True)
@@ -153,6 +178,7 @@ class PhaseStep:
         if self._follows or system.layers.closure is not None:
             modes = system.rigids[phase].rigid_normal.shape[1]
             self._onwards = Onwards(len(self._mu), modes, system.layers.closure, system.layers.hardness)
+        self._even = np.full(len(self._mu), system.rigid.mean_pressure)
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
     def solve(
@@ -179,139 +205,109 @@ class PhaseStep:
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
-        if self._at_begin is None:
-            return self._end_of(temperature, worn, before, load, half_cycles, near, cycle)
-        # Surfaces flow as soon as they are pressed, before anything wears.
-        pressed = self._at_begin.solve(temperature, worn, before, load, half_cycles, near, cycle)
-        flown = self.system.layers.flown_as(worn, worn + pressed.worn)
-        end = self._end_of(temperature, flown, before, load, half_cycles, near, cycle)
-        return replace(end, worn=end.worn + (flown - worn))
-
-    def _end_of(
-        self,
-        temperature: HeatState | None,
-        worn: WornDepths,
-        before: ContactState | None,
-        load: float,
-        half_cycles: float,
-        near: ContactState | None,
-        cycle: CycleShear | None,
-    ) -> PhaseEnd:
-        """Return the end of the phase, as `solve`."""
-        begin = self.system.exchange.own(temperature)
         if load != self._load:
             self._contact.press(load)
             self._load = load
-        gap = self.system.gap(self.phase, worn, passing=True)
         start = (before if self._onwards is None else self._onwards.start(before)) or near
+        pressure = self._even if start is None else start.pressure[0]
+        at = _Begin(self.system.exchange.own(temperature), worn, before, start, pressure, half_cycles, cycle)
+        if self._at_begin is None:
+            return self._end_of(at)
+        # Surfaces flow as soon as they are pressed, before anything wears.
+        pressed = self._at_begin.solve(temperature, worn, before, load, half_cycles, near, cycle)
+        flown = self.system.layers.flown_as(worn, worn + pressed.worn)
+        end = self._end_of(replace(at, worn=flown))
+        return replace(end, worn=end.worn + (flown - worn))
+
+    def _end_of(self, at: _Begin) -> PhaseEnd:
+        """Return the end of the phase."""
+        gap = self.system.gap(self.phase, at.worn, passing=True)
         if self._constant:
-            end = self._solve(begin, gap, start, self._passing, worn)
-            self._remember(before, end[0])
-            return self._end(*end, before, self._passing, worn)
-
-        near_pressure = None if start is None else start.pressure[0]
-        touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
+            return self._end(at, *self._solve(at, gap, self._passing), self._passing)
         if self._slides_before:  # friction is that of the state at the start
-            self._update(near_pressure, begin, worn, half_cycles, cycle, touching=touching)
+            self._update(at.near, at, touching=at.near > 0)
         if self._wears_after or self._slides_before:
-            contact, after, heat = self._solve(begin, gap, start, self._passing, worn)
-            passing = self._update(contact.pressure[0], begin, worn, half_cycles, cycle, ended=True)
-            self._remember(before, contact)
-            return self._end(contact, after, heat, before, passing, worn)
-
+            contact, after, heat = self._solve(at, gap, self._passing)
+            return self._end(at, contact, after, heat, self._update(contact.pressure[0], at, ended=True))
         if self._follows:
-            mu = self._friction_that_stays
-            if mu is None:
-                conditions = self._conditions(near_pressure, None, worn, half_cycles, cycle, touching)
-                mu = FollowingFriction(self.system.friction, conditions)
             try:
-                contact = self._following(mu, gap, start, worn)
+                return self._end_of_following(at, gap)
             except ConvergenceError:  # in turn they may come together yet
                 pass
-            else:
-                if self.system.edges is None:
-                    passing = self._taken(mu.at(contact.pressure[0]), worn, ended=True)
-                else:
-                    passing = self._update(contact.pressure[0], begin, worn, half_cycles, cycle, ended=True)
-                self._remember(before, contact)
-                return self._end(contact, None, None, before, passing, worn)
+        return self._end(at, *self._in_turn(at, gap))
 
-        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
-            nonlocal start
-            passing = self._update(pressure, begin, worn, half_cycles, cycle, touching=touching)
-            try:
-                contact, after, heat = self._solve(begin, gap, start, passing, worn)
-            except ConvergenceError as error:
-                largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
-                raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
-            start = contact
-            return contact.pressure[0], (contact, after, heat, passing), False
-
-        mean = np.full(len(gap), self.system.rigid.mean_pressure)
-        contact, after, heat, passing = fixed_point(
-            solve,
-            mean if start is None else start.pressure[0],
-            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
-            COEFFICIENTS_FAIL,
-            team=self.system.team,
-        )
-        self._remember(before, contact)
-        return self._end(contact, after, heat, before, passing, worn)
-
-    def _following(
-        self, mu: FollowingFriction, gap: Array, start: ContactState | None, worn: WornDepths
-    ) -> ContactState:
-        """Return the contact whose friction follows its pressure.
+    def _end_of_following(self, at: _Begin, gap: Array) -> PhaseEnd:
+        """Return the end of the phase whose friction follows its pressure.
 
         Raises:
             ConvergenceError: Newton's method does not find both together.
         """
+        mu = self._friction_that_stays
+        if mu is None:
+            conditions = self._conditions(at.near, None, at, at.near > 0)
+            mu = FollowingFriction(self.system.friction, conditions)
+        contact = self._following(mu, at, gap)
+        if self.system.edges is None:
+            passing = self._taken(mu.at(contact.pressure[0]), at.worn, ended=True)
+        else:
+            passing = self._update(contact.pressure[0], at, ended=True)
+        return self._end(at, contact, None, None, passing)
+
+    def _in_turn(self, at: _Begin, gap: Array) -> _Solved:
+        """Return contact, heat and coefficients that belong together, found in turn.
+
+        Raises:
+            ConvergenceError: they do not converge.
+        """
+
+        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
+            nonlocal at
+            passing = self._update(pressure, at, touching=at.near > 0)
+            try:
+                contact, after, heat = self._solve(at, gap, passing)
+            except ConvergenceError as error:
+                largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
+                raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
+            at = replace(at, start=contact)
+            return contact.pressure[0], (contact, after, heat, passing), False
+
+        return fixed_point(
+            solve,
+            at.near,
+            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
+            COEFFICIENTS_FAIL,
+            team=self.system.team,
+        )
+
+    def _following(self, mu: FollowingFriction, at: _Begin, gap: Array) -> ContactState:
+        """Return the contact whose friction follows its pressure."""
         assert isinstance(self._contact, CondensedContact)
         self._contact.follow(mu, self._bare, self._along)
         if self.system.layers.hardness == np.inf:
-            return self._contact.solve(gap, start, self._passing.step(worn, implicit=self.implicit))
-        solve = self._capped if self._contact.most < np.inf else partial(self._flowing, self._contact)
-        contact, _, _ = solve(self.system.exchange.initial(), gap, start, self._passing, worn)
-        return contact
-
-    def _remember(self, before: ContactState | None, contact: ContactState) -> None:
-        """Keep the contact, where the next one is extrapolated from those of the last cycles."""
-        if self._onwards is not None:
-            self._onwards.keep(before, contact)
+            return self._contact.solve(gap, at.start, self._passing.step(at.worn, implicit=self.implicit))
+        if self._contact.most < np.inf:
+            return self._capped(at, gap, self._passing)[0]
+        return self._flowing(self._contact, at, gap, self._passing)[0]
 
     def _update(
-        self,
-        pressure: Array | None,
-        temperature: HeatState,
-        worn: WornDepths,
-        half_cycles: float,
-        cycle: CycleShear | None,
-        *,
-        ended: bool = False,
-        touching: Mask | None = None,
+        self, pressure: Array, at: _Begin, *, ended: bool = False, touching: Mask | None = None
     ) -> LayerEvolution:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
 
         Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
         that touch, by default those that carry this pressure.
         """
-        surfaces = self.system.exchange.contact_temperatures(temperature, self.phase - 1)
-        conditions = self._conditions(pressure, surfaces, worn, half_cycles, cycle, touching)
-        return self._taken(conditions, worn, ended=ended)
+        surfaces = self.system.exchange.contact_temperatures(at.temperature, self.phase - 1)
+        return self._taken(self._conditions(pressure, surfaces, at, touching), at.worn, ended=ended)
 
     def _conditions(
-        self,
-        pressure: Array | None,
-        surfaces: tuple[Array, Array] | None,
-        worn: WornDepths,
-        half_cycles: float,
-        cycle: CycleShear | None,
-        touching: Mask | None,
+        self, pressure: Array, surfaces: tuple[Array, Array] | None, at: _Begin, touching: Mask | None
     ) -> ContactConditions:
         """Return what coefficients depend on, as `Tribosystem.conditions`."""
-        if self._staying is None or pressure is None:
-            return self.system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
-        return self._staying.pressed(pressure, self.system.layers.facing(self.system.pairs[self.phase], worn))
+        system, worn = self.system, at.worn
+        if self._staying is None:
+            return system.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)
+        return self._staying.pressed(pressure, system.layers.facing(system.pairs[self.phase], worn))
 
     @cached_property
     def _friction_that_stays(self) -> FollowingFriction | None:
@@ -352,59 +348,37 @@ class PhaseStep:
         """The contact whose surfaces flow by and by."""
         return self.system.passed_contact(self.phase, capped=False)
 
-    def _solve(
-        self,
-        temperature: HeatState,
-        gap: Array,
-        start: ContactState | None,
-        passing: LayerEvolution,
-        worn: WornDepths,
-    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+    def _solve(self, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
         contact = self._contact
         if self.system.layers.hardness == np.inf:
-            wearing = passing.step(worn, implicit=self.implicit)
-            return self._thermal.solve(temperature, gap, start, wearing)
+            wearing = passing.step(at.worn, implicit=self.implicit)
+            return self._thermal.solve(at.temperature, gap, at.start, wearing)
         if isinstance(contact, CondensedContact) and contact.most < np.inf:
             try:
-                return self._capped(temperature, gap, start, passing, worn)
+                return self._capped(at, gap, passing)
             except ConvergenceError:  # so much flows that too little else carries on the way to the solution
                 contact = self._uncapped
                 contact.press(self._load)
                 contact.slide([self._friction_ratio])
-        return self._flowing(contact, temperature, gap, start, passing, worn)
+        return self._flowing(contact, at, gap, passing)
 
-    def _capped(
-        self,
-        temperature: HeatState,
-        gap: Array,
-        start: ContactState | None,
-        passing: LayerEvolution,
-        worn: WornDepths,
-    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+    def _capped(self, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
         """Return the end of a phase whose contact lets no pressure beyond the hardness."""
-        wearing = passing.step(worn, implicit=self.implicit, capped=True)
-        contact, after, heat = self._thermal.solve(temperature, gap, start, wearing)
+        wearing = passing.step(at.worn, implicit=self.implicit, capped=True)
+        contact, after, heat = self._thermal.solve(at.temperature, gap, at.start, wearing)
         self._flowed = self.system.layers.flowed(contact.pressure[0], contact.gap[0])
         return replace(contact, gap=contact.gap + self._flowed), after, heat
 
-    def _flowing(
-        self,
-        solver: ContactSolver,
-        temperature: HeatState,
-        gap: Array,
-        start: ContactState | None,
-        passing: LayerEvolution,
-        worn: WornDepths,
-    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+    def _flowing(self, solver: ContactSolver, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
         """Return the end of a phase whose contact flows by and by."""
-        wearing, near, thermal = passing.step(worn, implicit=self.implicit), start, self._thermal
+        wearing, near, thermal = passing.step(at.worn, implicit=self.implicit), at.start, self._thermal
         if solver is not self._contact:
             thermal = self._kind(self.system, self.phase, solver)
             thermal.slide(heating_friction(self.system, self._mu, self.phase))
 
-        def solve(flowed: Array) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+        def solve(flowed: Array) -> _Contact:
             nonlocal near
-            found = thermal.solve(temperature, gap + flowed, near, wearing)
+            found = thermal.solve(at.temperature, gap + flowed, near, wearing)
             near = found[0]
             return found
 
@@ -413,26 +387,27 @@ class PhaseStep:
 
     def _end(
         self,
+        at: _Begin,
         contact: ContactState,
         temperature: HeatState | None,
         heat: HalfCycleHeat | None,
-        before: ContactState | None,
         passing: LayerEvolution,
-        worn: WornDepths,
     ) -> PhaseEnd:
-        previous = None if before is None else before.pressure[0]
+        if self._onwards is not None:
+            self._onwards.keep(at.before, contact)
         alike = self.system.friction.constant and passing.wear is self._passing.wear
         meter = self._meter if alike else self._meter.at(self._mu, passing.wear)
 
         def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]
-            lost = passing.worn(contact.pressure, worn, flowed=self._flowed)
+            lost = passing.worn(contact.pressure, at.worn, flowed=self._flowed)
             creep = self.system.creep
             if creep.creeps:
-                crept = creep.change(self.phase, worn.crept, pressure, self._friction_ratio, self._load)
+                crept = creep.change(self.phase, at.worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)
             return with_coated(self.system, meter(pressure), lost), lost
 
         adds, lost = self.system.team.lead(left)
+        previous = None if at.before is None else at.before.pressure[0]
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
-from fenwear.arrays import Array, Mask
+from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
 from fenwear.cycle.coupled import cycle_heat, touching
-from fenwear.cycle.tangent import lies_after, phase_tangent
+from fenwear.cycle.tangent import answered, lies_after, phase_tangent
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
@@ -72,9 +72,8 @@ def growth_rate(
         CaseError: a coefficient is negative or not finite there, or the pressures are of other phases or nodes.
         ConvergenceError: friction and the temperatures that it depends on do not come together, or numbers overflow.
     """
-    pressure, conductances = _parts(system, state, conductances)
-    system = with_reduced_heat(system)  # before rank 0 leads
-    return system.team.lead(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
+    rates = _rates(system, state, conductances, implicit=implicit)
+    return float(rates[0]) if len(rates) else 0.0  # as where all that is worn stays, and fills what it opens
 
 
 def decay_rates(system: Tribosystem, state: Array | StationaryState, conductances: Array | None = None) -> Array:
@@ -83,11 +82,19 @@ def decay_rates(system: Tribosystem, state: Array | StationaryState, conductance
     Real parts; those that neither grow nor decay, such as rigid motions of the shape, and those that are gone after a
     cycle are left out. Arguments and errors as of `growth_rate`, which is the first of them.
     """
+    rates = _rates(system, state, conductances)
+    return rates[rates > np.log(ROUNDING) / system.motion.period]
+
+
+def _rates(
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None, *, implicit: bool = True
+) -> Array:
+    """Return the rates of the disturbances that a cycle changes, 1/s, the largest first; collective."""
     pressure, conductances = _parts(system, state, conductances)
-    system = with_reduced_heat(system)
-    sizes = np.abs(system.team.lead(partial(_factors, system, pressure, conductances, implicit=True)))
-    counted = (np.abs(sizes - 1) > NEUTRAL) & (sizes > ROUNDING)
-    return np.sort(np.log(sizes[counted]) / system.motion.period)[::-1]
+    system = with_reduced_heat(system)  # before rank 0 leads
+    values = system.team.lead(partial(_factors, system, pressure, conductances, implicit=implicit))
+    sizes = np.abs(values[np.abs(values - 1.0) > NEUTRAL])
+    return np.sort(np.log(np.maximum(sizes, 1e-300)) / system.motion.period)[::-1]
 
 
 def _parts(
@@ -108,14 +115,6 @@ def _parts(
         message = f"expected pressures of {shape[0]} phases at {shape[1]} nodes, as `SteadyState.phase_pressure`"
         raise CaseError(InputError("state", f"{message}, got {pressure.shape}"))
     return pressure, own if conductances is None else conductances
-
-
-def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:
-    values = _factors(system, pressure, conductances, implicit=implicit)
-    counted = np.abs(values - 1.0) > NEUTRAL
-    if not counted.any():  # as where all that is worn stays, and fills what it opens
-        return 0.0
-    return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
 
 
 def _factors(
@@ -299,18 +298,17 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
     Raises:
         CaseError: the case has no heat, or a body no heat sink.
     """
-    n = len(system.pair.weights)
-    everywhere = np.ones(n, dtype=bool)
-    friction_ratio = system.friction_ratio(direction)
-    compliance = system.interface.compliance(friction_ratio).matrix()
-    stiffness = _restricted_stiffness(system, friction_ratio, compliance, everywhere)
+    n, rigid, friction_ratio = len(system.pair.weights), system.rigid, system.friction_ratio(direction)
+    compliance, balance = system.interface.compliance(friction_ratio).matrix(), rigid.equilibrium(friction_ratio)
+    everywhere, none = np.ones(n, dtype=bool), np.zeros((len(balance), n))
+    pressed = answered(system.interface, compliance, balance, everywhere, np.eye(n), none)
     speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed
         exchange = steady_exchange(system, [direction * speed])
         uniform = np.full(n, system.rigid.mean_pressure)
         states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
         thermal = exchange.gap_change(states) / speed
-        before, speed = speed, system.team.lead(partial(_unstable_speed, stiffness, thermal))
+        before, speed = speed, system.team.lead(partial(_unstable_speed, pressed, thermal))
         if np.isinf(speed):
             break
         if abs(speed - before) < 1e-6 * speed:
@@ -318,24 +316,9 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
     return speed
 
 
-def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance: Array, closed: Mask) -> Array:
-    """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
-    rigid = system.rigid
-    nodes = np.flatnonzero(closed)
-    k, r = len(nodes), rigid.rigid_normal.shape[1]
-    scale = system.interface.elastic_length
-    matrix = np.zeros((k + r, k + r))
-    matrix[:k, :k] = compliance[np.ix_(nodes, nodes)] / scale
-    matrix[:k, k:] = rigid.rigid_normal[nodes]
-    matrix[k:, :k] = rigid.equilibrium(friction_ratio)[:, nodes]
-    stiffness = np.zeros((len(closed), len(closed)))
-    stiffness[np.ix_(nodes, nodes)] = np.linalg.inv(matrix)[:k, :k] / scale
-    return stiffness
-
-
-def _unstable_speed(stiffness: Array, thermal: NDArray[Any]) -> float:
-    """Return the lowest V of p = -V X Theta p; infinite where there is none."""
-    values = np.linalg.eigvals(-stiffness @ thermal)
+def _unstable_speed(pressed: Array, thermal: NDArray[Any]) -> float:
+    """Return the lowest V of p = -V X Theta p, -X the pressures of unit gaps; infinite where there is none."""
+    values = np.linalg.eigvals(pressed @ thermal)
     growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
     return float(1 / growing.max()) if len(growing) else float("inf")
 

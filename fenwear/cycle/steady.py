@@ -21,7 +21,7 @@ Where properties of materials depend on the temperature, state and bodies follow
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -454,61 +454,30 @@ def running_in(
         jumps: Tolerance of the jumps over the fraction.
         ends: Of a problem nearby, whose jumps this one is to follow: the result is then smooth in what they differ by.
     """
-    phases = len(state.directions)
-    if ends:
-        return _along(system, state, fraction, tuple(ends))
-    on_the_way: list[int] = []
     goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
-    low: _Passed | None = None
-    for block in jump(system, limit * phases, tolerance=jumps * fraction, block=phases):
-        high = _Passed.of(block, state)
+    way, tolerance = _Way(system, state, goal), jumps * fraction
+    if ends:  # of which the last two are near to the level
+        start = replace(beginning(system), jump_length=ends[-1])
+        *_, low, high = way.passed(ends[-1], np.inf, start, ends)
+        return RunningIn(way.leads(low.meets, high), np.inf, tuple(ends))
+    before = list[_Passed]()
+    for high in way.passed(limit, tolerance):
         if high.distance < goal:
             break
-        low = high
-        on_the_way.append(low.cycles)
+        before.append(high)
     else:
         return None
-    if low is None or high.distance == 0:
+    if not before or high.distance == 0:
         return RunningIn(high.cycles, high.cycles)
-    tolerance, first = jumps * fraction, low
-    cycles = before = system.team.lead(partial(low.until, high, goal))  # a logarithm may have other bits on other ranks
-    for _ in range(REFINED):
-        if not low.cycles < round(cycles) < high.cycles:
-            break
-        *_, block = jump(system, round(cycles) * phases, tolerance=tolerance, block=phases, start=low.end)
-        between, before = _Passed.of(block, state), cycles
-        low, high = (low, between) if between.distance < goal else (between, high)
-        cycles = system.team.lead(partial(low.until, high, goal))
-        if abs(cycles - before) < SETTLED * cycles:
-            break
-    life = (high.cycles - low.cycles) / max(np.log(low.distance / max(high.distance, 1e-300)), 1e-300)
+    first = before[-1]
+    cycles, uncertainty = way.across(first, high, tolerance, jumps)
     near = max(round(cycles), first.cycles + 1)
-    stops = (near, near + max(1, round(BESIDE * cycles)))
-    blocks = jump(
-        system,
-        stops[1] * phases,
-        tolerance=tolerance,
-        block=phases,
-        start=first.end,
-        stops=frozenset(phases * stop for stop in stops),
-    )
-    passed = [_Passed.of(block, state) for block in blocks]
-    reached = system.team.lead(partial(passed[-2].meets, passed[-1], goal))
+    stops = near, near + max(1, round(BESIDE * cycles))
+    passed = list(way.passed(stops[1], tolerance, first.end, stops))
+    reached = way.leads(passed[-2].meets, passed[-1])
     if not np.isfinite(reached):
-        return RunningIn(cycles, jumps * life + abs(cycles - before))
-    ways = (*on_the_way, *(one.cycles for one in passed))
-    return RunningIn(reached, jumps * life + abs(cycles - before), ways)
-
-
-def _along(system: Tribosystem, state: SteadyState, fraction: float, ends: tuple[int, ...]) -> RunningIn:
-    """Return the same by the jumps of a problem nearby, of which the last two are near to the level; collective."""
-    phases = len(state.directions)
-    goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
-    start = replace(beginning(system), jump_length=ends[-1])
-    stops = frozenset(phases * end for end in ends)
-    blocks = jump(system, ends[-1] * phases, tolerance=np.inf, block=phases, start=start, stops=stops)
-    *_, low, high = (_Passed.of(block, state) for block in blocks)
-    return RunningIn(system.team.lead(partial(low.meets, high, goal)), np.inf, ends)
+        return RunningIn(cycles, uncertainty)
+    return RunningIn(reached, uncertainty, tuple(one.cycles for one in (*before, *passed)))
 
 
 @dataclass(frozen=True)
@@ -543,3 +512,51 @@ class _Passed:
         decayed = np.log(self.distance / max(later.distance, 1e-300))
         share = np.log(self.distance / goal) / decayed if decayed > 0 else 1.0
         return self.cycles + float(np.clip(share, 0.0, 1.0)) * (later.cycles - self.cycles)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """The way to a steady state.
+
+    Attributes:
+        system: The assembled problem.
+        state: The steady state.
+        goal: Distance of the pressures from its own, MPa.
+    """
+
+    system: Tribosystem
+    state: SteadyState
+    goal: float
+
+    def passed(
+        self, until: int, tolerance: float, start: RunState | None = None, stops: Sequence[int] = ()
+    ) -> Iterator[_Passed]:
+        """Yield the ends of the jumps of a run of so many cycles, which stop at some of them; collective."""
+        phases = len(self.state.directions)
+        ends = frozenset(phases * stop for stop in stops)
+        for block in jump(self.system, until * phases, tolerance=tolerance, block=phases, start=start, stops=ends):
+            yield _Passed.of(block, self.state)
+
+    def leads(self, law: Callable[[_Passed, float], float], later: _Passed) -> float:
+        """Return where a law of decay to a later end is the goal: a logarithm may have other bits on other ranks."""
+        return self.system.team.lead(partial(law, later, self.goal))
+
+    def across(self, low: _Passed, high: _Passed, tolerance: float, share: float) -> tuple[float, float]:
+        """Return the cycles at the goal between two ends, by jumps made again to there, and their uncertainty.
+
+        Args:
+            low, high: The ends.
+            tolerance: Of the jumps.
+            share: Of the goal, that it is.
+        """
+        cycles = before = self.leads(low.until, high)
+        for _ in range(REFINED):
+            if not low.cycles < round(cycles) < high.cycles:
+                break
+            *_, between = self.passed(round(cycles), tolerance, low.end)
+            low, high = (low, between) if between.distance < self.goal else (between, high)
+            before, cycles = cycles, self.leads(low.until, high)
+            if abs(cycles - before) < SETTLED * cycles:
+                break
+        life = (high.cycles - low.cycles) / max(np.log(low.distance / max(high.distance, 1e-300)), 1e-300)
+        return cycles, share * life + abs(cycles - before)

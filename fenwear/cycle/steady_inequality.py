@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -34,9 +35,7 @@ UNBALANCED = 0.3  # of the mean pressure times the surface: from there on a star
 APART = 1e-9  # of gaps by rigid motions: what is rounding
 AT_ONCE = 30  # Newton iterations, before the wear is followed and in its steps
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
-
-# Unknowns, their residual, Newton iterations, the largest pressure without a cap, and what failed.
-_Found = tuple[Array, Array, int, float, ConvergenceError | None]
+NO_STEP = 0.0, 0.0
 
 
 class SteadyInequality:
@@ -81,7 +80,7 @@ class SteadyInequality:
         self.peak_without_cap = 0.0
         self._solved = False
         # Of a step towards the state: the inverse of its length, and the shape where it begins.
-        self._step: tuple[float, Array] | None = None
+        self._step: tuple[float, Array | float] = NO_STEP
         self.inequality = Inequality(
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
@@ -133,9 +132,8 @@ class SteadyInequality:
         f = self.equations.multiply(x) + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
-        if self._step is not None:
-            inverse, before = self._step
-            f[self.omega] += inverse * (x[self.omega] - before)
+        inverse, before = self._step
+        f[self.omega] += inverse * (x[self.omega] - before)
         # A rim that looks square to the motion, where nothing wears, either: rounding would drive it for ever.
         still = (pressure.max(axis=0) <= AT_BOUND * self.p_scale) & (np.abs(f[self.omega]) < GRAZING)
         f[self.omega] = np.where(still, 0.0, f[self.omega])
@@ -168,9 +166,7 @@ class SteadyInequality:
         pressure = x[: self.m * self.n].reshape(self.m, self.n)
         slopes = self.wear.slopes(pressure * self.p_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
-        held = np.where(pressure.max(axis=0) <= AT_BOUND, DRIVE, 0.0)
-        if self._step is not None:
-            held += self._step[0]
+        held = np.where(pressure.max(axis=0) <= AT_BOUND, DRIVE, 0.0) + self._step[0]
         layer = None if self.closure is None else self.closure.slope(pressure * self.p_scale)
         known = self._known
         if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
@@ -203,15 +199,8 @@ class SteadyInequality:
             scale = self.p_scale / self.gap_scale
             by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
             self.equations, self._known = self.equations.with_heat(by_heat), None
-        failure: ConvergenceError | None = None
-        if not (follow := self._may_follow and self._far):
-            self.x, f, iterations, self.peak_without_cap, failure = self._found()
-            follow = failure is not None and self._may_follow
-        if follow:
-            contact = self.system.phase_contact(range(m))
-            self.x, f, iterations, self.peak_without_cap, failure = self._followed(contact)
-        if failure is not None:
-            raise failure
+        self.x = self._found()
+        f, iterations = self.inequality.residual, self.inequality.iterations
         self._solved = True
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
         return ContactState(pressure, gap, np.zeros((m, self.r)), iterations)
@@ -228,24 +217,24 @@ class SteadyInequality:
         loads = self._cold[(self.m + 1) * self.n :].reshape(forces.shape)
         return bool(np.abs(forces + loads).max(initial=0.0) > UNBALANCED)
 
-    def _found(self) -> _Found:
-        """Return what is found from the last unknowns, or from the start."""
-        x = self.x
-        if self.m == 1 or not self._solved:
-            x = self._touching(x)
-        return self._from(x, AT_ONCE if self._may_follow else None)
+    def _found(self) -> Array:
+        """Return the unknowns found from the last ones, or from the start, or where the wear leads.
 
-    def _from(self, x: Array, most: int | None = None, *, near: bool = False) -> _Found:
-        """Return what Newton's method finds from a start, within so many iterations."""
-        failure = None
-        try:
-            x = self._newton(x, most, near=near or self._solved)
-        except ConvergenceError as error:  # raised where all ranks know how far it came
-            failure = error
-        return x, self.inequality.residual, self.inequality.iterations, self.peak_without_cap, failure
+        Raises:
+            ConvergenceError: none are found.
+        """
+        follows = self._may_follow
+        if not (follows and self._far):
+            self.x = self._touching(self.x) if self.m == 1 or not self._solved else self.x
+            try:
+                return self._newton(self.x, AT_ONCE if follows else None, near=self._solved)
+            except ConvergenceError:
+                if not follows:
+                    raise
+        return self._followed(self.system.phase_contact(range(self.m)))
 
-    def _followed(self, contact: ContactSolver) -> _Found:
-        """Return what is found from where the wear leads, followed by implicit steps of ever more cycles.
+    def _followed(self, contact: ContactSolver) -> Array:
+        """Return the unknowns found from where the wear leads, followed by implicit steps of ever more cycles.
 
         Where loads and motions change much over a cycle no even pressure is near its end, and sets of nodes in contact
         go round from it. Source: pseudo-transient continuation, C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35,
@@ -263,18 +252,19 @@ class SteadyInequality:
             try:
                 solved = contact.solve(moved + omega * self.gap_scale, solved, StepWear(self.wear, cycles))
             except ConvergenceError:
-                return self._from(begin)
+                return self._newton(begin, None, near=False)
             worn = self.wear.opening(solved.pressure)[0] / self.wear_scale
             omega = omega + length * worn
             x = self._unknowns(solved, omega, worn)
         for length in LONGER:
             self._step = 1 / length, x[self.omega].copy()
-            found = self._from(x, AT_ONCE, near=True)
-            if found[-1] is None:
-                x = found[0]
-        self._step = None
-        found = self._from(x, AT_ONCE, near=True)
-        return found if found[-1] is None else self._from(begin)
+            with suppress(ConvergenceError):
+                x = self._newton(x, AT_ONCE, near=True)
+        self._step = NO_STEP
+        try:
+            return self._newton(x, AT_ONCE, near=True)
+        except ConvergenceError:
+            return self._newton(begin, None, near=False)
 
     def _unknowns(self, contact: ContactState, omega: Array, worn: Array) -> Array:
         """Return the unknowns of contacts on a shape omega (n,) that wears by `worn` (n,) a cycle, both scaled."""

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Creep, Tribosystem, heating_friction
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
-from fenwear.interface import Compliance
+from fenwear.interface import Compliance, Interface
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear, WornDepths
@@ -73,8 +73,6 @@ def phase_tangent(
     gap_by_s = np.hstack([gap_by_s + crept.gap_by_heat, crept.gap_by_state])
     state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
     state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
-    closed = pressure > 0
-    k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p
     by_state = by_mu @ traction_s + gap_by_s + before_s
     slope = system.layers.slope(pressure[None])
@@ -82,21 +80,35 @@ def phase_tangent(
         opened = opened + np.diag(slope[0])
     if implicit:
         opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
-    matrix: Array = np.zeros((k + r, k + r))
-    matrix[:k, :k] = opened[np.ix_(closed, closed)] / scale
-    matrix[:k, k:] = rigid.rigid_normal[closed]
-    matrix[k:, :k] = (rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p)[:, closed]
-    disturbance: Array = np.zeros((k + r, dim + n))
-    disturbance[:k, :dim] = by_state[closed] / scale
-    disturbance[:k, dim:] = np.eye(n)[closed] / scale
-    disturbance[k:, :dim] = balance_by_mu @ traction_s
-    answer: Array = np.zeros((n, dim + n))
-    answer[closed] = -np.linalg.solve(matrix, disturbance)[:k]
+    balance = rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p
+    gap: Array = np.hstack([by_state, np.eye(n)])
+    missing: Array = np.hstack([balance_by_mu @ traction_s, np.zeros((len(balance), n))])
+    answer = answered(interface, opened, balance, pressure > 0, gap, missing)
     change: Array = np.zeros((dim + n, dim + n))
     change[:dim, :dim], change[dim:, :dim], change[dim:, dim:] = state_s, laws.worn_s, np.eye(n)
     change[:dim] += state_p @ answer
     change[dim:] += laws.worn_p @ answer
     return change
+
+
+def answered(interface: Interface, opened: Array, balance: Array, closed: Mask, gap: Array, missing: Array) -> Array:
+    """Return the pressures (n, q) that q disturbances make where nodes stay closed, and the loads balanced.
+
+    Args:
+        interface: The surfaces.
+        opened: Gap by the pressures (n, n).
+        balance: E, forces along the rigid motions by the pressures (r, n).
+        closed: Which nodes are (n,).
+        gap: By each disturbance (n, q).
+        missing: Of the balance, by each (r, q).
+    """
+    modes, scale, k = interface.rigid.rigid_normal, interface.elastic_length, int(closed.sum())
+    matrix: Array = np.zeros((k + len(balance),) * 2)
+    matrix[:k, :k], matrix[:k, k:] = opened[np.ix_(closed, closed)] / scale, modes[closed]
+    matrix[k:, :k] = balance[:, closed]
+    found: Array = np.zeros(gap.shape)
+    found[closed] = -np.linalg.solve(matrix, np.vstack([gap[closed] / scale, missing]))[:k]
+    return found
 
 
 def lies_after(
@@ -211,33 +223,54 @@ def _laws(
     picked, rate = _picked(heat, phase), heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
+    found = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
     if not lies:
-        return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
-    debris, pair = system.layers.debris, system.pairs[phase]
-    reads, puts = np.eye(n), np.eye(n)
-    if system.layers.strip_carries:
-        reads, puts = pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
-    path, taken, thickness = (
-        system.path[phase],
-        depths(*around).sum(axis=0),
-        system.layers.lies(worn or system.unworn()),
+        return found
+    debris, taken = system.layers.debris, depths(*around).sum(axis=0)
+    by_lost = _slopes(lambda *values: debris.lost(at(*values)), around)
+    left, (lies_p, *lies_t, lies_here), reads = _lying(
+        system, phase, conditions, by_depths, by_lost, taken, worn or system.unworn()
     )
-    over = debris.over(path[None], [conditions], system.layers.places([pair]))
-    # Of what is fed, by what is worn at the nodes of the contact, to pressure, temperatures and thickness there.
-    put = over.slope(None)[0][:, None] * puts
-    lies_p, *lies_t, lies_here = (put * slope.sum(axis=0) for slope in by_depths)
-    if system.layers.varies:
-        by_loss = over.by_loss(thickness, (puts @ taken)[None])[:, None] * puts * path
-        more_p, *more_t, more_here = (
-            by_loss * slope for slope in _slopes(lambda *values: debris.lost(at(*values)), around)
-        )
-        lies_p, lies_here = lies_p + more_p, lies_here + more_here
-        lies_t = [own + more for own, more in zip(lies_t, more_t, strict=True)]
-    lies_s: Array = np.hstack(
-        [(np.array(lies_t) @ picked).sum(axis=0), np.diag(np.exp(-over.loss)) + lies_here @ reads]
-    )
+    lies_s: Array = np.hstack([(np.array(lies_t) @ picked).sum(axis=0), left + lies_here @ reads])
     mu_s, worn_s = np.hstack([mu_s, mu_t[2][:, None] * reads]), np.hstack([worn_s, worn_t[2] @ reads])
-    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, (lies_p, lies_s, reads))
+    return replace(found, mu_s=mu_s, worn_s=worn_s, lies=(lies_p, lies_s, reads))
+
+
+def _lying(
+    system: Tribosystem,
+    phase: int,
+    conditions: ContactConditions,
+    by_depths: Sequence[Array],
+    by_lost: Sequence[Array],
+    taken: Array,
+    worn: WornDepths,
+) -> tuple[Array, list[Array], Array]:
+    """Return what becomes of debris in a phase.
+
+    Args:
+        system: The assembled problem.
+        phase: Its number.
+        conditions: In it.
+        by_depths, by_lost: Derivatives of what both bodies lose and of what is lost over a unit of sliding, to the
+            pressure, the temperatures and the thickness of debris at the nodes of the contact.
+        taken: What both bodies lose (n,), mm.
+        worn: With the debris at the start.
+
+    Returns:
+        What is left of it (L, L), its derivatives at the end to the same (L, n), and what of it lies at the contact's
+        nodes (n, L).
+    """
+    layers, pair, path = system.layers, system.pairs[phase], system.path[phase]
+    reads, puts = np.eye(len(path)), np.eye(len(path))
+    if layers.strip_carries:
+        reads, puts = pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
+    over, thickness = layers.debris.over(path[None], [conditions], layers.places([pair])), layers.lies(worn)
+    fed = over.slope(None)[0][:, None] * puts
+    ends = [fed * own.sum(axis=0) for own in by_depths]
+    if layers.varies:
+        by_loss = over.by_loss(thickness, (puts @ taken)[None])[:, None] * puts * path
+        ends = [end + by_loss * more for end, more in zip(ends, by_lost, strict=True)]
+    return np.diag(np.exp(-over.loss)), ends, reads
 
 
 class _Creeping(NamedTuple):

@@ -25,7 +25,7 @@ from fenwear.cycle import (
     stationary_growth,
 )
 from fenwear.cycle.program import at_loads
-from fenwear.cycle.state import RunState, joined, on_other_grid
+from fenwear.cycle.state import RunState, all_phases, on_other_grid
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import (
     CaseError,
@@ -251,8 +251,9 @@ class _Run:
 
     def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
         """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
-        contacts = None if state is None else joined(state.contacts)
-        known = (None, None) if state is None or contacts is None else (contacts.pressure, state.temperature)
+        known = (None, None)
+        if state is not None and len(pressure := all_phases(state.contacts).pressure):
+            known = pressure, state.temperature
         for warning in self._heat_watch.see(system, *known):
             self.log(f"warning: {warning}")
         self.extremes.update(self._heat_watch.numbers)
@@ -407,7 +408,7 @@ class _Run:
 
     def _warnings_at_the_end(self, last: Block) -> list[str]:
         """Return the warnings of the case, of all stages and half-cycles; log those of all time steps; collective."""
-        if joined(self.state.contacts) is not None:  # a first half-cycle is no cycle
+        if len(all_phases(self.state.contacts).pressure):  # a first half-cycle is no cycle
             self._see_heat(self.system, self.state)
         texts = unique_text(np.concatenate(self.unique)), sliding_text(last), passing_text(last)
         found = [*(text for text in texts if text), *self._level.missed(self.state.half_cycle)]
@@ -478,13 +479,13 @@ class _Run:
 
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
-        contacts, motion = joined(self.state.contacts), self.system.motion
-        if last.heat is None or contacts is None or self.system.track_changes or self.system.sticks:
+        pressure, motion = all_phases(self.state.contacts).pressure, self.system.motion
+        if last.heat is None or not len(pressure) or self.system.track_changes or self.system.sticks:
             return ""
         surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
         phase = self.state.half_cycle % motion.half_cycles * motion.positions
         change = float(last.periodicity[-motion.half_cycles :].max())
-        rate, reason = stationary_growth(self.system, contacts.pressure, surfaces, phase, change)
+        rate, reason = stationary_growth(self.system, pressure, surfaces, phase, change)
         if rate is not None:
             self.numbers["growth_rate_per_s"] = rate
         return reason

@@ -19,7 +19,7 @@ from fenwear.assembly import with_reduced_heat
 from fenwear.contact.inequality import Inequality
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, growth_rate, stability_number
 from fenwear.cycle import state as cycle_state
-from fenwear.cycle.jump_error import Sizes
+from fenwear.cycle.jump_method import Sizes
 from fenwear.errors import InputError, RanksError
 from fenwear.heat.fluxes import FluxFactor
 from fenwear.parallel import Team, on_root, total

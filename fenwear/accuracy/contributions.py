@@ -34,7 +34,7 @@ from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.case import Case
 from fenwear.cycle import Block, SteadyState, steady
 from fenwear.cycle.driver import Watch, unwatched
-from fenwear.cycle.state import RunState, joined, pressure_scale
+from fenwear.cycle.state import RunState, all_phases, pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.results.quantity import KELVIN, degrees_of
 from fenwear.results.registry import known
@@ -367,12 +367,12 @@ def _with_steps(last: Block, finer: RunState) -> Block:
 
 def _with_pressures(last: Block, finer: RunState) -> Block:
     """Return a block with the pressures of another state in its last cycle."""
-    motion, contacts = last.system.motion, [joined(state.contacts) for state in (last.end, finer)]
-    if contacts[0] is None or contacts[1] is None:
+    motion, (own, other) = last.system.motion, (all_phases(state.contacts).pressure for state in (last.end, finer))
+    if not len(own) or not len(other):
         return last
     middle = slice(motion.positions // 2, None, motion.positions)
     pressure = last.pressure.copy()
-    pressure[-motion.half_cycles :] -= (contacts[0].pressure - contacts[1].pressure)[middle]
+    pressure[-motion.half_cycles :] -= (own - other)[middle]
     return replace(last, pressure=np.maximum(pressure, 0.0))
 
 

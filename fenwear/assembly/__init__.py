@@ -28,6 +28,7 @@ from fenwear.assembly.growing import (
     regridded,
     relaid,
     with_room,
+    with_what_grows,
 )
 from fenwear.assembly.laws import ContactLaw, law_named, register_contact_law
 from fenwear.assembly.placing import place, place_at_rest, place_case_bodies
@@ -122,4 +123,5 @@ __all__ = [
     "with_exchange",
     "with_reduced_heat",
     "with_room",
+    "with_what_grows",
 ]

@@ -9,8 +9,10 @@ stages of a program continue with the grid of the stage before; each begins with
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,8 @@ from fenwear.bodies.grid import RegularGrid
 from fenwear.case import CONDENSED, Case
 from fenwear.case.program import stages_of
 from fenwear.sliding.wear import WornDepths
+
+T = TypeVar("T")
 
 ROOM, NEAR = 0.25, 0.08  # of the contact's width beside it: what a new grid has, and below which a larger one is due
 TRIES = 8  # of grids around the first contact
@@ -126,6 +130,23 @@ def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
     if not coarser:  # what it has stays
         wider = np.minimum(wider[0], 0), np.maximum(wider[1], np.array(grid.counts) - 1)
     return _part(grid, largest, *wider, 2 if coarser else 1)
+
+
+def with_what_grows(
+    system: Tribosystem, find: Callable[[Tribosystem], T], touched: Callable[[T], Mask]
+) -> tuple[Tribosystem, T]:
+    """Return a system on a grid with room for an end that is found on it, and this end; collective.
+
+    Args:
+        system: To begin with.
+        find: The end of a system.
+        touched: Nodes of the punch that touch or have worn in an end (n,).
+    """
+    found = find(system)
+    while (grid := outgrown(system, touched(found))) is not None:
+        system = regridded(system, grid)
+        found = find(system)
+    return system, found
 
 
 def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float) -> RegularGrid | None:

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
+from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, with_reduced_heat
-from fenwear.contact import ContactState
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import BLOCK, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
 from fenwear.cycle.jump import jump
 from fenwear.cycle.program import Span, follow_program
-from fenwear.cycle.state import RunState, beginning, joined, on_exchange
+from fenwear.cycle.state import RunState, all_phases, beginning, on_exchange
 from fenwear.cycle.uniqueness import NO_JUMPS, heat_gain
 from fenwear.errors import ConvergenceError
 
@@ -73,15 +75,15 @@ def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **cou
 
 def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
     """Yield the blocks of jumps; name thermoelastic feedback where it makes them fail; collective."""
-    contacts: ContactState | None = None
+    pressure: Array = np.zeros((0, 0))
     try:
         for block in blocks:
-            contacts = joined(block.end.contacts)
+            pressure = all_phases(block.end.contacts).pressure
             yield block
     except ConvergenceError as error:
         system = with_reduced_heat(system)
-        at = [None, *([] if contacts is None else [contacts.pressure])]  # bands of few nodes have less
-        gain = max(heat_gain(system, pressure) or 0.0 for pressure in at)
+        at = [None, pressure] if len(pressure) else [None]  # bands of few nodes have less
+        gain = max(heat_gain(system, own) or 0.0 for own in at)
         if gain < 1:
             raise
         raise type(error)(

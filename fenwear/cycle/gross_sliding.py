@@ -2,13 +2,13 @@
 
 A half-cycle is solved phase by phase (`phase`). A jump takes the implicit step of `jump_step`, whole and in two halves.
 A third of their difference is the error estimate of the halves, which are kept: of the depths, of the pressures and of
-the temperatures, see `jump_error`.
+the temperatures, see `jump_method`.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -23,19 +23,17 @@ from fenwear.assembly import (
     at_rim,
     build_conduction,
     elastic,
-    grows,
     heating_frictions,
     in_parts,
     joined,
     make_sliding,
     on_first_contact,
-    outgrown,
     place_case_bodies,
     preparation,
     property_change,
-    regridded,
     with_exchange,
     with_reduced_heat,
+    with_what_grows,
 )
 from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
@@ -44,10 +42,10 @@ from fenwear.case import Case
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycle, PhaseRecord, heat_of_phases
 from fenwear.cycle.driver import Loading, Watch
-from fenwear.cycle.jump_error import Estimate, Lengths
+from fenwear.cycle.jump_method import Attempt, Estimate, Lengths
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
-from fenwear.cycle.state import RunState, carried_by, known_pressures
+from fenwear.cycle.state import RunState, all_phases, carried_by
 from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.cycle.totals import Totals
 from fenwear.errors import MARCHED, SHORTER_JUMPS, SMALLER_STEPS, CaseError, ConvergenceError, InputError
@@ -57,6 +55,9 @@ from fenwear.sliding.motion import DEFAULT_POSITIONS
 from fenwear.sliding.wear import WornDepths
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
+_Made = tuple[
+    Attempt[Any] | None, RunState, list[HalfCycle]
+]  # a jump, None where it was marched; its end, its last cycle
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 
 
@@ -168,8 +169,8 @@ class HalfCycles:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
-        known = known_pressures(state.contacts) if self._of_cycle else None
-        cycle = None if known is None else self.system.ways.shear(known)
+        known = all_phases(state.contacts).pressure if self._of_cycle else np.zeros((0, 0))
+        cycle = self.system.ways.shear(known) if len(known) else None
         for number, phase in enumerate(phases):
             if number:
                 self.watch()
@@ -217,38 +218,36 @@ class Jumps:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
         stepper, tolerance = self.stepper, self.tolerance
         strokes, given = stepper.system.motion.half_cycles, tolerance == float("inf")  # where jumps end
-        lengths = Lengths(tolerance)
-        length, left = int(state.jump_length), (until - state.half_cycle) // strokes
+        left = (until - state.half_cycle) // strokes
         # What flows in a first cycle, or as a load rises, depends on the order of the phases and on what they heat.
         if self.system.layers.hardness < np.inf and (left == 1 or not given):
             after, recorded = self._marched(state)
             if state.contacts[0] is None or self._flown(state, after) > tolerance or given:
                 return after, recorded
-        while True:
-            tried = min(length, left)
+
+        def made(cycles: float) -> tuple[_Made, Estimate]:
+            number = state.half_cycle + int(cycles) * strokes
             try:
-                end, estimate, recorded = stepper.attempt(state, tried)
+                jump, estimate, recorded = stepper.attempt(state, int(cycles))
             except ConvergenceError:
-                if tried > 1:
-                    stepper.system.remedies.note(SHORTER_JUMPS)
-                    length = int(lengths.cut(tried / 4))
-                    continue
+                stepper.system.remedies.note(SHORTER_JUMPS if cycles > 1 else MARCHED)
+                if cycles > 1:
+                    raise
                 end, recorded = self._marched(state)
-                estimate = Estimate(np.inf, np.inf, np.inf)  # it says nothing of the error
-                stepper.system.remedies.note(MARCHED)
-            if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
-                length = int(lengths.cut(tried / 2))
-                continue
-            warmed = tried > 1 and not given and stepper.system.team.each(self, "change", end.temperature) > WARMED
-            if (estimate.largest <= tolerance and not warmed) or tried == 1:
-                break
-            length = int(lengths.shorter(tried, estimate))
-        length = int(lengths.following(tried, length, estimate))
-        number = state.half_cycle + tried * strokes
-        after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
-        if state.finer is not None:
-            after = replace(after, finer=stepper.finer(state, state.finer, after, tried))
-        return after, recorded
+                return (None, end, recorded), Estimate(np.inf, np.inf, np.inf)  # it says nothing of the error
+            return (jump, stepper.state(jump.end, number), recorded), estimate
+
+        def fits(found: _Made) -> bool:
+            """Whether the grid has room, which grows before its rim is reached, and properties have changed little."""
+            _, end, _ = found
+            if at_rim(stepper.system, carried_by(end)):
+                return False
+            return given or stepper.system.team.each(self, "change", end.temperature) <= WARMED
+
+        lengths = Lengths(tolerance)
+        (jump, after, recorded), _, _, length = lengths.accepted(state.jump_length, lambda _: left, made, fits)
+        after = replace(after, jump_length=length)
+        return after if state.finer is None else replace(after, finer=stepper.finer(jump, after)), recorded
 
     def _flown(self, before: RunState, after: RunState) -> float:
         """Return the volume that surfaces flow in a step, over all that has flown."""
@@ -339,14 +338,8 @@ class GrossSliding:
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
-        found = steady_state(system, properties_within)
-        while grows(system):
-            grid = outgrown(system, np.asarray((found.phase_pressure > 0).any(axis=0)))
-            if grid is None:
-                break
-            system = regridded(system, grid)
-            found = steady_state(system, properties_within)
-        return found
+        find = partial(steady_state, properties_within=properties_within)
+        return with_what_grows(system, find, lambda found: np.asarray((found.phase_pressure > 0).any(axis=0)))[1]
 
     def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:  # noqa: ARG002
         """Return what steps remember."""

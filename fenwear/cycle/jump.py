@@ -41,7 +41,7 @@ def jump(
     Args:
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
-        tolerance: Largest estimated error of one jump, see `fenwear.cycle.jump_error.Estimate`.
+        tolerance: Largest estimated error of one jump, see `fenwear.cycle.jump_method.Estimate`.
         periodic_within, block, leave, watch: As of `fenwear.cycle.driver.RunLimits`; the change per cycle counts.
         start: Where to go on from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.

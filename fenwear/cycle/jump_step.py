@@ -5,14 +5,8 @@ the states of a march at whole numbers n of cycles: y(n + 1/2) changes by F(y(n)
 
     dy/dn = f(y) = F(y - f(y) / 2):
 
-the cycle with the middle y begins half a cycle's change before it. One jump is a step of the two-stage,
-second-order, L-stable and stiffly accurate Runge-Kutta method (SDIRK; Alexander, SIAM J. Numer. Anal.
-14, 1977) with g = 1 - 1/sqrt(2):
-
-    y_1 = y + g N f(y_1),    y_2 = y + (1 - g) N f(y_1) + g N f(y_2).
-
-Its weights 1 - g and g are positive, so that no depth decreases, and its end y_2 is itself a solved
-contact. A stage solves contact, wear and heat together: all phases of a cycle stand in one inequality
+the cycle with the middle y begins half a cycle's change before it. (`jump_method`).
+A stage solves contact, wear and heat together: all phases of a cycle stand in one inequality
 with the wear of h = g N cycles at their own pressures,
 
     gap_k = S_k p_k + H a_k + g_k + w_n + h beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
@@ -22,11 +16,6 @@ cycle begins at h - 1/2 cycles. Friction, wear and conductance are those of the 
 pressure of each phase, and the temperature at its start. All phases meet the shape in the middle of the
 cycle, where those of a march come one after the other: they differ by the wear of half a cycle, as an
 explicit march does from an implicit one.
-
-A node that comes into contact within a step has f(y_1) = 0: all that it must lose to follow its neighbours
-it loses by g N f(y_2), and at the end it carries up to 1 / g = 3.4 times their pressure. So a jump in which
-nodes come into contact ends by one step of the implicit Euler method over a share of it, `LAST`:
-y_3 = y_2 + h f(y_3). In it such a node loses what its neighbours lose.
 """
 
 from __future__ import annotations
@@ -43,30 +32,25 @@ from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord, heat_of_phases
 from fenwear.cycle.coupled import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
-from fenwear.cycle.jump_error import ORDER, Estimate, estimated, sizes_of
-from fenwear.cycle.state import RunState, joined, parted, present
+from fenwear.cycle.jump_method import HALVES, Attempt, Estimate, JumpLaw, Moment, Sizes, attempt
+from fenwear.cycle.state import RunState, all_phases, beginning, parted
 from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
-from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import Evolution
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import NOTHING, PhasesWear, WornDepths
 
-GAMMA = 1 - np.sqrt(0.5)
-LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
-ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which the stages of a jump are solved, and its end
-LOOSEST = 5e-3  # tolerance that these are of: contact of a rough run, too, is told to fulfil its conditions
+LOOSEST = 5e-3  # tolerance that contacts are solved to: of a rough run, too, they are told to fulfil their conditions
 
 
 @dataclass(frozen=True)
-class _Stage:
-    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals.
+class _Rate:
+    """What the cycle of a solved stage changes of temperature (dim,), depths and totals.
 
     Its conductances (m, n) are those by which it is heated. What is worn through coatings depends on where a step
     begins and how long it is: `wear` is that of its phases.
     """
 
-    contact: ContactState
     heated: Array
     worn: WornDepths
     adds: Totals
@@ -75,62 +59,15 @@ class _Stage:
 
 
 @dataclass(frozen=True)
-class _Moment:
-    """Depths, temperatures (dim,) and totals."""
+class _Moment(Moment):
+    """Depths, temperatures (dim,) and totals, and of the stage that they are the end of, its rate."""
 
-    worn: WornDepths
     temperature: Array
     totals: Totals
+    rate: _Rate | None = None
 
 
-class _Trend:
-    """How contacts change over a jump, by what is solved of it so far: where the next ones are looked for.
-
-    Lines through two of them, as those near borders that move come and go: parabolas begin farther away.
-    """
-
-    def __init__(self) -> None:
-        self._contacts: dict[float, ContactState] = {}  # by their time, cycles since the begin of the jump
-
-    def copy(self) -> _Trend:
-        """Return one that goes its own way from here."""
-        found = _Trend()
-        found._contacts = dict(self._contacts)
-        return found
-
-    def add(self, time: float, contact: ContactState | None) -> None:
-        """Take a contact at a time, cycles since the begin of the jump, if none is known there."""
-        if contact is not None:
-            self._contacts.setdefault(time, contact)
-
-    def from_one(self, contact: ContactState | None, since: float, to: float) -> ContactState | None:
-        """Return what a contact at one time will be near at another one; where it is not known, what is known there."""
-        if contact is None:
-            contact, since = self._near(to)
-        if contact is None or len(self._contacts) < 2:
-            return contact
-        pressure, rigid = contact.pressure.copy(), contact.rigid.copy()
-        for time, sign in ((to, 1.0), (since, -1.0)):
-            for share, known in self._line(time):
-                pressure += sign * share * known.pressure
-                rigid += sign * share * known.rigid
-        return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
-
-    def _near(self, time: float) -> tuple[ContactState | None, float]:
-        """Return the contact that is known next to a time, and when it is; None of none."""
-        known = min(self._contacts, key=lambda known: abs(known - time), default=time)
-        return self._contacts.get(known), known
-
-    def _line(self, time: float) -> list[tuple[float, ContactState]]:
-        """Return the shares at a time of the two contacts next to it, and them; of one alone that is of that time."""
-        if time in self._contacts:
-            return [(1.0, self._contacts[time])]
-        one, other = sorted(self._contacts, key=lambda known: abs(known - time))[:2]
-        share = (time - one) / (other - one)
-        return [(1 - share, self._contacts[one]), (share, self._contacts[other])]
-
-
-class Stepper:
+class Stepper(JumpLaw[_Moment]):
     """Implicit steps of any number of cycles."""
 
     def __init__(
@@ -139,7 +76,7 @@ class Stepper:
         self.system = system = with_reduced_heat(system)
         check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
-        self._sizes = sizes_of(system)
+        self._sizes = Sizes(system.layers, system.pair, system.creep.depth)
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
@@ -147,113 +84,114 @@ class Stepper:
         self.evolution = system.evolution(self.conditions)
         self._measure([system.friction.values(one) for one in self.conditions])
         self.coupled = Coupled(system, self.take)
-        self._heated: Array = np.zeros(0)  # by the last cycle
         self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
-        self._conductances: Array | None = None  # in it
+        self._begin: RunState = beginning(system)  # of the jump
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
-        self._whole: tuple[RunState, _Trend, WornDepths | None] | None = (
-            None  # the last attempt as one step: see `finer`
-        )
+        self._last_cycle: list[HalfCycle] = []
         follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
         follows = follows or bool(system.layers.memory.names)
         self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
         by_friction = any(law.beta or law.energy for law in system.sliding.wear)
         self._wear_follows = follows or (self._follows and by_friction)
 
-    def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate, list[HalfCycle]]:
-        """Return the state `cycles` cycles later, by two steps, an estimate of its error, and the last cycle.
+    def attempt(self, state: RunState, cycles: int) -> tuple[Attempt[_Moment], Estimate, list[HalfCycle]]:
+        """Return a jump, an estimate of its error, and the last cycle.
 
         Raises:
             ConvergenceError: it did not converge.
         """
-        self._whole, trend = None, _Trend()
-        half = self.step(state, cycles / 2, near=trend)
-        early = _comes(state, half, half)  # then begun near the halves, whose steps are not as long
-        whole = half if early else self.step(state, cycles, near=trend.copy())
-        comes = _comes(state, half, whole)
-        last = LAST * cycles if comes else 0.0
-        halves = self.step(half, cycles / 2 - last, cycles / 2, trend, ROUGH if comes else FINE)
-        if comes:
-            halves = self._last_step(halves, last, cycles - last, trend)
-        recorded = self._last_cycle(state, halves, cycles)  # by the coefficients and the heat of their end
-        if early:
-            whole = self.step(state, cycles, near=trend.copy())
-        estimate, bent = estimated(self.system, state, whole, halves), None
-        if comes:
-            first, second = half.worn - state.worn, whole.worn - half.worn
-            # The last step is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2.
-            bent = (second - first).times(2 * LAST**2)
-            share = self._sizes.area(bent) / max(self._sizes.area(first + second), 1e-300)
-            estimate = replace(estimate, depth=max(estimate.depth, share))
-        self._whole = whole, trend, bent
-        if self._wear_follows:
-            missed = self._missed(state, half, halves, cycles)
-            estimate = replace(estimate, depth=max(estimate.depth, missed))
-        return halves, estimate, recorded
+        self._begin = state
+        made = attempt(self, self._moment(state), cycles)
+        return made, self._estimate(made), self._last_cycle
 
-    def finer(self, state: RunState, fine: RunState, end: RunState, cycles: int) -> RunState:
+    def state(self, moment: _Moment, half_cycle: int) -> RunState:
+        """Return the state of a run at a moment."""
+        contacts = parted(moment.contact)
+        return RunState(half_cycle, moment.worn, contacts, self._temperature(moment.temperature), moment.totals)
+
+    def finer(self, made: Attempt[_Moment] | None, end: RunState) -> RunState:
         """Return where jumps of next to no length lead, from where they had led before the last attempt.
 
-        From the begin y to y_h in halves and to y_w as a whole y_h is off by a third of y_w - y_h; what was off before,
-        y - f, goes on as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
-        come into contact y_h has the error of its last step, of first order, too, which is taken from it.
-
         Args:
-            state: Before the attempt.
-            fine: Where they had led.
-            end: The attempt's.
-            cycles: Its length.
+            made: The attempt; None where it was marched, so that there is no estimate of it.
+            end: Its end.
         """
-        if self._whole is None:  # in smaller steps than there is an estimate of
-            return self._apart(end, fine, state, 1.0)
-        whole, trend, bent = self._whole
-        moved = whole
-        if fine is not state:
-            try:
-                moved = self.step(replace(fine, half_cycle=state.half_cycle), cycles, near=trend.copy())
-            except ConvergenceError:  # it may lie where no contact is: then what was off stays
-                moved = self._apart(whole, fine, state, 1.0)
-        halves = end if bent is None else replace(end, worn=end.worn - bent)
-        return replace(self._apart(moved, halves, whole, 2**ORDER / (2**ORDER - 1)), half_cycle=end.half_cycle)
+        fine = self._begin.finer
+        assert fine is not None
+        before = self._moment(fine)
+        if made is None:
+            moment = self.apart(self._moment(end), before, self._moment(self._begin), 1.0)
+        else:
+            moment = made.finer(self, made.begin if fine.worn is self._begin.worn else before)
+        return self.state(moment, end.half_cycle)
 
-    def _apart(self, state: RunState, one: RunState, other: RunState, share: float) -> RunState:
-        """Return a state, and a share of the difference of two others."""
-        exchange = self.coupled.heat.exchange
-        base, first, second = (exchange.own(own.temperature).values for own in (state, one, other))
-        return RunState(
-            state.half_cycle,
-            self.system.layers.settled(state.worn + (one.worn - other.worn).times(share)),
-            tuple(
-                _between(own, first, second, share)
-                for own, first, second in zip(state.contacts, one.contacts, other.contacts, strict=True)
-            ),
-            self._temperature(base + share * (first - second)),
-            state.totals + (one.totals - other.totals).times(share),
+    def apart(self, base: _Moment, one: _Moment, other: _Moment, share: float) -> _Moment:
+        """Return a moment, and a share of the difference of two others."""
+        contact = base.contact
+        if len(contact.pressure) and len(one.contact.pressure) and len(other.contact.pressure):
+            pressure = contact.pressure + share * (one.contact.pressure - other.contact.pressure)
+            rigid = contact.rigid + share * (one.contact.rigid - other.contact.rigid)
+            contact = replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
+        return _Moment(
+            self.system.layers.settled(base.worn + (one.worn - other.worn).times(share)),
+            contact,
+            base.time,
+            base.temperature + share * (one.temperature - other.temperature),
+            base.totals + (one.totals - other.totals).times(share),
         )
 
-    def _missed(self, state: RunState, half: RunState, halves: RunState, cycles: float) -> float:
+    def _estimate(self, made: Attempt[_Moment]) -> Estimate:
+        """Return the error of a jump."""
+        worn, wrong = (made.begin.worn, made.end.worn), (made.whole.worn - made.end.worn).times(HALVES)
+        estimate = self._sizes.estimate(worn, made, [wrong], HALVES * self._heat_difference(made))
+        missed = self._missed(made) if self._wear_follows else 0.0
+        return replace(estimate, depth=max(estimate.depth, self._through_difference(made), missed))
+
+    def _through_difference(self, made: Attempt[_Moment]) -> float:
+        """Return the largest difference of depths where coatings end, over the largest that the jump wears.
+
+        Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
+        """
+        found = 0.0
+        for body, thickness in zip(("punch", "strip"), self.system.coatings, strict=True):
+            first, one, other = (getattr(moment.worn, body) for moment in (made.begin, made.whole, made.end))
+            ended = (first < thickness) & (np.maximum(one, other) >= thickness)
+            apart = float(np.abs(one - other).max(where=ended, initial=0.0))
+            found = max(found, apart / max(float((other - first).max()), 1e-300))
+        return found
+
+    def _heat_difference(self, made: Attempt[_Moment]) -> float:
+        """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
+        exchange = self.system.exchange
+        states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.own(None))
+        first, second, initial = (np.array(exchange.contact_temperatures(state)) for state in states)
+        weights = self.system.pair.weights
+        apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
+        return apart / max(rise, 1e-300)
+
+    def _missed(self, made: Attempt[_Moment]) -> float:
         """Return the error of what a jump wears where coefficients change with depth or distance, relative.
 
         Its stages do not look at its begin: a coating that is worn through before the first of them would be missed.
         Simpson's rule on the wear of a cycle at the begin, in the middle and at the end does, and is of higher order.
         """
-        if any(contact is None for contact in state.contacts):
+        if not len(made.begin.contact.pressure):
             return 0.0
-        strokes = self.system.motion.half_cycles
+        done, strokes = self._begin.half_cycle, self.system.motion.half_cycles
         begin, middle, end = (
-            self._rate(one, state.half_cycle + share * cycles * strokes)
-            for one, share in ((state, 0.0), (half, 0.5), (halves, 1.0))
+            self._rate(one, done + share * made.cycles * strokes)
+            for one, share in ((made.begin, 0.0), (made.half, 0.5), (made.end, 1.0))
         )
-        simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
-        worn = replace(halves.worn - state.worn, between=NOTHING, carried=NOTHING)
+        simpson = (begin + middle.times(4.0) + end).times(made.cycles / 6)
+        worn = replace(made.end.worn - made.begin.worn, between=NOTHING, carried=NOTHING)
         return self._sizes.area(simpson - worn) / max(self._sizes.area(worn), 1e-300)
 
-    def _rate(self, state: RunState, half_cycles: float) -> WornDepths:
-        """Return what a cycle wears at the depths, temperatures and pressures of a state."""
+    def _rate(self, state: _Moment, half_cycles: float) -> WornDepths:
+        """Return what a cycle wears at the depths, temperatures and pressures of a moment."""
         system, exchange = self.system, self.coupled.heat.exchange
-        pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
+        pressures = state.contact.pressure
         shear = system.ways.shear(pressures)
-        surfaces = exchange.contact_temperatures(exchange.own(state.temperature))
+        surfaces = exchange.contact_temperatures(exchange.at(state.temperature))
         conditions: Sequence[ContactConditions] = [
             system.conditions(k, pressure, surfaces, state.worn, half_cycles, shear)
             for k, pressure in enumerate(pressures)
@@ -267,63 +205,28 @@ class Stepper:
         if isinstance(self.contact, CondensedContact) and self.system.layers.hardness == np.inf:
             self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
 
-    def step(
-        self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None, digits: float = ROUGH
-    ) -> RunState:
-        """Return the state `cycles` cycles later, by the two stages of one step.
-
-        Args:
-            state: Where it begins; its number of half-cycles is that of the jump's begin.
-            cycles: Its length.
-            since: Cycles from there to the begin of the step.
-            near: How contacts change, which takes those of the step, too; by default it begins with the step.
-            digits: Share of the tolerance that its last contact is solved to, where they cost.
-        """
-        share, near = GAMMA * cycles, near or _Trend()
-        self._solve_to(ROUGH)  # of a first stage its wear is all that stays
-        begin, contact = self._moment(state), joined(state.contacts)
-        near.add(since, contact)
-        self._press(state.half_cycle, since + share)
-        first = self._stage(begin, near.from_one(contact, since, since + share), share, cycles - share)
-        near.add(since + share, first.contact)
-        between = self._after(begin, first, cycles - share)
-        self._press(state.half_cycle, since + cycles)
-        start = near.from_one(first.contact, since + share, since + cycles)
-        self._solve_to(digits)
-        last = self._stage(between, start, share)
-        near.add(since + cycles, last.contact)
-        return self._end(state, between, last, share)
-
-    def _last_step(self, state: RunState, cycles: float, since: float, near: _Trend) -> RunState:
-        """Return the state `cycles` cycles later, by one implicit Euler step; as `step`."""
-        begin, contact = self._moment(state), joined(state.contacts)
-        self._solve_to(FINE)
-        self._press(state.half_cycle, since + cycles)
-        last = self._stage(begin, near.from_one(contact, since, since + cycles), cycles)
-        near.add(since + cycles, last.contact)
-        return self._end(state, begin, last, cycles)
-
     def _moment(self, state: RunState) -> _Moment:
-        return _Moment(state.worn, self.coupled.heat.exchange.own(state.temperature).values, state.totals)
+        temperature = self.coupled.heat.exchange.own(state.temperature).values
+        return _Moment(state.worn, all_phases(state.contacts), 0.0, temperature, state.totals)
 
     def _temperature(self, values: Array) -> HeatState | None:
         """Return the temperatures of coordinates (dim,); None of none."""
         return self.coupled.heat.exchange.at(values) if len(values) else None
 
-    def _after(self, before: _Moment, stage: _Stage, cycles: float) -> _Moment:
-        """Return the moment so many cycles as that of a stage later."""
-        lost, adds = stage.worn.times(cycles), stage.adds.times(cycles)
-        if stage.wear.coated:
-            own = stage.wear.begun(before.worn, cycles).worn(stage.contact.pressure).times(cycles)
-            lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
-        return _Moment(before.worn + lost, before.temperature + cycles * stage.heated, before.totals + adds)
+    def settled(self, end: _Moment) -> _Moment:
+        """Return the end of a step, which may have overshot."""
+        return replace(end, worn=self.system.layers.settled(end.worn))
 
-    def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
-        """Return the end of a step whose last stage is solved."""
-        now = self._after(before, last, cycles)
-        worn = self.system.layers.settled(now.worn)
-        self._heated, self._conductances = last.heated, last.conductances
-        return RunState(state.half_cycle, worn, parted(last.contact), self._temperature(now.temperature), now.totals)
+    def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
+        """Return the moment so many cycles as that of a stage later."""
+        rate, contact = stage.rate, stage.contact
+        assert rate is not None
+        lost, adds = rate.worn.times(cycles), rate.adds.times(cycles)
+        if rate.wear.coated:
+            own = rate.wear.begun(before.worn, cycles).worn(contact.pressure).times(cycles)
+            lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
+        temperature = before.temperature + cycles * rate.heated
+        return _Moment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
 
     def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
         """Return how depths follow in a stage where coefficients depend on them."""
@@ -334,27 +237,27 @@ class Stepper:
     def _wear(self, before: WornDepths, cycles: float, pressure: Array) -> WornDepths:
         return self.wear.begun(before, cycles).worn(pressure)  # as last taken
 
-    def _press(self, half_cycle: int, cycles: float) -> None:
-        """Take the time and the loads so many cycles after a half-cycle."""
-        self._done = half_cycle + cycles * self.system.motion.half_cycles
+    def _press(self, cycles: float) -> None:
+        """Take the time and the loads so many cycles after the begin of the jump."""
+        self._done = self._begin.half_cycle + cycles * self.system.motion.half_cycles
         if self.loading is not as_given:
             self._load = self.loading(self._done)
             self.contact.press(self._load)
 
-    def _stage(
-        self, before: _Moment, start: ContactState | None, cycles: float, followed: float | None = None
-    ) -> _Stage:
-        """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0.
+    def stage(self, before: _Moment, cycles: float, time: float, near: ContactState, digits: float) -> _Moment:
+        """Return the moment `cycles` cycles later, by the cycle whose middle it is.
 
-        What flows is no rate: all of it is there after as many cycles as follow the stage, by default those of its own.
+        What flows is no rate: all of it is there after as many cycles.
         """
+        self._solve_to(digits)
+        self._press(time)
         gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
-        if start is None:  # the first of all: what conducts is seen from the contact without heat
-            start = self._solve(gap, self._of_first_phase(gap), (before.worn, cycles))
+        if not len(near.pressure):  # the first of all: what conducts is seen from the contact without heat
+            near = self._solve(gap, self._of_first_phase(gap), (before.worn, cycles))
         solved = self.coupled.solve(
             before.temperature,
             cycles - 0.5,
-            start,
+            near,
             lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
             self._passing(before.worn, cycles),
             lagged=True,
@@ -362,13 +265,12 @@ class Stepper:
         contact, begin = solved.contact, solved.temperature
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        flowed: Array | None = None
-        if self._flowed is not None:
-            flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
+        flowed = None if self._flowed is None else np.asarray(self._flowed / cycles, dtype=np.float64)
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
-        return _Stage(contact, heated, worn, adds, solved.conductances, self.wear)
+        rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
+        return self.after(before, _Moment(worn, contact, time, begin, before.totals, rate), cycles)
 
     def _of_first_phase(self, gap: Array) -> ContactState | None:
         """Return the contact of the first phase alone, in every phase; None where all are found by factors at once.
@@ -422,18 +324,17 @@ class Stepper:
         """Return what each phase of a cycle adds at its pressure (m, n)."""
         return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
 
-    def _last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
-        """Return the half-cycles of the last cycle of a jump, whose end is what was solved last."""
+    def ended(self, end: _Moment, cycles: float) -> None:
+        """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""
         motion, found = self.system.motion, []
-        reached = before.half_cycle + cycles * motion.half_cycles
-        contacts = [present(contact) for contact in after.contacts]
-        heats = self._last_cycle_heat(after)
+        reached = self._begin.half_cycle + round(cycles) * motion.half_cycles
+        contacts, before = parted(end.contact), self._begin.contacts
+        heats = self._last_cycle_heat(end)
         # Half-cycles after one have worn what is missing at its end.
-        depths, totals = [after.worn], [after.totals]
-        adds = self._adds(np.concatenate([contact.pressure for contact in contacts]))
-        phases = list(range(len(contacts)))
+        depths, totals = [end.worn], [end.totals]
+        adds, phases = self._adds(end.contact.pressure), list(range(len(contacts)))
         if self.wear.coated:
-            own_worn = [self._worn([k], contacts, after.worn) for k in phases]
+            own_worn = [self._worn([k], contacts, end.worn) for k in phases]
             adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
         for stroke in reversed(range(1, motion.half_cycles)):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
@@ -441,12 +342,12 @@ class Stepper:
             totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
         for stroke, depth in enumerate(depths):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            records = [self._phase_record(k, contacts[k], before.contacts[k], cycles, adds[k]) for k in own]
+            records = [self._phase_record(k, contacts[k], before[k], cycles, adds[k]) for k in own]
             number = reached - (motion.half_cycles - 1 - stroke)
             heat = heat_of_phases(heats[k] for k in own)
             load = self.loading(reached)
             found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
-        return found
+        self._last_cycle = found
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
@@ -455,45 +356,24 @@ class Stepper:
         return passing.worn(pressures, now)
 
     def _phase_record(
-        self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals
+        self, phase: int, contact: ContactState, old: ContactState | None, cycles: float, adds: Totals
     ) -> PhaseRecord:
         previous = None
         if old is not None:
             previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
         return PhaseRecord(phase, contact, previous, adds, self.ratios[phase])
 
-    def _last_cycle_heat(self, state: RunState) -> list[HalfCycleHeat | None]:
-        """Return the heat of the cycle that ends with the state."""
+    def _last_cycle_heat(self, end: _Moment) -> list[HalfCycleHeat | None]:
+        """Return the heat of the cycle that ends a jump."""
+        assert end.rate is not None
         if not self.coupled.heat.dim:
-            return [None] * len(state.contacts)
+            return [None] * len(end.contact.pressure)
         heats: list[HalfCycleHeat | None] = []
         exchange = self.coupled.heat.exchange
-        temperature = exchange.at(exchange.own(state.temperature).values - self._heated)
-        for phase, contact in enumerate(state.contacts):
-            pressure = present(contact).pressure[0]
-            conductance = exchange.conductance(pressure) if self._conductances is None else self._conductances[phase]
-            temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
+        temperature = exchange.at(end.temperature - end.rate.heated)
+        for phase, pressure in enumerate(end.contact.pressure):
+            heated, conductance = self.coupled.mu[phase] * pressure, end.rate.conductances[phase]
+            temperature, terms = exchange.half_cycle(temperature, phase, heated, conductance)
             surfaces = exchange.contact_temperatures(temperature, phase)
             heats.append(HalfCycleHeat(*surfaces, terms, 1, temperature.bulk))
         return heats
-
-
-def _between(
-    contact: ContactState | None, one: ContactState | None, other: ContactState | None, share: float
-) -> ContactState | None:
-    """Return a contact, and a share of the difference of two others."""
-    if contact is None or one is None or other is None:
-        return contact
-    pressure = contact.pressure + share * (one.pressure - other.pressure)
-    rigid = contact.rigid + share * (one.rigid - other.rigid)
-    return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
-
-
-def _comes(before: RunState, half: RunState, end: RunState) -> bool:
-    """Return whether a node comes into contact from the begin of a jump or from its middle to its end."""
-    return any(
-        bool(np.any((late.pressure > 0) & ((middle.pressure == 0) | (early is not None and early.pressure == 0))))
-        for early, middle, late in zip(
-            before.contacts, map(present, half.contacts), map(present, end.contacts), strict=True
-        )
-    )

@@ -11,7 +11,6 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, carried, node_maps, on_nodes
 from fenwear.contact import ContactState
 from fenwear.cycle.totals import Totals, none_yet
-from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import WornDepths
@@ -96,19 +95,13 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     )
 
 
-def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:
-    """Return the contacts of all phases as one state; None unless all are there."""
+def all_phases(contacts: tuple[ContactState | None, ...]) -> ContactState:
+    """Return the contacts of all phases as one state; of no phases unless all are there."""
     present = [c for c in contacts if c is not None]
     if len(present) < len(contacts):
-        return None
+        return ContactState(*(np.zeros((0, 0)),) * 3, 0)
     pressure, gap, rigid = (np.concatenate([getattr(c, n) for c in present]) for n in ("pressure", "gap", "rigid"))
     return ContactState(pressure, gap, rigid, max(c.iterations for c in present))
-
-
-def known_pressures(contacts: tuple[ContactState | None, ...]) -> Array | None:
-    """Return the pressures of all phases (m, n), MPa; None unless all are there."""
-    found = joined(contacts)
-    return None if found is None else found.pressure
 
 
 def parted(contact: ContactState) -> tuple[ContactState, ...]:
@@ -117,13 +110,6 @@ def parted(contact: ContactState) -> tuple[ContactState, ...]:
         ContactState(contact.pressure[k : k + 1], contact.gap[k : k + 1], contact.rigid[k : k + 1], contact.iterations)
         for k in range(len(contact.pressure))
     )
-
-
-def present(contact: ContactState | None) -> ContactState:
-    """Return the contact of a phase that a step has solved."""
-    if contact is None:
-        raise ConvergenceError("a phase of the motion has no contact yet")
-    return contact
 
 
 def pressure_scale(system: Tribosystem, pressure: Array) -> float:

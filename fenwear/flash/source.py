@@ -34,7 +34,7 @@ from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, Cycle
 from fenwear.case.program import stages_of
 from fenwear.cycle import march
-from fenwear.cycle.state import known_pressures
+from fenwear.cycle.state import all_phases
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import check_memory, on_root
 from fenwear.results import checkpoint
@@ -239,8 +239,8 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         placed = place_case(case, followed=kept.followed)
     if kept.grid is not None:
         placed = placed_on(placed, grid_of(placed).with_numbers(kept.grid))
-    motion, reached = placed.motion, known_pressures(last.contacts)
-    if reached is None or reached.shape != (len(motion.phases), len(placed.pair.weights)):
+    motion, reached = placed.motion, all_phases(last.contacts).pressure
+    if reached.shape != (len(motion.phases), len(placed.pair.weights)):
         raise CaseError(InputError(str(directory), "expected a run that has done a whole cycle"))
     heat = np.empty_like(reached)
     for k in range(len(heat)):

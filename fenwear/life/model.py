@@ -18,7 +18,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case
 from fenwear.cycle import Block, Renewal, critical_speed, follow, jump, running_in, steady
-from fenwear.cycle.state import RunState, beginning, joined
+from fenwear.cycle.state import RunState, all_phases, beginning
 from fenwear.cycle.steady_cycle import SteadyCycle, steady_cycle
 from fenwear.cycle.totals import Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
@@ -392,14 +392,14 @@ def cycle_of(end: Block | SteadyCycle) -> Totals:
 
 def snapshot_of(block: Block) -> Snapshot:
     """Return the end of the last cycle of a block."""
-    system, contacts, end = block.system, joined(block.end.contacts), block.end
+    system, pressure, end = block.system, all_phases(block.end.contacts).pressure, block.end
     strokes = system.motion.half_cycles
     if block.steps:
         steps: tuple[Any, ...] = block.steps[-strokes:]
         rate = reduce(WornDepths.__add__, [one.wear for one in steps])
         pressure = np.concatenate([one.records.pressure for one in steps])
     else:
-        pressure, heat = block.pressure if contacts is None else contacts.pressure, block.heat
+        pressure, heat = pressure if len(pressure) else block.pressure, block.heat
         latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
         states = [system.conditions(k, np.asarray(p), latest, end.worn, end.half_cycle) for k, p in enumerate(pressure)]
         rate = system.wear.phases(states).worn(pressure)

@@ -17,7 +17,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.cycle import Block
-from fenwear.cycle.state import known_pressures
+from fenwear.cycle.state import all_phases
 from fenwear.cycle.steady_cycle import SteadyCycle
 from fenwear.heat.exchange import CROSSING, TERMS
 from fenwear.interface import is_translation
@@ -145,9 +145,9 @@ def _in_cycle(records: Block | SteadyCycle) -> float:
     """Return the largest pressure of a cycle in any phase or time step, MPa."""
     if isinstance(records, SteadyCycle):
         return float(records.phase_pressure.max())
-    strokes, contacts = records.system.motion.half_cycles, known_pressures(records.end.contacts)
+    strokes, contacts = records.system.motion.half_cycles, all_phases(records.end.contacts).pressure
     steps_taken = [one.pressure for one in records.steps[-strokes:]]
-    return float(np.max([one.max() for one in steps_taken or [records.pressure if contacts is None else contacts]]))
+    return float(np.max([one.max() for one in steps_taken or [contacts if len(contacts) else records.pressure]]))
 
 
 IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pressure at any time of the cycle",

@@ -23,7 +23,7 @@ from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.cycle.block import BlockHeat
-from fenwear.cycle.state import known_pressures
+from fenwear.cycle.state import all_phases
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.results.quantity import RECORD, InTable, Quantity
@@ -328,8 +328,8 @@ def table_cycle(last: Block) -> TableCycle | None:
         return None
     if system.sticks:
         return _of_time_steps(last, steps_of(last)[-1])
-    pressure = known_pressures(last.end.contacts)
-    if pressure is None:
+    pressure = all_phases(last.end.contacts).pressure
+    if not len(pressure):
         return None
     end, shear = last.end, system.ways.shear(pressure)
     states = [

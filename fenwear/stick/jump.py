@@ -3,18 +3,13 @@
 A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
 bodies, so that dy/dn = F(y) over the number n of cycles. Where the strip passes it takes many cycles to forget: there
 the contact runs in at y until a cycle ends as it begins, over no more cycles than the jump has, and without heat.
-With M(y) the wear of a cycle whose nodes slip as in the last one (`frozen`), and R = F - M what
-cycles do beside it, one jump of N cycles is a step of the two-stage Runge-Kutta
-method ARS(2,2,2) of second order (U. M. Ascher et al., Applied Numerical Mathematics 25, 1997): that of gross sliding
-(`fenwear.cycle.jump_step`), where nothing is beside M, with R as it was seen last, linear in n. With g = 1 - 1/sqrt(2)
-
-    y_1 = y + g N (M(y_1) + R(g N)),
-    y_2 = y + (1 - g) N (M(y_1) + R(g N)) + g N (M(y_2) + R(N)).
+With M(y) the wear of a cycle whose nodes slip as in the last one (`frozen`), and R = F - M what cycles do beside it, a
+jump is that of `fenwear.cycle.jump_method`, as in gross sliding, where nothing is beside M.
 
 R is known from the cycle at the begin and one halfway, to which a first step with R as it is at the begin leads. A
-second step starts there; the cycle at its end begins the next jump. A jump in which nodes come into contact ends by a
-step of the implicit Euler method over a part of it, as in gross sliding. Its error has two parts: of M a third of the
-difference to one step over the whole jump, and of R Simpson's rule against the line, each as the last stage damps it.
+second step starts there; the cycle at its end begins the next jump. Its error has two
+parts: of M a third of the difference to one step over the whole jump, and of R Simpson's rule against the line, each as
+the last stage damps it.
 
 What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
 lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
@@ -36,7 +31,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.cycle.jump_error import HALVES, Estimate, Lengths, Sizes, force_difference
+from fenwear.cycle.jump_method import FINE, HALVES, Attempt, Estimate, JumpLaw, Lengths, Moment, Sizes, attempt
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import opened_by_creep
@@ -47,8 +42,6 @@ from fenwear.stick.records import FrettingCycle, TimeStepRecords
 from fenwear.stick.state import PartialSlipState
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
-SHARE = 1 - np.sqrt(0.5)  # of a step, that a stage is long
-LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 MOST_RUN_IN, CLOSED = 20, 1e-3  # cycles until one closes; its change of tractions, over all of them
@@ -77,24 +70,17 @@ def jumped(
         ConvergenceError: the shortest part of a cycle did not converge.
     """
     begin, length, error, lengths = now, now.length, 0.0, Lengths(tolerance, SHORTEST)
+
+    def left(length: float) -> float:
+        return cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
+
+    def made(tried: float) -> tuple[FrettingCycle, Estimate]:
+        return _attempt(problem, now, tried, load, begin)
+
     while True:
-        left = cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
-        tried = left if left < min(length, 1) + SHORTEST else min(length, left)
-        try:
-            then, estimate = _attempt(problem, now, tried, load, begin)
-        except ConvergenceError:
-            if tried <= SHORTEST:
-                raise
-            length = lengths.cut(tried / 4)
-            continue
-        if tried > 1 and not fits(then):
-            length = lengths.cut(tried / 2)
-            continue
-        if estimate.largest > tolerance and tried > SHORTEST:
-            length = lengths.shorter(tried, estimate)
-            continue
-        error, length = max(error, estimate.largest), lengths.following(tried, length, estimate)
-        if tried == left or tried >= 1:
+        then, estimate, _, length = lengths.accepted(length, left, made, fits)
+        error = max(error, estimate.largest)
+        if then.number > begin.number + 1 - SHORTEST / 2:
             return replace(then, number=round(then.number), length=length, error=error)
         now = then
 
@@ -179,102 +165,113 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
     return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
-class _Packing:
-    """Depths and what goes with them as one array: of coated bodies what their coatings would have lost."""
+@dataclass(frozen=True)
+class _Moment(Moment):
+    """The end of a stage, and where it began and how many cycles it was long.
 
-    def __init__(self, problem: PartialSlipProblem, like: WornDepths) -> None:
-        self.problem, self._like = problem, like
-        self.depths = len(like.punch) + len(like.strip)
-        self._cuts = np.cumsum([part.size for part in _parts(like)])[:-1]
+    Of coated bodies its depths are what their coatings would have lost if they went on.
+    """
 
-    def of(self, worn: WornDepths) -> Array:
-        """Return depths as an array (size,)."""
-        return np.concatenate(_parts(self.problem.coatings.measured(worn)))
+    begin: WornDepths
+    length: float = 0.0
 
-    def parted(self, y: Array) -> WornDepths:
-        """Return the depths of an array (size,), no thickness below zero."""
-        return self.problem.interface.layers.settled(self.on_the_way(y))
 
-    def on_the_way(self, y: Array) -> WornDepths:
-        """Return the depths (size,) at the begin of a stage: they may overshoot, and so may debris."""
-        punch, strip, between, carried, crept = np.split(y, self._cuts)
-        shapes = self._like.between.shape, self._like.carried.shape
-        found = WornDepths(punch, strip, between.reshape(shapes[0]), crept, carried.reshape(shapes[1]))
-        return self.problem.interface.layers.bounded(self.problem.coatings.depths(found))
+class _Jump(JumpLaw[_Moment]):
+    """What the law gives a jump from a cycle; temperatures go on from those of the last whole cycle."""
 
-    def rate(self, cycle: FrettingCycle) -> Array:
-        """Return the rate of a cycle (size,).
+    def __init__(
+        self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], whole: FrettingCycle
+    ) -> None:
+        self.problem, self._now, self._load, self._whole = problem, now, load, whole
+        self._layers, self._coatings = problem.interface.layers, problem.coatings
+        self._frozen, y = Frozen(problem, now), self._coatings.measured(now.worn)
+        self.begin = _Moment(y, self._frozen.contact, 0.0, y)
+        self._first = self._beside(now, self.begin)
+        self._bend = self._first.times(0.0)  # R is their line
+        self._middle = self.then = now  # the cycles halfway and at the end
+
+    def depths(self, worn: WornDepths) -> WornDepths:
+        """Return the depths of a moment, no thickness below zero."""
+        return self._layers.settled(self._on_the_way(worn))
+
+    def moment(self, worn: WornDepths) -> _Moment:
+        """Return the begin at other depths."""
+        return replace(self.begin, worn=self._coatings.measured(worn))
+
+    def _on_the_way(self, worn: WornDepths) -> WornDepths:
+        """Return the depths at the begin of a stage: they may overshoot, and so may debris."""
+        return self._layers.bounded(self._coatings.depths(worn))
+
+    def stage(
+        self,
+        before: _Moment,
+        cycles: float,
+        time: float,
+        near: ContactState | None,
+        digits: float,  # noqa: ARG002
+    ) -> _Moment:
+        """Return z = before + cycles (M(z) + R(time)); to all digits."""
+        begin = before.worn + self._at(time).times(cycles)
+        worn, contact = self._frozen.stage(self._on_the_way(begin), cycles, near)
+        return _Moment(self._coatings.measured(worn), contact, time, begin, cycles)
+
+    def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
+        """Return before + cycles (M + R), at the rate of a stage."""
+        rate = (stage.worn - stage.begin).times(1 / stage.length) + self._at(stage.time)
+        return replace(stage, worn=before.worn + rate.times(cycles))
+
+    def settled(self, end: _Moment) -> _Moment:
+        """Return the end of a step, without depths below those at the begin of the jump."""
+        (punch, strip), first = (end.worn.punch, end.worn.strip), self.begin.worn
+        worn = replace(end.worn, punch=np.maximum(punch, first.punch), strip=np.maximum(strip, first.strip))
+        return replace(end, worn=worn)
+
+    def halfway(self, half: _Moment, cycles: float) -> _Moment:
+        """Return the state halfway with R as it is found there, in place of that at the begin all the way."""
+        self._middle = self._cycle(half, cycles / 2, self._now.end)
+        self._bend = (self._beside(self._middle, half) - self._first).times(2 / cycles)
+        return self.settled(replace(half, worn=half.worn + self._bend.times(cycles**2 / 8)))
+
+    def ended(self, end: _Moment, cycles: float) -> None:
+        """Take the cycle at the end of a jump."""
+        self.then = self._cycle(end, cycles, self._middle.end)
+
+    def estimate(self, made: Attempt[_Moment]) -> tuple[Estimate, WornDepths]:
+        """Return the error of a jump, and what R leaves of it, by Simpson's rule."""
+        end, interface = made.end, self.problem.interface
+        curved = self._beside(self.then, end) - self._at(made.cycles)
+        start = replace(end, worn=end.begin - self._at(end.time).times(end.length) + curved.times(made.cycles / 6))
+        missed = end.worn - self.stage(start, end.length, end.time, end.contact, FINE).worn
+        opened = partial(opened_by_creep, interface.middle, interface.creep)
+        begin, whole, last = (self.depths(one.worn) for one in (made.begin, made.whole, end))
+        parts = (whole - last).times(HALVES), self._on_the_way(end.worn) - self._on_the_way(end.worn - missed)
+        sizes = Sizes(self._layers, interface.middle.pair, opened, REST)
+        of_heat = max(self._middle.error, self.then.error)
+        return sizes.estimate((begin, last), made, parts, of_heat), missed
+
+    def _at(self, time: float) -> WornDepths:
+        """Return R after so many cycles of the jump."""
+        return self._first + self._bend.times(time)
+
+    def _beside(self, cycle: FrettingCycle, at: _Moment) -> WornDepths:
+        """Return R of a cycle at the end of a stage.
 
         Raises:
             ConvergenceError: it is beyond all numbers.
         """
-        found = np.concatenate(_parts(self.problem.coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn)))
-        if not np.isfinite(found).all():
+        found = self._coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn)
+        if not all(
+            np.isfinite(part).all() for part in (found.punch, found.strip, found.between, found.carried, found.crept)
+        ):
             raise ConvergenceError(TOO_LARGE)
-        return found
+        return found - self._coatings.with_slopes(self._frozen.rate(at.contact, cycle.worn), cycle.worn)
 
-    def measured(self, rate: WornDepths, worn: WornDepths) -> Array:
-        """Return the rate of depths (size,) at depths."""
-        found, slopes = np.concatenate(_parts(rate)), np.concatenate(self.problem.coatings.slopes(worn))
-        own = found[: self.depths]
-        own[:] = np.divide(own, slopes, out=np.zeros_like(own), where=slopes > 0)
-        return found
-
-
-def _parts(worn: WornDepths) -> list[Array]:
-    return [worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept]
-
-
-@dataclass(frozen=True)
-class _Moment:
-    """The end of a stage (size,), the contact there, and where the stage began and how many cycles it was long."""
-
-    y: Array
-    contact: ContactState
-    begin: Array
-    length: float = 0.0
-
-
-class _Steps:
-    """Steps of a jump from a cycle."""
-
-    def __init__(self, packing: _Packing, cycle: FrettingCycle) -> None:
-        self.packing, self._frozen, y = packing, Frozen(packing.problem, cycle), packing.of(cycle.worn)
-        self.begin = _Moment(y, self._frozen.contact, y)
-
-    def beside(self, cycle: FrettingCycle, at: _Moment) -> Array:
-        """Return R (size,) of a cycle at the end of a stage."""
-        rate = self._frozen.rate(at.contact, cycle.worn)
-        return self.packing.rate(cycle) - self.packing.measured(rate, cycle.worn)
-
-    def stage(self, begin: Array, cycles: float, near: ContactState) -> _Moment:
-        """Return y = begin + cycles M(y)."""
-        worn, contact = self._frozen.stage(self.packing.on_the_way(begin), cycles, near)
-        return _Moment(self.packing.of(worn), contact, begin, cycles)
-
-    def step(self, before: _Moment, cycles: float, beside: Callable[[float], Array], last: float = 0.0) -> _Moment:
-        """Return what y' = M(y) + beside(n) leads to.
-
-        Args:
-            before: Where it begins.
-            cycles: How many later.
-            beside: R after so many of them.
-            last: Cycles of the last step, of the implicit Euler method; 0 for none.
-        """
-        own = cycles - last
-        h = SHARE * own
-        first = self.stage(before.y + h * beside(h), h, before.contact)
-        rate = (first.y - first.begin) / h + beside(h)
-        found = self.stage(before.y + (own - h) * rate + h * beside(own), h, first.contact)
-        if last:
-            found = self.stage(found.y + last * beside(cycles), last, found.contact)
-        return self.risen(found)
-
-    def risen(self, end: _Moment, more: Array | float = 0.0) -> _Moment:
-        """Return the end with so much more (size,), without depths below those at the begin of the jump."""
-        y, depths = end.y + more, self.packing.depths
-        y[:depths] = np.maximum(y[:depths], self.begin.y[:depths])
-        return replace(end, y=y)
+    def _cycle(self, end: _Moment, done: float, after: PartialSlipState) -> FrettingCycle:
+        """Return the cycle so many later, at the end of a step, from where a cycle before has ended."""
+        now, start = self._now, _slid_on(self._now, done, self._load)
+        worn = _balanced(self.problem, now.worn, self.depths(end.worn))
+        at = replace(after, slid=start.slid, load=start.load)
+        return _cycle_after(self.problem, self._whole, at, worn, now.number + done)
 
 
 def _attempt(
@@ -285,64 +282,13 @@ def _attempt(
     begin_of_heat: FrettingCycle,
 ) -> tuple[FrettingCycle, Estimate]:
     """Return the cycle after a jump, and its error; temperatures go on from those of the last whole cycle."""
-    problem = problem.worn_like(now.records, now.first_step)
-    packing = _Packing(problem, now.worn)
-    steps = _Steps(packing, now)
-    begin = steps.beside(now, steps.begin)
-
-    def cycle_at(end: _Moment, done: float, after: PartialSlipState) -> FrettingCycle:
-        start = _slid_on(now, done, load)
-        worn = _balanced(problem, now.worn, packing.parted(end.y))
-        at = replace(after, slid=start.slid, load=start.load)
-        return _cycle_after(problem, begin_of_heat, at, worn, now.number + done)
-
-    half = steps.step(steps.begin, cycles / 2, lambda _: begin)
-    middle = cycle_at(half, cycles / 2, now.end)
-    bend = (steps.beside(middle, half) - begin) / (cycles / 2)
-    whole = steps.step(steps.begin, cycles, lambda n: begin + n * bend)
-    half = steps.risen(half, cycles**2 / 8 * bend)
-    last = LAST * cycles if _comes(steps.begin, half, whole) else 0.0
-    end = steps.step(half, cycles / 2, lambda n: begin + (cycles / 2 + n) * bend, last)
-    then = cycle_at(end, cycles, middle.end)
-    curved = steps.beside(then, end) - begin - cycles * bend
-    by_simpson = end.y - steps.stage(end.begin + cycles / 6 * curved, end.length, end.contact).y
-    estimate = _estimate(packing, (steps.begin, whole, end), by_simpson, max(middle.error, then.error))
+    law = _Jump(problem.worn_like(now.records, now.first_step), now, load, begin_of_heat)
+    made = attempt(law, law.begin, cycles)
+    estimate, missed = law.estimate(made)
     finer = None
     if now.finer is not None:
-        off = replace(steps.begin, y=packing.of(now.finer))
-        moved = steps.step(off, cycles, lambda n: begin + n * bend).y - whole.y
-        finer = packing.parted(end.y - HALVES * (whole.y - end.y) - by_simpson + moved)
-    return replace(then, finer=finer), estimate
-
-
-def _estimate(
-    packing: _Packing, found: tuple[_Moment, _Moment, _Moment], by_simpson: Array, of_heat: float
-) -> Estimate:
-    """Return the error of a jump.
-
-    Args:
-        packing: Of its arrays.
-        found: Its begin, and its end as a whole and in halves.
-        by_simpson: What R leaves of it (size,).
-        of_heat: That of temperatures.
-    """
-    interface, (begin, whole, end) = packing.problem.interface, (packing.parted(one.y) for one in found)
-    pair, contacts = interface.middle.pair, [one.contact.pressure for one in found]
-    sizes = Sizes(interface.layers, pair, partial(opened_by_creep, interface.middle, interface.creep))
-    parts = (whole - end).times(HALVES), packing.on_the_way(found[2].y) - packing.on_the_way(found[2].y - by_simpson)
-    pressure = max(force_difference(pair, one, other) for one, other in zip(*contacts[1:], strict=True))
-    return Estimate(
-        sum(sizes.of_depth(part, end - begin, end, REST) for part in parts),
-        HALVES * pressure,
-        of_heat,
-        sum(sizes.of_states(part, begin, end) for part in parts),
-    )
-
-
-def _comes(begin: _Moment, half: _Moment, whole: _Moment) -> bool:
-    """Return whether a node comes into contact from the begin of a jump or its middle to its end."""
-    before = np.minimum(begin.contact.pressure, half.contact.pressure)
-    return bool(((whole.contact.pressure > 0) & (before <= 0)).any())
+        finer = law.depths(made.finer(law, law.begin if now.finer is now.worn else law.moment(now.finer)).worn - missed)
+    return replace(law.then, finer=finer), estimate
 
 
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
@@ -366,7 +312,5 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
     """Return the end of a cycle under the load of so many later, as far as what its nodes have slipped tells."""
-    slid, end = now.end.slid, replace(now.end, load=load(now.number + cycles))
-    if slid is None:
-        return end
-    return replace(end, slid=slid + (cycles - 1) * now.records.slip_magnitude.sum(axis=0))
+    slid = now.end.slid + (cycles - 1) * now.records.slip_magnitude.sum(axis=0)
+    return replace(now.end, load=load(now.number + cycles), slid=slid)

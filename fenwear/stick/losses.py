@@ -68,21 +68,20 @@ class StepConditions:
         if self.heat is not None and at.temperature is not None:
             punch, strip = self.heat.surfaces(at.temperature)
             warm = punch, strip
-        speed = 0.0 if at.speed is None else at.speed
         return {
             "temperatures": warm,
             "worn": at.worn,
             "slid": at.slid,
-            "speed": speed,
+            "speed": at.speed,
             "cycle": self._shear(at),
         }
 
     def _shear(self, at: PartialSlipState) -> CycleShear | None:
-        """Return what laws know of the last cycle before a state; None where none asks, or before the first.
+        """Return what laws know of the last cycle before a state; None where none asks.
 
         A time step that has not been computed slips nothing at the mean pressure.
         """
-        if at.slips is None or at.pressures is None:
+        if not self.asks_cycle:
             return None
         middle, mean, places = self.interface.middle, self.interface.middle.rigid.mean_pressure, self.program.steps
         positions = [self.interface.position(step.offset) for step in places]
@@ -98,8 +97,7 @@ class StepConditions:
         """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
         laws, known = self.laws, self.at_start(before)
         assert laws is not None
-        begun = np.zeros(slips.slid.shape[1]) if before.slid is None else before.slid
-        slid = begun + np.cumsum(slips.slid, axis=0)
+        slid = before.slid + np.cumsum(slips.slid, axis=0)
         warm = [known["temperatures"]] * len(slid)
         if slips.temperature is not None and known["temperatures"] is not None:
             warm[1:] = [(punch, strip) for punch, strip in slips.temperature[:-1]]
@@ -178,9 +176,14 @@ class CoatedBodies:
         """Return the depths that `measured` made these of."""
         return replace(measured, punch=self.punch.depth(measured.punch), strip=self.strip.depth(measured.strip))
 
-    def slopes(self, worn: WornDepths) -> tuple[Array, Array]:
-        """Return the derivative of depths to what coatings would have lost, at the nodes of punch and strip."""
-        return self.punch.slope(worn.punch), self.strip.slope(worn.strip)
+    def with_slopes(self, rate: WornDepths, worn: WornDepths) -> WornDepths:
+        """Return rates of depths as those of `measured`, where these depths are worn."""
+        punch, strip = self.punch.slope(worn.punch), self.strip.slope(worn.strip)
+        return replace(rate, punch=_over(rate.punch, punch), strip=_over(rate.strip, strip))
+
+
+def _over(rate: Array, slope: Array) -> Array:
+    return np.divide(rate, slope, out=np.zeros_like(rate), where=slope > 0)
 
 
 _Both = tuple[Array, Array]  # of punch and strip

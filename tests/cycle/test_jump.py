@@ -12,7 +12,7 @@ from fenwear import Case, Tribosystem, assemble, jump, load_case, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
-from fenwear.cycle.jump_error import force_difference
+from fenwear.cycle.jump_method import force_difference
 from fenwear.sliding.wear import StepWear
 
 MEAN = 1e4 / 600

@@ -228,9 +228,9 @@ class Layers:
         between = np.concatenate([worn.between[:first], held.contact]) if first else held.contact
         return WornDepths(worn.punch, worn.strip, between, worn.crept, carried)
 
-    def flown(self, worn: WornDepths, flowed: Array | None) -> WornDepths:
-        """Return depths where surfaces have flown (n,) more, mm; None for nothing."""
-        if flowed is None:
+    def flown(self, worn: WornDepths, flowed: Array) -> WornDepths:
+        """Return depths where surfaces have flown (n,) more, mm: beyond a hardness alone."""
+        if self.hardness == np.inf:
             return worn
         state = worn.between.copy()
         state[self.row(PLASTIC)] += flowed

@@ -21,13 +21,11 @@ from fenwear.assembly import (
     at_rim,
     build_conduction,
     carried,
-    grows,
     joined,
     node_maps,
     on_nodes,
-    outgrown,
     place_at_rest,
-    regridded,
+    with_what_grows,
 )
 from fenwear.assembly.tribosystem import Condensed
 from fenwear.bodies.operators import SurfaceOperator
@@ -197,13 +195,11 @@ class Coulomb:
                 "no one final shape exists with a pressure_threshold: slipping nodes keep any pressure below it, as "
                 "the way there has left it. Follow the wear by `run`"
             )
-        found = final_shape(system.law_state.problem)
-        while grows(system):
-            grid = outgrown(system, np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)))
-            if grid is None:
-                break
-            system = regridded(system, grid)
-            found = final_shape(system.law_state.problem)
+        system, found = with_what_grows(
+            system,
+            lambda own: final_shape(own.law_state.problem),
+            lambda found: np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)),
+        )
         return replace(found, system=system)
 
     def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
@@ -309,7 +305,7 @@ class _Run:
             at = self.problem.beginning(state.worn, load)
             return replace(at, temperature=at.temperature if warm is None else warm)
         at, steps = memory.at, self.problem.program.steps
-        if at.pressures is not None and len(at.pressures) != len(steps):
+        if len(at.pressures) != len(steps):
             at = self.problem.forgotten(at)
         heating = np.zeros(len(self.problem.weights)) if at.heating is None else at.heating
         at = replace(self.problem.shaped(at, state.worn), load=load, temperature=warm)
@@ -371,7 +367,7 @@ class HalfCycles(_Run):
         at, records = problem.half_cycle(begin)
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
-        before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
+        before = begin.pressures[own]
         lost = problem.losses.worn_in(records, first, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)

@@ -31,7 +31,7 @@ from fenwear.stick.losses import CoatedBodies, StepConditions, StepLosses, StepS
 from fenwear.stick.position import LoadEffect, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.records import TimeStepRecords, record
-from fenwear.stick.state import Imposed, PartialSlipState, StickState
+from fenwear.stick.state import NO_SHIFT, Imposed, PartialSlipState, StickState
 
 T = TypeVar("T")
 MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
@@ -147,8 +147,7 @@ class PartialSlipProblem:
         """Return a state at the start of a cycle whose time steps have not been computed yet."""
         steps, (n, m) = len(self.program.steps), at.contact.trial.shape
         none = np.full((steps, n, m), np.nan)
-        slips = none if self.conditions.asks_cycle else None
-        return replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=none, slips=slips)
+        return replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=none, slips=none)
 
     def beginning(self, shape: WornDepths | None = None, load: float = 1.0) -> PartialSlipState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
@@ -195,9 +194,10 @@ class PartialSlipProblem:
             worn = interface.layers.flown(worn, state.flowed)
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
-        at = PartialSlipState(state, replace(before, closure=None), worn, load=load)
+        none, still = np.zeros((0, 0)), np.zeros(len(self.weights))
+        at = PartialSlipState(state, replace(before, closure=None), worn, none, none, none, still, still, load=load)
         for step in program.lead_in:
-            at = self._stepped(at, step)
+            at = self._stepped(self.forgotten(at), step)
         return at
 
     def opening(self, position: Position, worn: WornDepths) -> Array:
@@ -218,20 +218,20 @@ class PartialSlipProblem:
         closure = interface.layers.closure_at(position.pair, worn)
         return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside, closure)
 
-    def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array | None:
+    def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array:
         """Return what the strip's supports are moved by beside the displacement at the end of a step (n, d), mm.
 
         Near its place every point of the strip keeps the one opposite: it is moved by the screw that leads from there
         to its place, and a cycle brings it back. Going far, others come: it is moved on by what slides past them.
         """
         if step.way is None:
-            return None
+            return NO_SHIFT
         x, field, now = position.pair.punch.x, self.interface.field, step.displacement or 0.0
         if not position.far:
             moved = Screw(HERE, step.way.last).field.velocity(x) - now * field.velocity(x)
             return np.asarray(in_model(moved, x.shape[1]))
         on = step.way.field.velocity(x) - (now - (before.displacement or 0.0)) * field.velocity(x)
-        return np.asarray((0.0 if before.beside is None else before.beside) + in_model(on, x.shape[1]))
+        return np.asarray(before.beside + in_model(on, x.shape[1]))
 
     def step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state after a time step, and its record; the shape stays; collective."""
@@ -302,19 +302,8 @@ class PartialSlipProblem:
         )
 
     def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
-        pressures, trials = at.then(state)
-        following = (at.next_step + 1) % len(self.program.steps)
         worn = self.interface.layers.flown(at.worn, state.flowed)
-        imposed = replace(imposed, closure=None)  # what gives way follows from the depths
-        after = PartialSlipState(state, imposed, worn, following, pressures=pressures, trials=trials, load=at.load)
-        if self.laws is None:
-            return after
-        slipped = np.linalg.norm(state.slip, axis=1)
-        before, slips = np.zeros_like(slipped) if at.slid is None else at.slid, at.slips
-        if slips is not None:
-            slips = slips.copy()
-            slips[at.next_step] = state.slip
-        return replace(after, slid=before + slipped, speed=slipped / step.duration, slips=slips)
+        return at.then(state, replace(imposed, closure=None), worn, step.duration)  # it follows from the depths
 
     def half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
@@ -368,10 +357,8 @@ def on_other_grid(
     f = np.concatenate([pressure, traction.T.ravel()])
     force, back = position.forces(f)
     moved = interface.punch.apply(force), -interface.strip.apply(back)
-    beside = None
-    if contact.beside is not None:
-        old = before.interface.position(before.program.steps[at.next_step - 1].offset)
-        beside = _affine(old.pair.punch.x, contact.beside, position.pair.punch.x)
+    old = before.interface.position(before.program.steps[at.next_step - 1].offset).pair.punch.x
+    beside = _affine(old, np.broadcast_to(contact.beside, old.shape), position.pair.punch.x)
     state = replace(
         contact,
         pressure=pressure,
@@ -385,18 +372,18 @@ def on_other_grid(
         crept=worn.crept,
         elastic=interface.creep.of_contact(position, f, moved, loaded),
         beside=beside,
-        flowed=None if contact.flowed is None else _at(contact.flowed, nodes),
+        flowed=_at(contact.flowed, nodes),
     )
     return replace(
         at,
         contact=state,
         imposed=replace(at.imposed, loaded=loaded, opening=opening, beside=beside),
         worn=worn,
-        pressures=None if at.pressures is None else _known(at.pressures, _at(at.pressures, nodes)),
-        trials=None if at.trials is None else _known(at.trials, _along(at.trials, nodes)),
-        slid=None if at.slid is None else _at(at.slid, nodes),
-        speed=None if at.speed is None else _at(at.speed, nodes),
-        slips=None if at.slips is None else _known(at.slips, _along(at.slips, nodes)),
+        pressures=_known(at.pressures, _at(at.pressures, nodes)),
+        trials=_known(at.trials, _along(at.trials, nodes)),
+        slips=_known(at.slips, _along(at.slips, nodes)),
+        slid=_at(at.slid, nodes),
+        speed=_at(at.speed, nodes),
         held=None,
     )
 

@@ -322,7 +322,7 @@ class Step:
             crept=crept,
             elastic=elastic,
             beside=self.imposed.beside,
-            flowed=flowed if self.hardness < np.inf else None,
+            flowed=flowed,
         )
 
     def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:

@@ -118,9 +118,8 @@ def _advance(
     middle = start.towards(end, 0.5)
     try:
         first = _advance(interface, position, before, start, middle, friction, halvings - 1)
-        flowed = 0.0 if first.flowed is None else first.flowed
-        middle = replace(middle, opening=middle.opening + flowed)
-        rest = replace(end, duration=end.duration - middle.duration, opening=end.opening + flowed)
+        middle = replace(middle, opening=middle.opening + first.flowed)
+        rest = replace(end, duration=end.duration - middle.duration, opening=end.opening + first.flowed)
         second = _advance(interface, position, first, middle, rest, friction, halvings - 1)
     except ConvergenceError as error:
         raise (whole if isinstance(whole, ManyAnswersError) else error) from None
@@ -131,7 +130,7 @@ def _advance(
         iterations=first.iterations + second.iterations,
         unique=first.unique and second.unique and not isinstance(whole, ManyAnswersError),
         parts=first.parts + second.parts,
-        flowed=None if second.flowed is None else flowed + second.flowed,
+        flowed=first.flowed + second.flowed,
     )
 
 

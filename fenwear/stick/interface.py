@@ -259,4 +259,5 @@ def untouched(interface: OppositeBodies) -> StickState:
         none,
         crept=interface.creep.beginning(),
         elastic=interface.creep.unloaded(),
+        flowed=np.zeros(n),
     )

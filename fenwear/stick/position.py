@@ -149,10 +149,8 @@ class Position:
         """Return slips along the tangents (n, d - 1) as vectors in space (n, 3)."""
         return in_space(np.einsum("nac,na->nc", self.frame[:, 1:], slip))
 
-    def beside(self, moved: Array | None) -> Array:
-        """Return what the strip is moved by beside its motion (n, d) in the frame (d n,)."""
-        if moved is None:
-            return np.zeros(len(self.drive))
+    def beside(self, moved: Array) -> Array:
+        """Return what the strip is moved by beside its motion (n, d), of all nodes or alike, in the frame (d n,)."""
         found = self.in_frame(moved)
         if self.far:
             found[: len(self.pair.weights)] = 0.0

@@ -215,7 +215,7 @@ def record(
         *_of_heat(heat, at, after),
         float(after.coupling),
         state.rigid,
-        np.zeros_like(state.pressure) if state.flowed is None else state.flowed,
+        state.flowed,
     )
     return TimeStepRecords(*(np.asarray(value)[None] for value in values))
 

@@ -270,10 +270,8 @@ def _judged(
 ) -> tuple[float, NDArray[np.bool_] | None]:
     """Return what halving all steps changes, and which are to be halved; None where that is to end."""
     after, coarse = problem.cycle(problem.beginning())
-    begin = fine.beginning()
-    if after.pressures is not None and after.trials is not None:  # second halves end where their steps do
-        known = np.where(_last(of)[:, None], after.pressures[of], np.nan)
-        begin = replace(begin, pressures=known, trials=after.trials[of])
+    known = np.where(_last(of)[:, None], after.pressures[of], np.nan)  # second halves end where their steps do
+    begin = replace(fine.beginning(), pressures=known, trials=after.trials[of])
     halves = TimeStepRecords.joined(fine.cycle(begin)[1])
     local, change = _compare(TimeStepRecords.joined(coarse), halves, of, problem.weights)
     if change <= tolerance or local[~splits].sum() > tolerance:  # the finest steps alone are too coarse

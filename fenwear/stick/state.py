@@ -14,6 +14,8 @@ from fenwear.layers.memory import Held
 from fenwear.sliding.wear import STIFF, WornDepths
 from fenwear.stick.position import LoadEffect
 
+NO_SHIFT: Array = np.zeros((1, 1))  # of any node along any axis
+
 
 @dataclass(frozen=True)
 class Imposed:
@@ -26,8 +28,8 @@ class Imposed:
         force: Tangential force on the strip along the motion, N/mm or N; None where the displacement is.
         strain: Bulk strain eps_xx of the strip's surface.
         duration: Of the step, s: what creeps does so over it.
-        beside: What the strip's supports are moved by beside the displacement, at the contact nodes (n, d), mm; None
-            for nothing.
+        beside: What the strip's supports are moved by beside the displacement, at the contact nodes (n, d), mm; by
+            default nothing.
         closure: By what all that lies between gives way where it is worn as here; None where nothing does.
     """
 
@@ -37,7 +39,7 @@ class Imposed:
     force: float | None = None
     strain: float = 0.0
     duration: float = 0.0
-    beside: Array | None = None
+    beside: Array = field(default_factory=lambda: NO_SHIFT)
     closure: Closure | None = None
 
     def towards(self, other: Imposed, share: float) -> Imposed:
@@ -53,16 +55,9 @@ class Imposed:
             between(self.force, other.force),
             self.strain + share * (other.strain - self.strain),
             share * other.duration,
-            _between(self.beside, other.beside, share),
+            (1 - share) * self.beside + share * other.beside,
             other.closure,
         )
-
-
-def _between(one: Array | None, other: Array | None, share: float) -> Array | None:
-    """Return what is a share of the way from one to the other; None is zero."""
-    if one is None and other is None:
-        return None
-    return np.asarray((1 - share) * (0.0 if one is None else one) + share * (0.0 if other is None else other))
 
 
 @dataclass(frozen=True)
@@ -87,8 +82,8 @@ class StickState:
         crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
         elastic: Displacements by the forces of now of all that may creep, from which it creeps on; empty where nothing
             does.
-        beside: What the strip's supports are moved by beside the displacement (n, d), mm; None for nothing.
-        flowed: Depth that the surfaces have flown in the step (n,), mm; None without a hardness.
+        beside: What the strip's supports are moved by beside the displacement (n, d), mm.
+        flowed: Depth that the surfaces have flown in the step (n,), mm.
     """
 
     pressure: Array
@@ -107,8 +102,8 @@ class StickState:
     parts: int = 1
     crept: Array = field(default_factory=lambda: STIFF)
     elastic: Array = field(default_factory=lambda: STIFF)
-    beside: Array | None = None
-    flowed: Array | None = None
+    beside: Array = field(default_factory=lambda: NO_SHIFT)
+    flowed: Array = field(kw_only=True)
 
     @property
     def heat(self) -> NDArray[Any]:
@@ -144,44 +139,44 @@ class PartialSlipState:
         heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
         conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts; None without heat.
         pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
-            was not: zones come back from cycle to cycle, so that Newton starts there. None before the first cycle.
+            was not: zones come back from cycle to cycle, so that Newton starts there.
         load: Factor of all loads in the steps to come.
-        slid: What each node has slipped from the start (n,), mm, where a law depends on it; else None.
-        speed: Of the slip of each node in the last step (n,), mm/s, where a law depends on it; else None.
+        slid: What each node has slipped from the start (n,), mm.
+        speed: Of the slip of each node in the last step (n,), mm/s.
         coupling: Iterations of contact and heat in the last step.
         held: What laws remember after the last step, where that is not what `worn` has; the shape stays until the end
             of a half-cycle.
-        slips: Of the nodes in each time step of the cycle (k, n, m), mm, as `trials`; None where no law depends on
-            what a whole cycle does.
+        slips: Of the nodes in each time step of the cycle (k, n, m), mm, as `trials`.
     """
 
     contact: StickState
     imposed: Imposed
     worn: WornDepths
+    pressures: Array
+    trials: Array
+    slips: Array
+    slid: Array
+    speed: Array
     next_step: int = 0
     temperature: Array | None = None
     heating: Array | None = None
     conductance: Array | None = None
-    pressures: Array | None = None
-    trials: Array | None = None
     load: float = 1.0
     coupling: int = 0
-    slid: Array | None = None
-    speed: Array | None = None
     held: Held | None = None
-    slips: Array | None = None
 
     @property
     def near(self) -> tuple[Array, Array] | None:
         """Pressure and trial of the next time step a cycle ago; None where there was none."""
-        if self.pressures is None or self.trials is None or np.isnan(self.pressures[self.next_step, 0]):
+        if np.isnan(self.pressures[self.next_step, 0]):
             return None
         return self.pressures[self.next_step], self.trials[self.next_step]
 
-    def then(self, state: StickState) -> tuple[Array | None, Array | None]:
-        """Return pressures and trials of the time steps with those of the next one."""
-        if self.pressures is None or self.trials is None:
-            return None, None
-        pressures, trials = self.pressures.copy(), self.trials.copy()
-        pressures[self.next_step], trials[self.next_step] = state.pressure, state.trial
-        return pressures, trials
+    def then(self, state: StickState, imposed: Imposed, worn: WornDepths, duration: float) -> PartialSlipState:
+        """Return where a run is after its next time step, but for its heat."""
+        k, slipped = self.next_step, np.linalg.norm(state.slip, axis=1)
+        pressures, trials, slips = self.pressures.copy(), self.trials.copy(), self.slips.copy()
+        pressures[k], trials[k], slips[k] = state.pressure, state.trial, state.slip
+        slid, following = self.slid + slipped, (k + 1) % len(pressures)
+        known = pressures, trials, slips, slid, slipped / duration
+        return PartialSlipState(state, imposed, worn, *known, next_step=following, load=self.load)

@@ -50,13 +50,24 @@ class ContactState:
         pressure: p (m, n), MPa.
         gap: (m, n), mm.
         rigid: Amplitudes a of the rigid modes (m, modes).
-        iterations: Newton iterations of the inequality.
+        iterations: Newton iterations of the inequality; -1 where it has not been solved yet.
     """
 
     pressure: Array
     gap: Array
     rigid: Array
     iterations: int
+
+    @classmethod
+    def unsolved(cls, nodes: int) -> ContactState:
+        """Return the contact of a phase that has not been solved yet: NaN."""
+        unknown = np.full((1, nodes), np.nan)
+        return cls(unknown, unknown, np.zeros((1, 0)), -1)
+
+    @property
+    def solved(self) -> bool:
+        """Whether it has been solved."""
+        return self.iterations >= 0
 
 
 @dataclass(frozen=True)

@@ -207,7 +207,7 @@ class PhaseRecord:
     Attributes:
         phase: Its number in the cycle.
         contact: Its contact.
-        before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
+        before: Pressure of the same phase one cycle ago (n,), MPa; NaN in the first cycle.
         adds: What it adds to the totals.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
         equilibrium: What it is in; by default that of the phase.
@@ -215,7 +215,7 @@ class PhaseRecord:
 
     phase: int
     contact: ContactState
-    before: Array | None
+    before: Array
     adds: Totals
     friction_ratio: Array
     equilibrium: RigidEquilibrium | None = None
@@ -297,8 +297,7 @@ class Recorder:
             found = np.array([pressure_scales(self.system, now[None])[0] for now, _ in pairs])
             return np.array([np.abs(now - before).max() for now, before in pairs]) / found
         pressure = np.array([[p.contact.pressure[0] for p in row.phases] for row in rows])
-        unknown = np.full(pressure.shape[2], np.nan)
-        before = np.array([[unknown if p.before is None else p.before for p in row.phases] for row in rows])
+        before = np.array([[p.before for p in row.phases] for row in rows])
         changes: Array = np.abs(pressure - before).max(axis=(1, 2)) / pressure_scales(self.system, pressure)
         return changes
 

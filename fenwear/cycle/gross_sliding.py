@@ -124,13 +124,12 @@ class SmallerSteps:
         self._steps[parts] = [PhaseStep(system, phase, implicit=self.implicit) for phase in phases]
 
 
-def _as_one(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: HeatState | None) -> PhaseEnd:
+def _as_one(ends: list[PhaseEnd], phase: int, before: ContactState, temperature: HeatState | None) -> PhaseEnd:
     """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
     middle = ends[len(ends) // 2].record
     adds = reduce(Totals.__add__, [end.record.adds for end in ends])
-    previous = None if before is None else before.pressure[0]
     return PhaseEnd(
-        PhaseRecord(phase, middle.contact, previous, adds, middle.friction_ratio),
+        PhaseRecord(phase, middle.contact, before.pressure[0], adds, middle.friction_ratio),
         temperature,
         heat_of_phases(end.heat for end in ends),
         reduce(WornDepths.__add__, [end.worn for end in ends]),
@@ -222,7 +221,7 @@ class Jumps:
         # What flows in a first cycle, or as a load rises, depends on the order of the phases and on what they heat.
         if self.system.layers.hardness < np.inf and (left == 1 or not given):
             after, recorded = self._marched(state)
-            if state.contacts[0] is None or self._flown(state, after) > tolerance or given:
+            if not state.contacts[0].solved or self._flown(state, after) > tolerance or given:
                 return after, recorded
 
         def made(cycles: float) -> tuple[_Made, Estimate]:

@@ -328,11 +328,13 @@ class Stepper(JumpLaw[_Moment]):
         """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""
         motion, found = self.system.motion, []
         reached = self._begin.half_cycle + round(cycles) * motion.half_cycles
-        contacts, before = parted(end.contact), self._begin.contacts
+        contacts, pressure = parted(end.contact), end.contact.pressure
+        before = np.concatenate([contact.pressure for contact in self._begin.contacts])
+        earlier = pressure - (pressure - before) / cycles  # in the cycle before
         heats = self._last_cycle_heat(end)
         # Half-cycles after one have worn what is missing at its end.
         depths, totals = [end.worn], [end.totals]
-        adds, phases = self._adds(end.contact.pressure), list(range(len(contacts)))
+        adds, phases = self._adds(pressure), list(range(len(contacts)))
         if self.wear.coated:
             own_worn = [self._worn([k], contacts, end.worn) for k in phases]
             adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
@@ -342,7 +344,7 @@ class Stepper(JumpLaw[_Moment]):
             totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
         for stroke, depth in enumerate(depths):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            records = [self._phase_record(k, contacts[k], before[k], cycles, adds[k]) for k in own]
+            records = [PhaseRecord(k, contacts[k], earlier[k], adds[k], self.ratios[k]) for k in own]
             number = reached - (motion.half_cycles - 1 - stroke)
             heat = heat_of_phases(heats[k] for k in own)
             load = self.loading(reached)
@@ -354,14 +356,6 @@ class Stepper(JumpLaw[_Moment]):
         conditions = [self.conditions[k] for k in phases]
         passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
         return passing.worn(pressures, now)
-
-    def _phase_record(
-        self, phase: int, contact: ContactState, old: ContactState | None, cycles: float, adds: Totals
-    ) -> PhaseRecord:
-        previous = None
-        if old is not None:
-            previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
-        return PhaseRecord(phase, contact, previous, adds, self.ratios[phase])
 
     def _last_cycle_heat(self, end: _Moment) -> list[HalfCycleHeat | None]:
         """Return the heat of the cycle that ends a jump."""

@@ -55,11 +55,10 @@ class Onwards:
         self._alike = 0  # of them, in which the same nodes touch as in the last one
         self._touching = b""
 
-    def keep(self, before: ContactState | None, contact: ContactState) -> None:
+    def keep(self, before: ContactState, contact: ContactState) -> None:
         """Take a contact, and the one a cycle before it; what was known is forgotten where that is not the last one."""
         pressure = contact.pressure[0]
-        follows = before is not None and before is self._last
-        self._count = min(self._count + 1, len(ONWARDS)) if follows else 1
+        self._count = min(self._count + 1, len(ONWARDS)) if before is self._last else 1
         self._known[1:] = self._known[:-1]
         self._values[0] = pressure if self._law is None else self._law.nearness(pressure, contact.gap[0])
         self._known[0, self._nodes :], self._last = contact.rigid[0], contact
@@ -68,10 +67,10 @@ class Onwards:
             self._alike = min(self._alike + 1, self._count) if touching == self._touching else 1
             self._touching = touching
 
-    def start(self, before: ContactState | None) -> ContactState | None:
+    def start(self, before: ContactState) -> ContactState:
         """Return the contact that goes on as over the last cycles, from that of the last one."""
         count = self._count
-        if before is None or count < 2 or before is not self._last:
+        if count < 2 or before is not self._last:
             return before
         own, every = before.pressure[0], ONWARDS[count - 1, :count] @ self._known[:count]
         further, rigid = every[: self._nodes], every[None, self._nodes :]
@@ -110,7 +109,7 @@ class _Begin:
     Attributes:
         temperature: Of both bodies.
         worn: Depths.
-        before: The same phase one cycle ago; None in the first cycle.
+        before: The same phase one cycle ago.
         start: Where its contact is looked for; None from nothing.
         near: Pressures there (n,), MPa: even ones where none are known. By edges of the contact those nodes touch that
             carry one, as in a cycle ago: they do not go to and fro.
@@ -120,7 +119,7 @@ class _Begin:
 
     temperature: HeatState
     worn: WornDepths
-    before: ContactState | None
+    before: ContactState
     start: ContactState | None
     near: Array
     half_cycles: float
@@ -185,7 +184,7 @@ class PhaseStep:
         self,
         temperature: HeatState | None,
         worn: WornDepths,
-        before: ContactState | None,
+        before: ContactState,
         load: float = 1.0,
         half_cycles: float = 0.0,
         near: ContactState | None = None,
@@ -208,7 +207,9 @@ class PhaseStep:
         if load != self._load:
             self._contact.press(load)
             self._load = load
-        start = (before if self._onwards is None else self._onwards.start(before)) or near
+        start = near
+        if before.solved:
+            start = before if self._onwards is None else self._onwards.start(before)
         pressure = self._even if start is None else start.pressure[0]
         at = _Begin(self.system.exchange.own(temperature), worn, before, start, pressure, half_cycles, cycle)
         if self._at_begin is None:
@@ -408,6 +409,5 @@ class PhaseStep:
             return with_coated(self.system, meter(pressure), lost), lost
 
         adds, lost = self.system.team.lead(left)
-        previous = None if at.before is None else at.before.pressure[0]
-        record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
+        record = PhaseRecord(self.phase, contact, at.before.pressure[0], adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)

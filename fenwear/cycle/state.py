@@ -23,7 +23,7 @@ class RunState:
     Attributes:
         half_cycle: Its number; 0 before the first.
         worn: Worn depths of both bodies.
-        contacts: The last contact of each phase; None where there was none yet.
+        contacts: The last contact of each phase; unsolved where there was none yet.
         temperature: Of both bodies; None without heat.
         totals: What all half-cycles so far add up to.
         jump_length: Cycles that the next jump tries; below 1 a part of one, with stick alone.
@@ -35,7 +35,7 @@ class RunState:
 
     half_cycle: int
     worn: WornDepths
-    contacts: tuple[ContactState | None, ...]
+    contacts: tuple[ContactState, ...]
     temperature: HeatState | None
     totals: Totals
     jump_length: float = 1
@@ -48,12 +48,14 @@ def with_phases(state: RunState | None, count: int) -> RunState | None:
     """Return the state for a motion of so many phases: the contacts of another number of them are of no use."""
     if state is None or len(state.contacts) == count:
         return state
-    return replace(state, contacts=(None,) * count, periodic_phases=0, finer=with_phases(state.finer, count))
+    contacts = (ContactState.unsolved(len(state.worn.punch)),) * count
+    return replace(state, contacts=contacts, periodic_phases=0, finer=with_phases(state.finer, count))
 
 
 def beginning(system: Tribosystem, temperature: HeatState | None = None) -> RunState:
     """Return the unworn bodies at a temperature, by default the initial one."""
-    return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature, none_yet(system))
+    contacts = (ContactState.unsolved(len(system.pair.weights)),) * len(system.motion.phases)
+    return RunState(0, system.unworn(), contacts, temperature, none_yet(system))
 
 
 def on_exchange(state: RunState, exchange: HeatExchange) -> RunState:
@@ -64,11 +66,8 @@ def on_exchange(state: RunState, exchange: HeatExchange) -> RunState:
 
 def carried_by(state: RunState) -> Mask:
     """Return the nodes of the punch that touch in some phase or have worn (n,)."""
-    found: Mask = state.worn.punch > 0
-    for contact in state.contacts:
-        if contact is not None:
-            found = found | (contact.pressure[0] > 0)
-    return found
+    touched = [contact.pressure[0] > 0 for contact in state.contacts]
+    return np.asarray(np.any([state.worn.punch > 0, *touched], axis=0))
 
 
 def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> RunState:
@@ -76,11 +75,7 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     nodes, _ = node_maps(before, after)
     none, totals = np.zeros(len(nodes)), state.totals
     contacts = [
-        None
-        if one is None
-        else replace(
-            one, pressure=on_nodes(one.pressure, nodes, none), gap=on_nodes(one.gap, nodes, after.pair.initial_gap)
-        )
+        replace(one, pressure=on_nodes(one.pressure, nodes, none), gap=on_nodes(one.gap, nodes, after.pair.initial_gap))
         for one in state.contacts
     ]
     return replace(
@@ -95,13 +90,12 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     )
 
 
-def all_phases(contacts: tuple[ContactState | None, ...]) -> ContactState:
-    """Return the contacts of all phases as one state; of no phases unless all are there."""
-    present = [c for c in contacts if c is not None]
-    if len(present) < len(contacts):
+def all_phases(contacts: tuple[ContactState, ...]) -> ContactState:
+    """Return the contacts of all phases as one state; of no phases unless all are solved."""
+    if not all(contact.solved for contact in contacts):
         return ContactState(*(np.zeros((0, 0)),) * 3, 0)
-    pressure, gap, rigid = (np.concatenate([getattr(c, n) for c in present]) for n in ("pressure", "gap", "rigid"))
-    return ContactState(pressure, gap, rigid, max(c.iterations for c in present))
+    pressure, gap, rigid = (np.concatenate([getattr(c, n) for c in contacts]) for n in ("pressure", "gap", "rigid"))
+    return ContactState(pressure, gap, rigid, max(c.iterations for c in contacts))
 
 
 def parted(contact: ContactState) -> tuple[ContactState, ...]:

@@ -138,8 +138,7 @@ class Seen:
         """Look at half-cycles of a run."""
         touching = (block.pressure > 0) | (block.wear > 0)
         for contact in block.end.contacts:
-            if contact is not None:
-                touching[-1] |= contact.pressure[0] > 0
+            touching[-1] |= contact.pressure[0] > 0
         return cls(
             made, block.system, [f"in half-cycle {int(n):,}" for n in block.half_cycle], block.pressure,
             block.complementarity_error, {"punch": block.wear, "strip": block.wear_strip}, block.end.worn,

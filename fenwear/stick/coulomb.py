@@ -343,8 +343,7 @@ class _Run:
         ratio = np.where(pressed[:, None], force, 0.0) / np.where(pressed, records.pressure[middle], 1.0)[:, None]
         loaded = problem.interface.loaded(step.fraction)
         equilibrium = replace(position.rigid, resultant=loaded.resultant)
-        before = None if np.isnan(steps.before[middle]).any() else steps.before[middle]
-        phase = PhaseRecord(stroke, contact, before, adds, ratio, equilibrium)
+        phase = PhaseRecord(stroke, contact, steps.before[middle], adds, ratio, equilibrium)
         heat = None
         if problem.heat is not None:
             punch, strip = records.temperature[-1]

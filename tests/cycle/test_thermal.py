@@ -351,7 +351,7 @@ def test_no_growth_rate_of_what_is_not_stationary(assembled: Assemble) -> None:
     system = assembled("example1-heat", *COARSE, "heat.partition=0.2", "wear.punch.coefficient=4e-6")
     for half_cycles, told in ((1, False), (40, False), (3000, True)):
         *_, last = march(system, half_cycles, implicit=True)
-        contacts = [c.pressure[0] for c in last.end.contacts if c is not None]
+        contacts = [c.pressure[0] for c in last.end.contacts]
         surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
         change = last.periodicity[-2:].max() if half_cycles > 1 else np.nan
         rate, reason = stationary_growth(system, np.array(contacts), surfaces, half_cycles % 2, change)

@@ -56,7 +56,7 @@ from fenwear.stick.setup import (
     unheated_problem,
     with_ends,
 )
-from fenwear.stick.state import PartialSlipState
+from fenwear.stick.state import NO_HEAT, PartialSlipState
 
 
 @dataclass(frozen=True)
@@ -292,10 +292,10 @@ class _Run:
         self.strokes = system.motion.half_cycles
         self.meter = Meter(system, self.problem)
 
-    def temperature(self, state: RunState) -> Array | None:
+    def temperature(self, state: RunState) -> Array:
         """Return the temperatures of a state on this system's bases (dim,)."""
         exchange = self.system.exchange
-        return exchange.own(state.temperature).values if exchange.conducts else None
+        return exchange.own(state.temperature).values
 
     def at(self, state: RunState, load: float) -> PartialSlipState:
         """Return where the time steps of a state are, with its own depths and temperatures."""
@@ -303,13 +303,11 @@ class _Run:
         warm = self.temperature(state)
         if memory is None:
             at = self.problem.beginning(state.worn, load)
-            return replace(at, temperature=at.temperature if warm is None else warm)
+            return replace(at, temperature=warm)
         at, steps = memory.at, self.problem.program.steps
         if len(at.pressures) != len(steps):
             at = self.problem.forgotten(at)
-        heating = np.zeros(len(self.problem.weights)) if at.heating is None else at.heating
         at = replace(self.problem.shaped(at, state.worn), load=load, temperature=warm)
-        at = replace(at, heating=None if warm is None else heating)
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
             at, _ = self.problem.half_cycle(at)
         worn = self.problem.interface.layers.flown_as(state.worn, at.worn)
@@ -379,9 +377,11 @@ class HalfCycles(_Run):
         record = self.half_cycle(number, steps, (worn, totals), adds, load)
         contacts = list(state.contacts)
         contacts[stroke] = record.phases[0].contact
-        warm = None if at.temperature is None else self.system.exchange.at(at.temperature)
+        warm = self.system.exchange.at(at.temperature) if self.system.exchange.conducts else None
         memory = Memory(
-            replace(at, worn=worn, held=None, temperature=None), stuck=stuck.astype(float), made_of=self.setup.made_of
+            replace(at, worn=worn, held=None, temperature=NO_HEAT),
+            stuck=stuck.astype(float),
+            made_of=self.setup.made_of,
         )
         return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
 
@@ -436,9 +436,9 @@ class Jumps(_Run):
             made.append(record)
         warm = state.temperature
         after: tuple[HeatState, ...] = ()
-        if then.warm is not None and then.end.temperature is not None:
+        if exchange.conducts:
             warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
-        kept = replace(then, end=replace(then.end, temperature=None), warm=None, finer=None)
+        kept = replace(then, end=replace(then.end, temperature=NO_HEAT), warm=NO_HEAT, finer=None)
         memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.made_of)
         done = RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory)
         return (done if then.finer is None else replace(done, finer=self._finer(done, then, until))), made
@@ -450,7 +450,7 @@ class Jumps(_Run):
         memory: Memory | None = done.memory
         if done.half_cycle == until and memory is not None:
             cycle = first_cycle(self.problem, then.end, then.finer, then.number, then.warm)
-            memory = replace(memory, cycle=replace(cycle, warm=None, end=replace(cycle.end, temperature=None)))
+            memory = replace(memory, cycle=replace(cycle, warm=NO_HEAT, end=replace(cycle.end, temperature=NO_HEAT)))
         return replace(done, worn=then.finer, totals=done.totals - off, memory=memory)
 
     def _fits(self, cycle: FrettingCycle) -> bool:

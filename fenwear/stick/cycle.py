@@ -247,7 +247,7 @@ class PartialSlipProblem:
         laws, layers, slipped = self.laws, self.interface.layers, np.linalg.norm(after.contact.slip, axis=1)
         if laws is None:
             return self.wear, None
-        steps = StepSlips(after.contact.pressure[None], slipped[None], np.array([step.duration]), None)
+        steps = StepSlips(after.contact.pressure[None], slipped[None], np.array([step.duration]), np.zeros((1, 2, 0)))
         evolution = self.losses.evolution_of(steps, at)
         if evolution is None:
             return laws.wear_at(self.conditions.of_steps(steps, at)[0]), None
@@ -281,7 +281,7 @@ class PartialSlipProblem:
         """Return the state after a time step with friction mu (n,)."""
         self.watch()
         position, imposed = self.imposed(step, at)
-        if self.heat is None or at.temperature is None or at.heating is None:
+        if self.heat is None or not len(at.temperature):  # before the first cycle nothing heats
             state = advance(self.interface, at.contact, at.imposed, imposed, friction, position, at.near)
             return self._after(at, state, imposed, step)
 
@@ -318,7 +318,7 @@ class PartialSlipProblem:
             if at.next_step == 0:
                 break
         records = TimeStepRecords.joined(parts)
-        if self.heat is not None and begin.temperature is not None and at.temperature is not None:
+        if self.heat is not None:
             self.heat.check_bounds(begin.temperature, at.temperature, records.heat)
         return at, records
 

@@ -39,7 +39,7 @@ from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.frozen import Frozen
 from fenwear.stick.heat import HeatHistory
 from fenwear.stick.records import FrettingCycle, TimeStepRecords
-from fenwear.stick.state import PartialSlipState
+from fenwear.stick.state import NO_HEAT, PartialSlipState
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
@@ -86,7 +86,7 @@ def jumped(
 
 
 def first_cycle(
-    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array | None = None
+    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array = NO_HEAT
 ) -> FrettingCycle:
     """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,).
 
@@ -95,7 +95,7 @@ def first_cycle(
     """
     at, heat = _led_to(problem, at, worn), problem.heat
     if heat is not None:
-        at = replace(at, temperature=heat.initial() if warm is None else warm)
+        at = replace(at, temperature=warm if len(warm) else heat.initial())
     return _recorded(problem, at, worn, number)
 
 
@@ -120,7 +120,7 @@ def _cycle_after(
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
     at, heat = _led_to(problem, at, worn), problem.heat
-    if heat is None or before.warm is None or before.end.temperature is None:
+    if heat is None:
         return _recorded(problem, at, worn, number, min(int(number - before.number), MOST_RUN_IN))
     cycles, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
     if cycles <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before

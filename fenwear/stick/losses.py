@@ -36,7 +36,7 @@ class StepSlips(NamedTuple):
     pressure: Array
     slid: Array
     duration: Array
-    temperature: Array | None
+    temperature: Array
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class StepConditions:
     def at_start(self, at: PartialSlipState) -> dict[str, Any]:
         """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
         warm = None
-        if self.heat is not None and at.temperature is not None:
+        if self.heat is not None and len(at.temperature):
             punch, strip = self.heat.surfaces(at.temperature)
             warm = punch, strip
         return {
@@ -99,7 +99,7 @@ class StepConditions:
         assert laws is not None
         slid = before.slid + np.cumsum(slips.slid, axis=0)
         warm = [known["temperatures"]] * len(slid)
-        if slips.temperature is not None and known["temperatures"] is not None:
+        if known["temperatures"] is not None:
             warm[1:] = [(punch, strip) for punch, strip in slips.temperature[:-1]]
         return [
             laws.conditions(

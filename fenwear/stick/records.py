@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import surface_strain
 from fenwear.stick.program import TimeStep
-from fenwear.stick.state import PartialSlipState
+from fenwear.stick.state import NO_HEAT, PartialSlipState
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class FrettingCycle:
         first_step: Number of the time step that its records begin with.
         end: State at its end. What comes next follows from it.
         length: Cycles of the next jump, as wished; below 1 a part of one.
-        warm: Temperatures at the start of its records (dim,); None without heat.
+        warm: Temperatures at the start of its records (dim,); empty without heat.
         finer: Depths to which jumps of next to no length would have led, to the next order; None where nobody asks.
     """
 
@@ -149,7 +149,7 @@ class FrettingCycle:
     first_step: int
     end: PartialSlipState
     length: float = 1
-    warm: Array | None = None
+    warm: Array = field(default_factory=lambda: NO_HEAT)
     finer: WornDepths | None = None
 
     @property
@@ -222,8 +222,7 @@ def record(
 
 def _of_heat(heat: StickHeat | None, at: PartialSlipState, after: PartialSlipState) -> tuple[Array, Array, Array]:
     """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
-    none, conductance = np.zeros(0), after.conductance
-    if heat is None or at.temperature is None or after.heating is None or conductance is None:
-        return none, np.zeros((2, 0)), none
-    made = heat.step(at.next_step, at.temperature, after.heating, conductance)
-    return made.terms, made.surfaces, conductance
+    if heat is None:
+        return NO_HEAT, np.zeros((2, 0)), NO_HEAT
+    made = heat.step(at.next_step, at.temperature, after.heating, after.conductance)
+    return made.terms, made.surfaces, after.conductance

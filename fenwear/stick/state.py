@@ -14,6 +14,7 @@ from fenwear.layers.memory import Held
 from fenwear.sliding.wear import STIFF, WornDepths
 from fenwear.stick.position import LoadEffect
 
+NO_HEAT: Array = np.zeros(0)  # of bodies whose temperatures stay
 NO_SHIFT: Array = np.zeros((1, 1))  # of any node along any axis
 
 
@@ -135,9 +136,9 @@ class PartialSlipState:
         imposed: On it, expansion by heat among it.
         worn: Depths.
         next_step: Its number in the cycle.
-        temperature: Of both bodies, on the bases of the rig's heat (dim,); None without heat.
-        heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
-        conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts; None without heat.
+        temperature: Of both bodies, on the bases of the rig's heat (dim,); empty without heat, as the next two.
+        heating: Heat of friction of the nodes in the last step (n,), mW/mm².
+        conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts.
         pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
             was not: zones come back from cycle to cycle, so that Newton starts there.
         load: Factor of all loads in the steps to come.
@@ -158,9 +159,9 @@ class PartialSlipState:
     slid: Array
     speed: Array
     next_step: int = 0
-    temperature: Array | None = None
-    heating: Array | None = None
-    conductance: Array | None = None
+    temperature: Array = field(default_factory=lambda: NO_HEAT)
+    heating: Array = field(default_factory=lambda: NO_HEAT)
+    conductance: Array = field(default_factory=lambda: NO_HEAT)
     load: float = 1.0
     coupling: int = 0
     held: Held | None = None

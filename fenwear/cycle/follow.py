@@ -35,7 +35,6 @@ from fenwear.assembly import (
     warming_key,
 )
 from fenwear.bodies.assembly import interpolate
-from fenwear.bodies.grid import RegularGrid
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState, carried_by, on_other_grid
 from fenwear.heat.field import HeatState
@@ -124,40 +123,28 @@ class _Leaving:
             self._heights_of.mesh_update_due(system.unworn())
 
     def __call__(self, state: RunState) -> bool:
-        """Return whether wear or warmth is large; collective, or for rank 0 that leads."""
-        if self.given is not None:
-            return state.half_cycle in self.given
-        team = self.system.team
-        if self.is_worn(state) or self.larger(state) is not None:
-            return True
-        return bool(warming_key(self.system)) and team.each(self, "is_warm", state)
+        """Return whether something is to be made anew; collective, or for rank 0 that leads."""
+        return self._renewal(state, partial(self.system.team.each, self, "is_warm")) is not None
 
     def renewal(self, state: RunState) -> Renewal | None:
         """Return what is to be made anew; collective."""
+        return self._renewal(state, self.is_warm)
+
+    def _renewal(self, state: RunState, is_warm: Callable[[RunState], bool]) -> Renewal | None:
+        team = self.system.team
         if self.given is not None:
             return self.given.get(state.half_cycle)
-        if self.is_worn(state):
+        if team.lead(partial(self._heights_of.mesh_update_due, state.worn)):
             return Renewal.MESHES
-        if state.temperature is not None and self.is_warm(state):
+        if warming_key(self.system) and is_warm(state):
             return Renewal.PROPERTIES
-        return None if self.larger(state) is None else Renewal.GRID
-
-    def is_worn(self, state: RunState) -> bool:
-        """Return whether the meshes are to follow the wear; collective, or for rank 0 that leads."""
-        return self.system.team.lead(partial(self._heights_of.mesh_update_due, state.worn))
-
-    def larger(self, state: RunState) -> RegularGrid | None:
-        """Return the grid that the contact asks for, None where it has room; collective, or for rank 0 that leads."""
-        return self.system.team.lead(lambda: outgrown(self.system, carried_by(state)))
+        grows = team.lead(lambda: outgrown(self.system, carried_by(state)) is not None)
+        return Renewal.GRID if grows else None
 
     def is_warm(self, state: RunState) -> bool:
         """Return whether a whole cycle ends at temperatures for which properties are to be taken anew; collective."""
-        return _is_warm(self.system, state)
-
-
-def _is_warm(system: Tribosystem, state: RunState) -> bool:
-    """Return whether a whole cycle ends at temperatures for which the properties are to be taken anew; collective."""
-    return state.half_cycle % system.motion.half_cycles == 0 and properties_outdated(system, state.temperature)
+        whole = state.half_cycle % self.system.motion.half_cycles == 0
+        return whole and properties_outdated(self.system, state.temperature)
 
 
 def _moved_along(state: RunState, moved: Tribosystem) -> RunState:

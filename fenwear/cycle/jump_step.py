@@ -84,7 +84,7 @@ class Stepper(JumpLaw[_Moment]):
         self.evolution = system.evolution(self.conditions)
         self._measure([system.friction.values(one) for one in self.conditions])
         self.coupled = Coupled(system, self.take)
-        self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
+        self._flowed: Array | float = 0.0  # beyond the hardness, in the stage solved last
         self._begin: RunState = beginning(system)  # of the jump
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._last_cycle: list[HalfCycle] = []
@@ -265,9 +265,8 @@ class Stepper(JumpLaw[_Moment]):
         contact, begin = solved.contact, solved.temperature
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        flowed = None if self._flowed is None else np.asarray(self._flowed / cycles, dtype=np.float64)
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
-        worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
+        worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed / cycles)
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
         rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
         return self.after(before, _Moment(worn, contact, time, begin, before.totals, rate), cycles)

@@ -170,7 +170,7 @@ class PhaseStep:
         self._passing = system.passing(wear, [phase])
         self._debris, self._slid = self._passing.debris, system.path[[phase]]
         self._edge: Array | None = None  # distances from it, for which debris is lost as it is there
-        self._flowed: Array | None = None  # beyond the hardness, in the last solve
+        self._flowed: Array | float = 0.0  # beyond the hardness, in the last solve
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
         self._onwards: Onwards | None = None  # where the iterations of contact depend on their start

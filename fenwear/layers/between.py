@@ -280,7 +280,7 @@ class Layers:
         """Return by how much more the surfaces have to flow at pressures (m, n), mm."""
         return self.softness * np.maximum(pressure - self.hardness, 0.0)
 
-    def flowing(self, solve: Callable[[Array], T], pressure_of: Callable[[T], Array]) -> tuple[T, Array | None]:
+    def flowing(self, solve: Callable[[Array], T], pressure_of: Callable[[T], Array]) -> tuple[T, Array]:
         """Return what solves a contact with no pressure beyond the hardness, and what has flown (n,), mm.
 
         Args:
@@ -292,11 +292,9 @@ class Layers:
         """
         flowed = np.zeros(self.nodes)
         found = solve(flowed)
-        if self.hardness == np.inf:
-            return found, None
         for _ in range(MOST_FLOWS):
             pressure = pressure_of(found)
-            if pressure.max() <= (1 + CAPPED) * self.hardness:
+            if pressure.max() <= (1 + CAPPED) * self.hardness:  # which may be infinite
                 return found, flowed
             flowed = flowed + self.flow(pressure).max(axis=0)
             found = solve(flowed)

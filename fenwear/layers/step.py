@@ -49,7 +49,7 @@ class LayerEvolution:
         return cls(layers, wear, layers.debris.over(slid, conditions, layers.places(wear.pairs)), evolution)
 
     def worn(
-        self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | None = None
+        self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | float = 0.0
     ) -> WornDepths:
         """Return what the phases wear, and how the state of what lies between changes.
 
@@ -66,7 +66,7 @@ class LayerEvolution:
         if self.layers.debris.present:
             lies = carried if self.layers.strip_carries else changes
             lies[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
-        if flowed is not None:
+        if self.layers.hardness < np.inf:
             changes[self.layers.row(PLASTIC)] = flowed
         found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
         if self.evolution is None or not self.layers.memory.names:

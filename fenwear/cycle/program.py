@@ -15,7 +15,7 @@ from fenwear.case import Case, Cycle
 from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import Loading, as_given
-from fenwear.cycle.follow import follow
+from fenwear.cycle.follow import Integrate, follow
 from fenwear.cycle.state import RunState, carried_by, on_other_grid, with_phases
 from fenwear.errors import CaseError, InputError
 
@@ -60,8 +60,7 @@ def follow_program(
     """
     stages = stages_of(system.case)
     if not stages:
-        span = Span(half_cycles)
-        yield from follow(system, lambda own, state, leave: integrate(own, state, leave, span), start)
+        yield from follow(system, _over(Span(half_cycles), integrate), start)
         return
     base, state, again = system, start, Recurring(stages)
     for stage in stages:
@@ -78,21 +77,21 @@ def follow_program(
             again.forget()
             return again.at_stage(base, stage)
 
-        def run(
-            own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span = span
-        ) -> Iterator[Block]:
-            return integrate(own, state, leave, span)
-
         larger, state = _with_larger_grid(base, stage, state, span.loading(max(done, stage.begin)))
         if larger is not base:
             base = larger
             again.forget()
         own = again.at_stage(base, stage)
-        for block in follow(own, run, with_phases(state, len(own.motion.phases)), adapt):
+        for block in follow(own, _over(span, integrate), with_phases(state, len(own.motion.phases)), adapt):
             yield block
             state = block.end
             if state.half_cycle >= span.until:  # what it asks for by now the next stage has
                 break
+
+
+def _over(span: Span, integrate: IntegrateSpan) -> Integrate:
+    """Return what integrates over a span."""
+    return lambda system, state, leave: integrate(system, state, leave, span)
 
 
 def _with_larger_grid(

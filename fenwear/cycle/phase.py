@@ -243,10 +243,7 @@ class PhaseStep:
         Raises:
             ConvergenceError: Newton's method does not find both together.
         """
-        mu = self._friction_that_stays
-        if mu is None:
-            conditions = self._conditions(at.near, None, at, at.near > 0)
-            mu = FollowingFriction(self.system.friction, conditions)
+        mu = FollowingFriction(self.system.friction, self._conditions(at.near, None, at, at.near > 0))
         contact = self._following(mu, at, gap)
         if self.system.edges is None:
             passing = self._taken(mu.at(contact.pressure[0]), at.worn, ended=True)
@@ -309,13 +306,6 @@ class PhaseStep:
         if self._staying is None:
             return system.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)
         return self._staying.pressed(pressure, system.layers.facing(system.pairs[self.phase], worn))
-
-    @cached_property
-    def _friction_that_stays(self) -> FollowingFriction | None:
-        """Friction that follows the pressure and nothing else that changes; None where something else does."""
-        if self._staying is None or self.system.layers.debris.present:
-            return None
-        return FollowingFriction(self.system.friction, self._staying)
 
     def _taken(self, conditions: ContactConditions, worn: WornDepths, *, ended: bool) -> LayerEvolution:
         """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""

@@ -15,6 +15,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import GRAZING, ConvergenceError
+from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat, CycleJump, cycle_memory, cycles_of
 from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
@@ -41,6 +42,20 @@ Take = Callable[[Sequence[ContactConditions], Evolution], None]
 def cycle_heat(system: Tribosystem) -> CycleHeat:
     """Return the heat of whole cycles."""
     return cycles_of(with_reduced_heat(system).exchange)
+
+
+def end_temperatures(heat: CycleHeat, begin: Array, pressure: Array, conductances: Array) -> tuple[Array, HeatState]:
+    """Return the temperatures of both surfaces at the end of each phase (m, 2, n), K, and those of the bodies then.
+
+    Args:
+        heat: Of cycles.
+        begin: Temperatures at the start (dim,).
+        pressure: Of the phases (m, n), times what `heat` leaves out of friction.
+        conductances: Of their nodes (m, n).
+    """
+    states = [heat.exchange.at(one) for one in heat.states(begin, pressure, conductances)[1:]]
+    surfaces = [heat.exchange.contact_temperatures(one, phase) for phase, one in enumerate(states)]
+    return np.array(surfaces), states[-1]
 
 
 def check_cycle_memory(system: Tribosystem) -> None:
@@ -305,12 +320,6 @@ class Coupled:
             return fixed_point(advance, start.pressure.ravel(), close, DISAGREE, depth=SMOOTH, team=self.system.team)
         except ConvergenceError:  # heat that is no small part
             return solve(end.gap, end.coupling(self.mu), start)
-
-    def at_friction(self) -> CycleHeat:
-        """Return the heat of whole cycles at the friction last taken."""
-        if self.system.friction.constant:
-            return self.heat
-        return cycles_of(self.heat.exchange.with_friction(self.mu))
 
     def surfaces(self, state: Array, pressure: Array, conductances: Array) -> Array:
         """Return the contact temperatures of both bodies at the start of each phase (m, 2, n), K."""

@@ -39,7 +39,7 @@ from fenwear.case.names import told_by_name
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.block import Block
-from fenwear.cycle.coupled import Coupled, Solved, check_cycle_memory
+from fenwear.cycle.coupled import Coupled, Solved, check_cycle_memory, end_temperatures
 from fenwear.cycle.jump import jump
 from fenwear.cycle.own_properties import with_own_properties
 from fenwear.cycle.program import at_step
@@ -48,8 +48,6 @@ from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_heat_m
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.field import HeatState
-from fenwear.heat.periodic import CycleHeat
-from fenwear.layers.memory import Held
 from fenwear.sliding.wear import STIFF
 
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
@@ -268,8 +266,8 @@ def _loads_oppose(system: Tribosystem) -> bool:
     return bool(along.status == 0 and -along.fun <= ALONG)
 
 
-def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
-    """Return contact of all phases, with heat the temperatures, the heat of whole cycles, and what laws remember."""
+def _solve(problem: SteadyInequality) -> tuple[Solved, Coupled]:
+    """Return contact of all phases, with heat the temperatures, and what they were found with."""
     system = problem.system
     try:
         contact = problem.solve()
@@ -292,9 +290,9 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat, Held | None]:
     coupled = Coupled(system, problem.take)
     heat = coupled.heat
     if not heat.dim and system.constant_coefficients:
-        return Solved(contact, heat.initial(), heat.conductances(contact.pressure)), heat, None
+        return Solved(contact, heat.initial(), heat.conductances(contact.pressure)), coupled
     solved = coupled.solve(heat.initial(), np.inf, contact, lambda gap, coupling, _: problem.solve(gap, coupling))
-    return solved, coupled.at_friction(), coupled.held
+    return solved, coupled
 
 
 def _any_shape_stays(problem: SteadyInequality, contact: ContactState) -> bool:
@@ -328,7 +326,7 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
 
 
-def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: Held | None) -> SteadyState:
+def _result(problem: SteadyInequality, solved: Solved, coupled: Coupled) -> SteadyState:
     system, contact = problem.system, solved.contact
     hardness, peak = system.layers.hardness, float(contact.pressure.max())
     if peak > hardness:
@@ -362,27 +360,22 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat, held: He
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
         0.0,
-        _steady_heat(heat, solved, middle) if heat.dim else None,
+        _steady_heat(coupled, solved) if coupled.heat.dim else None,
         coordinates=system.pair.punch.x,
         system=system,
         conductances=solved.conductances,
         debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
         crept=system.creep.depth(crept),
-        states={} if held is None else system.layers.memory.by_name(held),
+        states={} if coupled.held is None else system.layers.memory.by_name(coupled.held),
     )
 
 
-def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat:
+def _steady_heat(coupled: Coupled, solved: Solved) -> SteadyHeat:
     """Follow the temperatures through one cycle of the steady state."""
-    exchange, now = heat.exchange, heat.exchange.at(solved.temperature)
-    punch, strip = [], []
-    for phase in range(len(solved.conductances)):
-        now, _ = exchange.half_cycle(now, phase, solved.contact.pressure[phase], solved.conductances[phase])
-        temperatures = exchange.contact_temperatures(now, phase)
-        punch.append(temperatures[0])
-        strip.append(temperatures[1])
-    ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle
-    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], now)
+    heated, positions = coupled.mu * solved.contact.pressure, coupled.system.motion.positions
+    surfaces, end = end_temperatures(coupled.heat, solved.temperature, heated, solved.conductances)
+    ends = surfaces[positions - 1 :: positions]  # the last phase of each half-cycle
+    return SteadyHeat(ends[:, 0], ends[:, 1], end)
 
 
 def _uniform_wear_exists(system: Tribosystem) -> bool:

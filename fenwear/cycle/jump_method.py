@@ -365,7 +365,8 @@ class Sizes:
         return float(self.pair.weights @ np.abs(self.crept(worn.crept)))
 
     def _carried(self, worn: WornDepths) -> float:
-        return float(self.pair.strip.weights @ np.abs(self.layers.lies(worn))) if self.layers.strip_carries else 0.0
+        carried = worn.carried[:1] if self.layers.strip_carries else ()  # none where depths alone are measured
+        return float(sum(self.pair.strip.weights @ np.abs(own) for own in carried))
 
     def _states(self, worn: WornDepths) -> Array:
         """Return the integrals of the size of all states."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -180,6 +181,8 @@ class Coupled:
         self._touching: Mask | None = None  # which nodes do in each phase, for the edges of the contact
         self._passing: LayerEvolution | None = None  # at the conditions last taken, where debris is felt by them
         self.heat = cycle_heat(system)
+        self._warm = self.heat.dim > 0 and not system.constant_coefficients
+        self._felt = system.layers.debris.present and system.asks("debris")
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
         if not system.friction.constant:
             self.heat = cycles_of(self.heat.exchange.with_friction(self.mu))
@@ -255,32 +258,24 @@ class Coupled:
         lagged: bool,
     ) -> Solved:
         """Return the same, where nodes of these pressures conduct."""
-        system, heat, constant = self.system, self.heat, self.system.constant_coefficients
-        shape, contact = start.pressure.shape, start
+        heat, constant, shape, contact = self.heat, self.system.constant_coefficients, start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
-        warm = heat.dim > 0 and not constant
-        parts: list[Array] = [start.pressure.ravel()]
-        if warm:
-            first = heat.conductances(start.pressure)
-            parts.append(self.surfaces(temperature, start.pressure, first).ravel())
-        if passing is not None:
-            # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
-            parts += [passing.before.punch, passing.before.strip]
-        felt = system.layers.debris.present and system.asks("debris")
-        if felt:
-            parts.append(self._first_debris(start.pressure, passing))
-        unknowns = _Unknowns.like(parts, pressure_scale(system, start.pressure), warm=warm)
+        # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
+        depths = [] if passing is None else [passing.before.punch, passing.before.strip]
+        debris, first = partial(self._first_debris, start.pressure, passing), heat.conductances(start.pressure)
+        parts = self._parts(start.pressure, temperature, first, depths, debris)
+        unknowns = _Unknowns.like(parts, pressure_scale(self.system, start.pressure), warm=self._warm)
 
         def advance(x: Array) -> tuple[Array, Solved, bool]:
             nonlocal contact, known
             now = unknowns.parted(x)
             pressure = now[0].reshape(shape)
             if not constant:
-                surfaces = now[1] if warm else np.zeros(0)
-                depths = now[:-1] if felt else now
+                surfaces = now[1] if self._warm else np.zeros(0)
+                depths = now[:-1] if self._felt else now
                 worn = None if passing is None else replace(passing.before, punch=depths[-2], strip=depths[-1])
-                self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing, now[-1] if felt else None)
-            found: list[Array] = []
+                lies = now[-1] if self._felt else None
+                self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing, lies)
             conductances = heat.conductances(conducting(pressure))
             key = conductances.tobytes()
             if known is None or known[0] != key:
@@ -288,17 +283,25 @@ class Coupled:
             end = known[1]
             contact = self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling(self.mu), contact)
             state = end.state(self.mu * contact.pressure)
-            solved = Solved(contact, state, conductances)
             same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
-            if warm:
-                found.append(self.surfaces(state, contact.pressure, conductances).ravel())
-            if passing is not None:
-                found.extend(passing.depths(contact.pressure))
-            if felt:
-                found.append(self._debris(contact.pressure, passing))
-            return unknowns.joined([contact.pressure.ravel(), *found]), solved, same and constant
+            worn_off = [] if passing is None else passing.depths(contact.pressure)
+            debris = partial(self._debris, contact.pressure, passing)
+            parts = self._parts(contact.pressure, state, conductances, worn_off, debris)
+            return unknowns.joined(parts), Solved(contact, state, conductances), same and constant
 
-        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=system.team)
+        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=self.system.team)
+
+    def _parts(
+        self, pressure: Array, state: Array, conductances: Array, depths: list[Array], debris: Callable[[], Array]
+    ) -> list[Array]:
+        """Return the unknowns: pressures, and where coefficients depend on them temperatures, depths and debris."""
+        parts: list[Array] = [pressure.ravel()]
+        if self._warm:
+            parts.append(self.surfaces(state, pressure, conductances).ravel())
+        parts += depths
+        if self._felt:
+            parts.append(debris())
+        return parts
 
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
         """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""

@@ -12,7 +12,7 @@ from fenwear.sliding.local_laws import LocalWear
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import OppositeBodies
-from fenwear.stick.position import surface_strain
+from fenwear.stick.position import Position, surface_strain
 from fenwear.stick.program import TimeStep
 from fenwear.stick.state import NO_HEAT, PartialSlipState
 
@@ -175,24 +175,8 @@ def record(
         step: What was done in it.
         wear: By its law.
     """
-    before, state, position = at.contact, after.contact, interface.position(step.offset)
-    weights = position.pair.weights
-    f = np.concatenate([state.pressure, state.traction.T.ravel()])
-    force, back = position.forces(f)
-    on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
-    layers, closure = interface.layers, interface.layers.closure_at(position.pair, at.worn)
-    closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)
-    if interface.creep.creeps:
-        crept = zip(*map(interface.creep.displaced, (state.crept, before.crept)), strict=True)
-        on_punch, on_strip, closed = (
-            own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
-        )
-    stored = float(np.vdot(force, on_punch) - np.vdot(back, on_strip))
-    lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
-    work = state.force * (state.displacement - before.displacement) + lowered
-    carried = position.beside(state.beside) - position.beside(before.beside)
-    work += float((f * position.weights) @ carried)
-    stored += float(weights @ (state.pressure * closed))
+    state, position = after.contact, interface.position(step.offset)
+    weights, (work, stored) = position.pair.weights, _work(interface, position, at, after)
     slipped = np.linalg.norm(state.slip, axis=1)
     coatings, bases = wear.both(state.pressure, slipped, step.duration)
     values = (
@@ -218,6 +202,29 @@ def record(
         state.flowed,
     )
     return TimeStepRecords(*(np.asarray(value)[None] for value in values))
+
+
+def _work(
+    interface: OppositeBodies, position: Position, at: PartialSlipState, after: PartialSlipState
+) -> tuple[float, float]:
+    """Return what rig and loads do in a time step at a place of the strip, and what both bodies take up."""
+    before, state = at.contact, after.contact
+    f = np.concatenate([state.pressure, state.traction.T.ravel()])
+    force, back = position.forces(f)
+    on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
+    layers, closure = interface.layers, interface.layers.closure_at(position.pair, at.worn)
+    closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)
+    if interface.creep.creeps:
+        crept = zip(*map(interface.creep.displaced, (state.crept, before.crept)), strict=True)
+        on_punch, on_strip, closed = (
+            own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
+        )
+    stored = float(np.vdot(force, on_punch) - np.vdot(back, on_strip))
+    lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
+    work = state.force * (state.displacement - before.displacement) + lowered
+    carried = position.beside(state.beside) - position.beside(before.beside)
+    work += float((f * position.weights) @ carried)
+    return work, stored + float(position.pair.weights @ (state.pressure * closed))
 
 
 def _of_heat(heat: StickHeat | None, at: PartialSlipState, after: PartialSlipState) -> tuple[Array, Array, Array]:

@@ -228,13 +228,9 @@ def _unit(text: object, of: str) -> float:
 
     unit = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
     try:
-        return convert(f"1 {unit}", "mm") if unit.strip() not in ("", "1") else _no_unit(unit)
+        return convert(f"1 {unit.strip() or 1}", "mm")  # none is an error
     except ValueError:
         raise ValueError(f"{of} is in {unit!r}; expected a unit of length such as um or mm") from None
-
-
-def _no_unit(unit: str) -> float:
-    raise ValueError(unit)
 
 
 def _named(names: Sequence[str], wanted: Sequence[str]) -> str | None:

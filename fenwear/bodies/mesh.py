@@ -24,26 +24,24 @@ from numpy.typing import NDArray
 from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.bodies import kept
-from fenwear.bodies.raw_mesh import GmshView, RawMesh, element_problems, raw_mesh
+from fenwear.bodies.raw_mesh import GmshView, RawMesh, raw_mesh
 from fenwear.bodies.ready import constants, meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError, OutputError, did_you_mean
-from fenwear.files.by_gmsh import gmsh_model
+from fenwear.files.by_gmsh import gmsh_model, model_mesh
 from fenwear.files.cad import name_parts, read_shapes, set_sizes
 from fenwear.files.formats import CAD, MESHES, is_foreign, read_mesh
-from fenwear.files.groups import Group, GroupedMesh, grouped, into_gmsh, normal, rows_text
-from fenwear.files.mesh import stacked
+from fenwear.files.groups import GroupedMesh, grouped, into_gmsh, normal
+from fenwear.files.mesh import ENTITIES, FLAT, sound
 from fenwear.parallel import check_memory, on_root
 
 BODIES = ROLES
-ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 TRIANGLE = 2  # gmsh's number of the cell
 MATRICES = (
     3  # of n by n contact nodes, that a contact holds at least: of forces along three axes; in a plane it is four
 )
-SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
 # What makes the mesh of a .geo follow from more than its text and parameters.
@@ -139,24 +137,21 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
     if path is None:
         names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
         raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
-    ends = (".geo", ".msh", *CAD, *MESHES)
-    if path.suffix.lower() not in ends:
-        message = f"expected a file that ends in {', '.join(ends)}, got {geometry.file!r}"
-        raise CaseError(InputError("geometry.file", message))
-    meshed_here = path.suffix.lower() in (".geo", *CAD)
-    if not meshed_here and geometry.order != 1:
-        message = f"a {path.suffix} file has its own; it belongs to a .geo file or to a shape from CAD"
-        raise CaseError(InputError("geometry.order", message))
-    shape = path.suffix.lower() in CAD
-    for key in ("size", "sizes"):
-        if getattr(geometry, key) and not shape:
-            message = f"belongs to a shape from CAD ({', '.join(CAD)}); a {path.suffix} file has its own sizes"
+    ends, suffix = (".geo", ".msh", *CAD, *MESHES), path.suffix.lower()
+    shape, of_gmsh = suffix in CAD, suffix in (".geo", ".msh")
+    of_cad = f"belongs to a shape from CAD ({', '.join(CAD)}); a {path.suffix} file has its own sizes"
+    of_shape = f"a {path.suffix} file has its own; it belongs to a .geo file or to a shape from CAD"
+    of_others = "belongs to the mesh of another program; a .geo has Mesh.ScalingFactor"
+    for key, wrong, message in (
+        ("file", suffix not in ends, f"expected a file that ends in {', '.join(ends)}, got {geometry.file!r}"),
+        ("order", geometry.order != 1 and not shape and suffix != ".geo", of_shape),
+        ("size", geometry.size and not shape, of_cad),
+        ("sizes", geometry.sizes and not shape, of_cad),
+        ("unit", geometry.unit and of_gmsh, of_others),
+        ("parameters", geometry.parameters and suffix == ".msh", "a .msh file has none; they belong to a .geo file"),
+    ):
+        if wrong:
             raise CaseError(InputError(f"geometry.{key}", message))
-    if geometry.unit is not None and path.suffix.lower() in (".geo", ".msh"):
-        message = "belongs to the mesh of another program; a .geo has Mesh.ScalingFactor"
-        raise CaseError(InputError("geometry.unit", message))
-    if path.suffix == ".msh" and geometry.parameters:
-        raise CaseError(InputError("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
     return path
 
 
@@ -197,21 +192,19 @@ def build_meshes(
 def _meshed(
     geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float], names: Names, fresh: bool
 ) -> tuple[RawMesh, RawMesh]:
-    """Return the meshes of the punch and the strip: those kept on disk, or gmsh's, which are kept; on one rank."""
+    """Return the meshes of the punch and the strip: those kept on disk, or new ones, which are kept; on one rank."""
     parameters = _parameters(geometry, path, known)
     content = path.read_bytes()
     keep = path.suffix in (".geo", ".msh", *CAD) and not (path.suffix == ".geo" and REACHES_OUT.search(content))
     sizes = (geometry.size, sorted(geometry.sizes.items()), geometry.unit, sorted(geometry.groups.items()))
     shape = (geometry.order, geometry.degree, kind, names, path.suffix, sorted(parameters.items()), sizes)
     place = kept.known(MPI.COMM_SELF, lambda: [*shape, content], fresh=fresh) if keep else kept.NOWHERE
-    if (stored := place.arrays) is not None:
+    if stored := place.arrays:
         _check_size(float(stored["contact_nodes"]))
         own = [{name.removeprefix(body): a for name, a in stored.items() if name.startswith(body)} for body in BODIES]
         return RawMesh.of_arrays(own[0]), RawMesh.of_arrays(own[1])
-    foreign = foreign_mesh(geometry, path, kind, names)
-    with gmsh_model() as gmsh:
-        contact_nodes = _load(gmsh, geometry, path, kind, parameters, names, foreign)
-        punch, strip = (raw_mesh(gmsh, body, _dim(kind)) for body in BODIES)
+    mesh, contact_nodes = _grouped(geometry, path, kind, parameters, names)
+    punch, strip = (raw_mesh(mesh, body, _dim(kind)) for body in BODIES)
     both = zip(BODIES, (punch, strip), strict=True)
     arrays = {f"{body}{name}": a for body, raw in both for name, a in raw.arrays().items()}
     place.save({**arrays, "contact_nodes": np.array(contact_nodes)})
@@ -248,10 +241,9 @@ def write_msh(
         OutputError: there is no room for it.
     """
     geo = find_geometry(geometry, folder)
-    parameters, foreign = _parameters(geometry, geo, known), foreign_mesh(geometry, geo, kind, names)
+    mesh, _ = _grouped(geometry, geo, kind, _parameters(geometry, geo, known), names)
     with gmsh_model() as gmsh:
-        _load(gmsh, geometry, geo, kind, parameters, names, foreign)
-        _name_groups(gmsh, names.by_name)
+        into_gmsh(gmsh, mesh, names.by_name)
         try:
             path.touch()
         except OSError as error:
@@ -260,42 +252,39 @@ def write_msh(
         if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
             path.unlink()
             raise OutputError(path, "gmsh wrote only a part of it; is there room?")
-        if foreign is not None:
-            return foreign.rows(), foreign.text()
-        rows = _group_rows(gmsh)
-    return rows, rows_text(rows)
+    return mesh.rows(), mesh.text()
 
 
-def _group_rows(gmsh: Any) -> list[dict[str, Any]]:
-    """Return a row of each group of bodies in gmsh's current model."""
-    tags, flat, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    points = np.asarray(flat, dtype=np.float64).reshape(-1, 3)[order]
-    groups = []
-    for dim in range(4):
-        for name, tag in _groups(gmsh, dim).items():
-            cells: dict[int, NDArray[np.int64]] = {}
-            for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-                for kind, labels, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
-                    rows = np.searchsorted(np.asarray(tags)[order], nodes).reshape(len(labels), -1)
-                    cells[int(kind)] = stacked(cells.get(int(kind)), rows)
-            if cells:
-                groups.append(Group(name, dim, cells, name))
-    return GroupedMesh(points, tuple(groups), (), ()).rows()
-
-
-def foreign_mesh(geometry: Geometry, path: Path, kind: Kind | None, names: Names) -> GroupedMesh | None:
-    """Return the groups that the mesh of another program gives; None of a file that gmsh meshes or writes itself.
+def _grouped(
+    geometry: Geometry, path: Path, kind: Kind | None, parameters: Mapping[str, float], names: Names
+) -> tuple[GroupedMesh, float]:
+    """Return the groups of the mesh that a file has or gives, and about how many contact nodes a solid has, else 0.
 
     Raises:
-        CaseError: it cannot be read, or its sets do not fit.
+        CaseError: it cannot be read or meshed, or its groups do not fit.
     """
-    if not is_foreign(path):
-        return None
-    mesh = read_mesh(path)
+    by_role, wanted, contact_nodes = _any_case(names), geometry.groups, 0.0
     scale = None if geometry.unit is None else _millimetres(geometry.unit)
-    dim = mesh.dim if kind is None else _dim(kind)
-    return grouped(mesh, geometry.groups, scale, dim, _any_case(names), lambda text: convert(text, "mm"))
+    if is_foreign(path):
+        mesh = read_mesh(path)
+        dim = mesh.dim if kind is None else _dim(kind)
+    else:
+        scale = 1.0
+        with gmsh_model() as gmsh:
+            dim, contact_nodes = _load(gmsh, geometry, path, kind, parameters, by_role)
+            mesh = sound(model_mesh(path.name, gmsh))
+        if path.suffix.lower() in CAD:
+            wanted = {}  # its parts are named
+    found = grouped(mesh, wanted, scale, dim, by_role, _length)
+    if kind == "axisymmetric" and (inner := float(found.points[:, 0].min())) < -FLAT * float(np.ptp(found.points)):
+        message = f"{path.name} reaches to x = {inner:g} mm, but x is the radius of an axisymmetric model: x >= 0"
+        raise CaseError(InputError("geometry.file", message))
+    return found, contact_nodes
+
+
+def _length(text: str) -> float:
+    """Return a length in mm."""
+    return convert(text, "mm")
 
 
 def _millimetres(unit: str) -> float:
@@ -329,13 +318,12 @@ def _load(
     path: Path,
     kind: Kind | None,
     parameters: Mapping[str, float],
-    names: Names,
-    foreign: GroupedMesh | None,
-) -> float:
-    """Read and mesh the geometry in the current gmsh model, name its groups by roles, and check the contract.
+    by_role: Callable[[str], str],
+) -> tuple[int, float]:
+    """Read a file of gmsh or a shape into the current gmsh model, and mesh it.
 
     Returns:
-        About how many contact nodes a solid has; 0 of others.
+        Dimension of the bodies, and about how many contact nodes a solid has; 0 of others.
     """
     gmsh.parser.clear()
     for name, value in parameters.items():
@@ -343,27 +331,24 @@ def _load(
     gmsh.option.setNumber(SCALING, 1.0)  # not of a geometry that was read before
     contact_nodes, shape = 0.0, path.suffix.lower() in CAD
     try:
-        if foreign is not None:
-            into_gmsh(gmsh, foreign)
-        elif shape:
+        if shape:
             read_shapes(gmsh, path, _millimetres(geometry.unit or "mm"))
         else:
             _merge(gmsh, path)
-            _rename_groups(gmsh, path, geometry, names)
-        kind = kind or ("solid" if gmsh.model.getEntities(3) else "stress")
-        dim = _dim(kind)
+        whole = 3 if gmsh.model.getEntities(3) else 2
+        dim = whole if kind is None else _dim(kind)
+        if dim < whole and any(by_role(name).startswith(BODIES) for name in _groups(gmsh, 3)):
+            message = f"{path.name} has physical volumes: expected model.kind = 'solid' with it"
+            raise CaseError(InputError("geometry.file", message))
         if shape:
-            parts = {_any_case(names)(name): part for name, part in geometry.groups.items()}
-            name_parts(gmsh, path.name, parts, dim, _any_case(names), lambda text: convert(text, "mm"))
-        _by_roles(gmsh, path, names)
-        if shape:
+            parts = {by_role(name): part for name, part in geometry.groups.items()}
+            name_parts(gmsh, path.name, parts, dim, by_role, _length)
             tags = {name: (d, tag) for d in range(4) for name, tag in _groups(gmsh, d).items()}
-            sizes = {_any_case(names)(name): size for name, size in geometry.sizes.items()}
-            set_sizes(gmsh, geometry.size, sizes, tags)
-            _check_groups_there(gmsh, path, kind)
+            set_sizes(gmsh, geometry.size, {by_role(name): size for name, size in geometry.sizes.items()}, tags)
         if shape or path.suffix == ".geo":
             gmsh.model.mesh.generate(dim - 1)
-            most = max(_contact_nodes(gmsh, geometry, body, dim - 1) for body in BODIES[: 1 if kind == "solid" else 2])
+            contact = _contact_nodes(gmsh, geometry, by_role, dim - 1)
+            most = max(contact[body] for body in BODIES[: 1 if kind == "solid" else 2])
             _check_size(most)
             contact_nodes = most if kind == "solid" else 0.0
             gmsh.model.mesh.generate(dim)
@@ -375,70 +360,24 @@ def _load(
         raise
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
-    _check_groups(gmsh, path, kind)
-    return contact_nodes
+    return dim, contact_nodes
 
 
-def _rename_groups(gmsh: Any, path: Path, geometry: Geometry, names: Names) -> None:
-    """Give groups of a .geo or .msh the names that geometry.groups has, and known ones in capitals their own.
-
-    Raises:
-        CaseError: a group does not exist.
-    """
-    for dim in range(4):
-        for name, tag in _groups(gmsh, dim).items():
-            group = _any_case(names)(name)
-            if group.startswith(tuple(f"{body}_" for body in BODIES)) and names.by_role(name) == name != group:
-                gmsh.model.removePhysicalName(name)
-                gmsh.model.setPhysicalName(dim, tag, group)
-    for wanted, value in geometry.groups.items():
-        every = {normal(name): (dim, tag, name) for dim in range(4) for name, tag in _groups(gmsh, dim).items()}
-        for text in [value] if isinstance(value, str) else value:
-            if text and normal(text) not in every:
-                message = f"{path.name} has no group {text!r}. It has {', '.join(sorted(every)) or 'none'}."
-                raise CaseError(InputError(f"geometry.groups.{wanted}", message))
-        parts = [every[normal(text)] for text in ([value] if isinstance(value, str) else value) if text]
-        old = every.get(normal(wanted))
-        if old is not None and old not in parts:
-            gmsh.model.removePhysicalGroups([old[:2]])
-        if parts:
-            own = [e for dim, tag, _ in parts for e in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
-            for dim, tag, name in parts:
-                gmsh.model.removePhysicalGroups([(dim, tag)])
-                gmsh.model.removePhysicalName(name)
-            tag = gmsh.model.addPhysicalGroup(parts[0][0], own)
-            gmsh.model.setPhysicalName(parts[0][0], tag, wanted)
-
-
-def _by_roles(gmsh: Any, path: Path, names: Names) -> None:
-    """Name the groups of bodies by their roles.
-
-    Raises:
-        CaseError: a body has groups of both names.
-    """
-    groups = {name for dim in range(4) for name in _groups(gmsh, dim)}
-    both = sorted(f"{name} and {names.by_role(name)}" for name in groups if {names.by_role(name)} & (groups - {name}))
-    if both:
-        raise CaseError(InputError("geometry.file", f"{path.name} has {', '.join(both)}: expected one of each"))
-    _name_groups(gmsh, names.by_role)
-
-
-def _name_groups(gmsh: Any, change: Callable[[str], str]) -> None:
-    """Give the groups of the current gmsh model other names."""
-    for dim in range(4):
-        for name, tag in _groups(gmsh, dim).items():
-            if (new := change(name)) != name:
-                gmsh.model.removePhysicalName(name)
-                gmsh.model.setPhysicalName(dim, tag, new)
-
-
-def _contact_nodes(gmsh: Any, geometry: Geometry, body: str, dim: int) -> float:
-    """Return about how many contact nodes a body has on its meshed surfaces, or lines."""
-    nodes = 0.0
-    tags = [tag for name, tag in _groups(gmsh, dim).items() if name == f"{body}_contact" or _contact_name(body, name)]
-    for entity in (entity for tag in tags for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)):
-        for cell, cells in zip(*gmsh.model.mesh.getElements(dim, entity)[:2], strict=True):
-            nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**dim)
+def _contact_nodes(gmsh: Any, geometry: Geometry, by_role: Callable[[str], str], dim: int) -> dict[str, float]:
+    """Return about how many contact nodes each body has on its meshed surfaces, or lines."""
+    wanted = {
+        normal(text): by_role(group)
+        for group, value in geometry.groups.items()
+        for text in ([value] if isinstance(value, str) else value)
+    }
+    nodes = dict.fromkeys(BODIES, 0.0)
+    for name, tag in _groups(gmsh, dim).items():
+        body, _, rest = wanted.get(normal(name), by_role(name)).partition("_")
+        if body not in nodes or rest.partition("_")[0] != "contact":
+            continue
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
+            for cell, cells in zip(*gmsh.model.mesh.getElements(dim, entity)[:2], strict=True):
+                nodes[body] += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**dim)
     return nodes
 
 
@@ -478,115 +417,28 @@ def _parameters(geometry: Geometry, path: Path, known: Mapping[str, float]) -> d
     Raises:
         CaseError: the file does not define one by DefineConstant, or too many elements are asked for.
     """
-    defined = _checked_parameters(geometry, path)
+    defined = sorted(constants(path)) if path.suffix == ".geo" else list(geometry.parameters)
+    problems = []
+    for name, value in geometry.parameters.items():
+        key = f"geometry.parameters.{name}"
+        if name not in defined:
+            has = f"{', '.join(defined) or 'none'}{did_you_mean(name, defined)}"
+            problems.append(InputError(key, f"{path.name} has no such parameter, but {has}"))
+        elif "elements" in name and value > MOST_ELEMENTS:
+            problems.append(InputError(key, f"expected at most {MOST_ELEMENTS:,} elements, got {value:g}"))
+    if problems:
+        raise CaseError(problems)
     return {**{name: value for name, value in known.items() if name in defined}, **geometry.parameters}
-
-
-def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
-    """Return the parameters that the .geo file defines by DefineConstant, and reject others."""
-    if path.suffix != ".geo":
-        return []
-    known = sorted(constants(path))
-    unknown = [name for name in geometry.parameters if name not in known]
-    if unknown:
-        raise CaseError(
-            [InputError(f"geometry.parameters.{name}", _no_parameter(path, name, known)) for name in unknown]
-        )
-    many = [name for name, value in geometry.parameters.items() if "elements" in name and value > MOST_ELEMENTS]
-    if many:
-        message = f"expected at most {MOST_ELEMENTS:,} elements, got {geometry.parameters[many[0]]:g}"
-        raise CaseError(InputError(f"geometry.parameters.{many[0]}", message))
-    return known
-
-
-def _no_parameter(path: Path, name: str, known: list[str]) -> str:
-    hint = did_you_mean(name, known)
-    return f"{path.name} has no such parameter, but {', '.join(known) or 'none'}{hint}"
 
 
 def _groups(gmsh: Any, dim: int) -> dict[str, int]:
     return {gmsh.model.getPhysicalName(dim, tag): tag for _, tag in gmsh.model.getPhysicalGroups(dim)}
 
 
-def _named(gmsh: Any, dim: int) -> str:
-    names = [name or "one without a name" for name in _groups(gmsh, dim)]
-    return f"it has {', '.join(names)}" if names else f"it has no physical {ENTITIES[dim]}"
-
-
-def _check_groups_there(gmsh: Any, path: Path, kind: Kind) -> None:
-    """Refuse a geometry without the groups that bodies need, before or after it is meshed.
-
-    Raises:
-        CaseError: a body has no region or no contact.
-    """
-    if problems := _missing_groups(gmsh, path, _dim(kind)):
-        raise CaseError([InputError("geometry.file", text) for text in problems])
-
-
-def _missing_groups(gmsh: Any, path: Path, whole: int) -> list[str]:
-    """Return which groups of the contract are missing, in words."""
-    problems = []
-    region, facet = ENTITIES[whole], ENTITIES[whole - 1]
-    for body in BODIES:
-        regions = [name for name in _groups(gmsh, whole) if name.startswith(f"{body}_")]
-        if not regions:
-            problems.append(f"{path.name} has no physical {region} named {body}_...; {_named(gmsh, whole)}")
-        facets = _groups(gmsh, whole - 1)
-        named = [name for name in facets if _contact_name(body, name)]
-        if f"{body}_contact" not in facets and not named:
-            problems.append(f"{path.name} has no physical {facet} named {body}_contact; {_named(gmsh, whole - 1)}")
-        if f"{body}_contact" in facets and named:
-            problems.append(
-                f"{path.name} has {body}_contact and {', '.join(sorted(named))}; expected one or the others"
-            )
-    if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
-        problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
-    return problems
-
-
-def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
-    whole = _dim(kind)
-    problems = _missing_groups(gmsh, path, whole)
-    for dim in (whole, whole - 1):
-        names = _groups(gmsh, dim)
-        types = {name: _element_types(gmsh, dim, tag) for name, tag in names.items()}
-        problems += [f"{path.name}: physical group {name} has no elements" for name in names if not types[name]]
-        problems += [
-            f"{path.name}: physical group {name} mixes element types" for name in names if len(types[name]) > 1
-        ]
-    if not problems and whole == 3:
-        problems = [f"{path.name}: {text}" for text in _solid_types(gmsh)]
-    if not problems:
-        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(whole + 1)]
-        found = element_problems(gmsh, groups, axisymmetric=kind == "axisymmetric")
-        problems = [f"{path.name}: {text}" for text in found]
-    if problems:
-        raise CaseError([InputError("geometry.file", text) for text in problems])
-
-
 def _contact_name(body: str, group: str) -> str:
     """Return NAME of a group BODY_contact_NAME, "" of any other."""
     head, _, name = group.partition(f"{body}_contact_")
     return "" if head else name
-
-
-def _element_types(gmsh: Any, dim: int, tag: int) -> set[int]:
-    entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
-    return {int(t) for entity in entities for t in gmsh.model.mesh.getElementTypes(dim, entity)}
-
-
-def _solid_types(gmsh: Any) -> list[str]:
-    """Return what is wrong with the kinds of elements of solids, in words."""
-    problems = []
-    for body in BODIES:
-        regions = [tag for name, tag in _groups(gmsh, 3).items() if name.startswith(f"{body}_")]
-        types = {t for tag in regions for t in _element_types(gmsh, 3, tag)}
-        names = sorted(gmsh.model.mesh.getElementProperties(t)[0] for t in types)
-        if len(types) > 1:
-            problems.append(f"the {body} mixes elements ({', '.join(names)}); expected one kind in a body")
-        if not names[0].startswith(SOLID_ELEMENTS):
-            problems.append(f"the {body} has elements of the kind {names[0]}; expected tetrahedra or hexahedra")
-    return problems
 
 
 def _distribute(raw: RawMesh | None, body: str, owner: int | None, comm: MPI.Comm, kind: Kind) -> BodyMesh:

@@ -14,10 +14,11 @@ from fenwear import compat
 from fenwear.arrays import Mask
 from fenwear.bodies.contact_surface import ContactSurface, Trace
 from fenwear.bodies.guides import Loose
-from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.bodies.mesh import BodyMesh
 from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Body, Kind, Support
 from fenwear.errors import CaseError, InputError
+from fenwear.files.mesh import ENTITIES
 
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
@@ -153,18 +154,16 @@ class Supports:
         high = np.array([comm.allreduce(x[:, i].max(initial=-np.inf), MPI.MAX) for i in range(3)])
         return float((high - low).max())
 
-    def rigid_basis(self, pivot: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def rigid_basis(self, pivot: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the translations and the rotations omega x (x - x_O) on the owned dofs (owned, modes).
 
-        About a pivot x_O, by default that of the first part.
-
-        A positive rotation about y lowers what lies at larger x:
+        About a pivot x_O. A positive rotation about y lowers what lies at larger x:
         u = (z - z_O, -(x - x_O)). These are the paper's signs of lambda_M.
         """
         owned = self.space.dofmap.index_map.size_local
         x = self.space.tabulate_dof_coordinates()[:owned]
         dim = self.dim
-        arm = x[:, :dim] - (self.pivot if pivot is None else pivot)
+        arm = x[:, :dim] - pivot
         if dim == 2:
             turns = np.stack([arm[:, 1], -arm[:, 0]], axis=1)[:, :, None]
         else:
@@ -227,7 +226,7 @@ class Supports:
             return [np.array(description.pivot)] * self._count
         body, comm, tolerance = self.body, self.body.mesh.comm, 1e-6 * self._size()
         nodes = self.space.tabulate_dof_coordinates()[: len(self._part), : self.dim]
-        found: list[NDArray[np.float64] | None] = [None] * self._count
+        found = np.full((self._count, self.dim), np.nan)
         for number, support in enumerate(description.supports):
             if support.on is not None and support.on not in body.points:
                 continue
@@ -236,9 +235,9 @@ class Supports:
             parts = np.where(distance < tolerance, self._part[:, None], -1).max(axis=0, initial=-1)
             parts = np.max(comm.allgather(parts), axis=0)
             for k in range(self._count):
-                if found[k] is None and (parts == k).any():
+                if np.isnan(found[k]).any() and (parts == k).any():
                     found[k] = points[parts == k].mean(axis=0)
-        return [np.zeros(self.dim) if point is None else point for point in found]
+        return list(np.nan_to_num(found))
 
     def _untouched(self, k: int) -> str:
         """Say which part neither touches nor is held; collective."""

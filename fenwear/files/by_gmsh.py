@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, Block, MeshFile, MeshSet
+from fenwear.files.gmsh_child import arrays_of
+from fenwear.files.mesh import ENTITIES, KINDS, Block, MeshFile, MeshSet
 from fenwear.stack import importing
 
 
@@ -28,15 +29,6 @@ def _library() -> Any:
     with importing():
         import gmsh
     return gmsh
-
-
-def gmsh_there() -> None:
-    """Look whether there is gmsh.
-
-    Raises:
-        StackError: it is missing, or a library that it needs.
-    """
-    _library()
 
 
 @contextmanager
@@ -57,7 +49,6 @@ def gmsh_model() -> Iterator[Any]:
             gmsh.finalize()
 
 
-ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 LONGEST = 600  # s that gmsh may read
 
 
@@ -88,7 +79,7 @@ def in_process(path: Path, *, shapes: bool = False) -> dict[str, NDArray[Any]]:
         CaseError: gmsh cannot read it, or ends on it.
         StackError: there is no gmsh.
     """
-    gmsh_there()
+    _library()
     program = "OpenCASCADE" if shapes else "gmsh"
     with TemporaryDirectory() as folder:
         result = Path(folder) / "mesh.npz"
@@ -113,6 +104,11 @@ def in_process(path: Path, *, shapes: bool = False) -> dict[str, NDArray[Any]]:
             return dict(arrays)
 
 
+def model_mesh(name: str, gmsh: Any) -> MeshFile:
+    """Return the mesh of gmsh's current model, with its physical groups as sets."""
+    return _mesh(name, arrays_of(gmsh.model), "")
+
+
 def _mesh(name: str, arrays: dict[str, NDArray[Any]], word: str) -> MeshFile:
     """Return the mesh of arrays; `word` names the sets of entities without a group."""
     named = json.loads(bytes(arrays["named"]))
@@ -135,9 +131,8 @@ def _mesh(name: str, arrays: dict[str, NDArray[Any]], word: str) -> MeshFile:
         start += len(labels)
     sets = []
     for dim, tag, text, entities in named["groups"]:
-        own = [one for entity in entities for one in members.get((dim, entity), [])]
-        if own:
-            sets.append(MeshSet(text or f"{ENTITIES[dim]} group {tag}", "elements", np.concatenate(own)))
+        own = [np.zeros(0, np.int64), *(one for entity in entities for one in members.get((dim, entity), []))]
+        sets.append(MeshSet(text or f"{ENTITIES[dim]} group {tag}", "elements", np.concatenate(own)))
     if word:
         twice = {tag for dim, tag in members if any((other, tag) in members for other in range(4) if other != dim)}
         for (dim, tag), parts in members.items():

@@ -18,7 +18,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, listed, wrong
+from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, listed, wrong
 from fenwear.files.table import TableError, decoded
 
 DEEPEST = 20  # includes within each other, and sets of sets
@@ -54,6 +54,7 @@ SHELLS = re.compile(r"(?:S|STRI|DS|M3D|SFM3D|R3D|SC)(\d+)[A-Z]*\d?\w*")
 LINES = re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|MAX|RB2D|RB3D|DC1D|PIPE2|PIPE3)(\d)\w*")
 SHAPELESS = re.compile(r"(?:MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|DGAP|ITT|ITS|HEATCAP|DCOUP|DRAG|JOINTC|CAPACITY)\w*|D")
 FLAT_KINDS = {3: 2, 4: 3, 6: 9, 8: 16, 9: 10}
+GLOBAL = (np.eye(3), np.zeros(3))  # a turn, and a point: that of no turn
 SOLID_KINDS = {4: 4, 5: 7, 6: 6, 8: 5, 10: 11, 15: -15, 20: 17, 27: 12}
 
 
@@ -107,7 +108,7 @@ class _Instance:
     line: int
     own: _Scope
     shift: Array
-    turn: tuple[Array, Array] | None = None  # matrix, point
+    turn: tuple[Array, Array]  # matrix, point
 
 
 def read_deck(path: Path) -> MeshFile:
@@ -158,7 +159,7 @@ class _Deck:
         self.parts: dict[str, _Scope] = {}
         self.instances: dict[str, _Instance] = {}
         self.scope = self.model
-        self.system: tuple[Array, Array] | None = None
+        self.system = GLOBAL
         self.passed: Counter[str] = Counter()
         self.shapeless: Counter[str] = Counter()
         self.notes: list[str] = []
@@ -279,8 +280,7 @@ class _Deck:
                              | (np.abs(table[:, 0]) > 2**62))  # fmt: skip
         if len(bad):
             raise self.fail(data[bad[0]][0], f"expected a node number and finite coordinates, got {data[bad[0]][1]!r}")
-        points = np.zeros((len(table), 3))
-        points[:, : min(3, table.shape[1] - 1)] = table[:, 1:4]
+        points = in_space(table[:, 1:4])
         system = given.get("SYSTEM", "R").upper() or "R"
         if system not in ("R", "C", "S"):
             raise self.fail(line, f"*NODE: SYSTEM={system} is not known. Expected R, C or S.")
@@ -291,7 +291,7 @@ class _Deck:
 
     def placed(self, points: Array) -> Array:
         """Return points of the local system in the global one."""
-        return points if self.system is None else points @ self.system[0].T + self.system[1]
+        return points @ self.system[0].T + self.system[1]
 
     def add_nodes(self, labels: Ints, points: Array, lines: Ints, given: Mapping[str, str], line: int) -> None:
         if not len(labels):
@@ -396,16 +396,16 @@ class _Deck:
         self.only(line, "SYSTEM", given, ())
         values = [self.number(n, cell) for n, text in data for cell in _split(text) if cell]
         if len(values) in (0, 3):
-            self.system = (np.eye(3), np.array(values)) if values else None
+            self.system = (np.eye(3), np.array(values)) if values else GLOBAL
             return
         values += [0.0] * (9 - len(values)) if len(values) > 6 else []
         a, b = np.array(values[:3]), np.array(values[3:6])
-        c = np.array(values[6:9]) if len(values) == 9 else None
         x = b - a
-        if c is None:  # a turn about z
+        if len(values) != 9:  # a turn about z
             x = x * [1.0, 1.0, 0.0] if len(b) == 3 else x
             y = np.array([-x[1], x[0], 0.0])
         else:
+            c = np.array(values[6:9])
             y = (c - a) - ((c - a) @ x) / max(x @ x, 1e-300) * x
         if len(values) not in (6, 9) or not np.linalg.norm(x) or not np.linalg.norm(y):
             raise self.fail(line, "*SYSTEM: expected an origin, a point on the axis x, and one in the plane of x and y")
@@ -481,11 +481,9 @@ class _Deck:
                 open_row += [int(cell) for cell in (cells[:-1] if goes_on else cells)]
             except ValueError:
                 open_row += [self.whole(number, cell.strip()) for cell in (cells[:-1] if goes_on else cells)]
-            if len(open_row) < wide and not goes_on:
+            if len(open_row) > wide or (len(open_row) < wide and not goes_on):
                 raise self.fail(number, f"expected {count} nodes of a {name}, got {len(open_row) - 1}")
-            if len(open_row) >= wide:
-                if len(open_row) > wide:
-                    raise self.fail(number, f"expected {count} nodes of a {name}, got {len(open_row) - 1}")
+            if len(open_row) == wide:
                 values += open_row
                 open_row = []
         if open_row:
@@ -588,11 +586,11 @@ class _Deck:
         if not name or _key(name) in self.parts:
             raise self.fail(line, f"*PART: expected a name that no other part has, got {name!r}")
         self.scope = self.parts[_key(name)] = _Scope(name.strip('"'))
-        self.system = None
+        self.system = GLOBAL
 
     def end(self, _line: int, _given: dict[str, str], _data: list[tuple[int, str]]) -> None:
         """Go on outside of parts and instances."""
-        self.scope, self.system = self.model, None
+        self.scope, self.system = self.model, GLOBAL
 
     def instance(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         self.only(line, "INSTANCE", given, ("NAME", "PART"))
@@ -606,10 +604,10 @@ class _Deck:
         if len(rows) > 2 or (rows and len(rows[0]) > 3) or (len(rows) > 1 and len(rows[1]) < 7):
             raise self.fail(line, "*INSTANCE: expected a line of 3 shifts, and one of two points and an angle")
         shift = np.array([*(rows[0] if rows else ()), 0.0, 0.0, 0.0][:3])
-        turn = _turn(self.file, data[1][0], rows[1]) if len(rows) > 1 else None
+        turn = _turn(self.file, data[1][0], rows[1]) if len(rows) > 1 else GLOBAL
         own = _Scope(name.strip('"'))
         self.instances[_key(name)] = _Instance(name.strip('"'), _key(part), line, own, shift, turn)
-        self.scope, self.system = own, None
+        self.scope, self.system = own, GLOBAL
 
     def include(self, line: int, given: dict[str, str], _data: list[tuple[int, str]]) -> None:
         self.lines_of(self.beside(line, given.get("INPUT", "")), line)
@@ -698,9 +696,7 @@ class _Whole:
         element_labels = []
         for block in scope.elements:
             element_labels.append(block.labels)
-            at = np.searchsorted(known, block.nodes)
-            there = at < len(known)
-            there[there] = known[at[there]] == block.nodes[there]
+            there = np.isin(block.nodes, known)
             if not there.all():
                 row, column = np.argwhere(~there)[0]
                 raise fail(
@@ -708,7 +704,8 @@ class _Whole:
                     f"element {block.labels[row]} has the node {block.nodes[row, column]}, which is not defined",
                 )
             kind = block.kind or 15
-            nodes = self.count + order[at] if block.kind else np.zeros((len(block.labels), 1), np.int64)
+            nodes = self.count + order[np.searchsorted(known, block.nodes)]
+            nodes = nodes if block.kind else np.zeros((len(block.labels), 1), np.int64)
             self.blocks.append(Block(kind, nodes, block.labels, block.lines))
         every = np.concatenate(element_labels) if element_labels else np.zeros(0, np.int64)
         by_label = np.argsort(every, kind="stable")
@@ -734,11 +731,8 @@ def _joined(part: _Scope, own: _Scope) -> _Scope:
 
 
 def _moved(points: Array, one: _Instance) -> Array:
-    shifted = points + one.shift
-    if one.turn is None:
-        return shifted
     turn, about = one.turn
-    return (shifted - about) @ turn.T + about
+    return (points + one.shift - about) @ turn.T + about
 
 
 def _assembled(deck: _Deck) -> MeshFile:
@@ -841,16 +835,14 @@ class _Resolver:
         known, order = (
             (placed.labels, placed.order) if word == "nset" else (placed.element_labels, placed.element_order)
         )
-        at = np.searchsorted(known, labels)
-        there = at < len(known)
-        there[there] = known[at[there]] == labels[there]
+        there = np.isin(labels, known)
         if not there.all():
             missing = labels[~there]
             if not entry.ranges or not there.any():
                 message = f"the set {one.name!r} names {kind} {missing[0]}, which does not exist. Correct the set."
                 raise self.deck.fail(entry.line, message)
             self.notes.append(f"set {one.name}, line {entry.line}: {len(missing)} of its range are no {kind}s")
-        return order[at[there]]
+        return order[np.searchsorted(known, labels[there])]
 
     def faces(self, one: _Set, scope: str) -> Ints:
         """Return the sides of a surface: of given faces, or all free ones of its elements."""

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, known_nodes, read_as
+from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, known_nodes, read_as
 
 MED_KINDS = {"PO1": 15, "SE2": 1, "SE3": 8, "TR3": 2, "TR6": 9, "QU4": 3, "QU8": 16, "QU9": 10, "TE4": 4, "T10": 11,
              "HE8": 5, "H20": 17, "PE6": 6, "PY5": 7}  # fmt: skip
@@ -56,9 +56,7 @@ def _med(name: str, file: Any) -> MeshFile:
     step = group[sorted(group)[-1]] if "NOE" not in group else group
     coordinates = np.asarray(step["NOE"]["COO"], dtype=np.float64)
     count = int(step["NOE"]["COO"].attrs.get("NBR", len(coordinates) // int(group.attrs.get("ESP", 3))))
-    flat = coordinates.reshape(-1, count).T
-    points = np.zeros((count, 3))
-    points[:, : flat.shape[1]] = flat
+    points = in_space(coordinates.reshape(-1, count).T)
     blocks, families, notes = [], [], []
     for kind in step.get("MAI", {}):
         part = step["MAI"][kind]
@@ -68,7 +66,7 @@ def _med(name: str, file: Any) -> MeshFile:
         number = MED_KINDS[kind]
         table = np.asarray(part["NOD"], dtype=np.int64).reshape(KINDS[number].nodes, -1).T - 1
         nodes = known_nodes(table, count, f"the kind {kind} of elements")
-        blocks.append(Block.of(number, nodes[:, MED_ORDERS.get(number, list(range(nodes.shape[1])))]))
+        blocks.append(Block.of(number, nodes[:, MED_ORDERS.get(number, slice(None))]))
         families.append(np.asarray(part["FAM"] if "FAM" in part else np.zeros(len(nodes)), dtype=np.int64))
     if len(meshes) > 1:
         notes.append(f"meshes left out: {', '.join(meshes[1:])}")
@@ -127,8 +125,7 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
         columns = [np.asarray(row, dtype=np.float64) for row in get("coord")]
     else:
         columns = [np.asarray(get(f"coord{axis}"), np.float64) for axis in "xyz" if get(f"coord{axis}") is not None]
-    points = np.zeros((len(columns[0]), 3))
-    points[:, : len(columns)] = np.column_stack(columns)
+    points = in_space(np.column_stack(columns))
     blocks, sets, start = [], [], 0
     ids, names = get("eb_prop1"), _texts(get("eb_names"))
     for number in _numbered("connect", get):
@@ -138,8 +135,7 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
         if key not in EXODUS_KINDS:
             raise ValueError(f"block {number} has elements {word} with {nodes.shape[1]} nodes")
         nodes, kind = known_nodes(nodes, len(points), f"block {number}"), EXODUS_KINDS[key]
-        nodes = nodes[:, EXODUS_ORDERS[kind]] if kind in EXODUS_ORDERS else nodes
-        blocks.append(Block.of(kind, nodes, start + 1))
+        blocks.append(Block.of(kind, nodes[:, EXODUS_ORDERS.get(kind, slice(None))], start + 1))
         members = np.arange(start, start + len(nodes))
         sets.append(MeshSet(_name(names, ids, number, "block"), "elements", members))
         start += len(nodes)
@@ -269,7 +265,7 @@ class _Vtu:
                 count = KINDS[number].nodes
                 table = nodes[ends[own][:, None] - count + np.arange(count)]
                 known_nodes(table, len(part) // 3, f"type {kind} of cells")
-                blocks.append(Block.of(number, start + table[:, ORDERS.get(number, list(range(count)))]))
+                blocks.append(Block.of(number, start + table[:, ORDERS.get(number, slice(None))]))
                 kept.append(own)
             cells = np.concatenate(kept) if kept else np.zeros(0, np.int64)
             for name, values in data.items():
@@ -338,16 +334,14 @@ def _xdmf(path: Path) -> MeshFile:
     geometry, topology = grid.find("Geometry"), grid.find("Topology")
     if geometry is None or topology is None:
         raise ValueError("has no grid with points and cells")
-    flat = _item(path, geometry.find("DataItem"))
-    points = np.zeros((len(flat), 3))
-    points[:, : flat.shape[1]] = flat
+    points = in_space(_item(path, geometry.find("DataItem")))
     kind = (topology.get("TopologyType") or topology.get("Type") or "").casefold()
     if kind not in XDMF_KINDS:
         raise ValueError(f"has cells of the kind {kind!r}; expected one of {', '.join(XDMF_KINDS)}")
     number = XDMF_KINDS[kind]
     nodes: Ints = _item(path, topology.find("DataItem")).astype(np.int64).reshape(-1, KINDS[number].nodes)
     known_nodes(nodes, len(points), "a cell")
-    blocks = (Block.of(number, nodes[:, ORDERS.get(number, list(range(nodes.shape[1])))]),)
+    blocks = (Block.of(number, nodes[:, ORDERS.get(number, slice(None))]),)
     arrays = {
         attribute.get("Name", ""): _item(path, attribute.find("DataItem")).ravel()
         for attribute in grid.iterfind("Attribute")

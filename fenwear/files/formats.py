@@ -13,9 +13,9 @@ from fenwear.files import by_gmsh, exchange
 from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import entities, entities_text, read_shapes
 from fenwear.files.deck import read_deck
-from fenwear.files.groups import ENTITIES, MEASURES
+from fenwear.files.groups import MEASURES
 from fenwear.files.heights import MAPS, read_heights
-from fenwear.files.mesh import KINDS, USABLE, MeshFile, completed
+from fenwear.files.mesh import ENTITIES, KINDS, MeshFile, sound
 from fenwear.files.table import TableError, read_table
 
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -52,14 +52,7 @@ def read_mesh(path: Path) -> MeshFile:
     if path.suffix.lower() not in READERS:
         message = f"expected a name that ends in {', '.join((*MESHES, *CAD))}. Convert it to .msh."
         raise CaseError(InputError(path.name, message))
-    mesh = READERS[path.suffix.lower()][1](path)
-    if not np.isfinite(mesh.points).all():
-        raise CaseError(InputError(path.name, "has coordinates that are no numbers. Write the file again."))
-    mesh = completed(mesh)
-    if not any(block.kind in USABLE for block in mesh.blocks if len(block.nodes)):
-        message = "has no triangles, quadrilaterals, tetrahedra or hexahedra to make bodies of. Export its mesh."
-        raise CaseError(InputError(path.name, message))
-    return mesh
+    return sound(READERS[path.suffix.lower()][1](path))
 
 
 TABLES = (".csv", ".txt", ".dat", ".tsv")

@@ -8,13 +8,15 @@ It imports gmsh and numpy alone, and prints what gmsh says is wrong.
 
 import json
 import sys
+from typing import Any
 
-import gmsh
 import numpy as np
 
 
 def main(path: str, result: str = "") -> None:
     """Read the file; write what it holds."""
+    import gmsh
+
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.option.setNumber("General.AbortOnError", 2)
@@ -23,9 +25,13 @@ def main(path: str, result: str = "") -> None:
         gmsh.model.occ.synchronize()
         return
     gmsh.merge(path)
-    model = gmsh.model
+    np.savez(result, **arrays_of(gmsh.model))
+
+
+def arrays_of(model: Any) -> dict[str, Any]:
+    """Return nodes, elements and physical groups of a model of gmsh as arrays."""
     tags, points, _ = model.mesh.getNodes()
-    arrays: dict[str, object] = {"tags": tags, "points": points}
+    arrays: dict[str, Any] = {"tags": tags, "points": points}
     blocks: list[tuple[int, int, int, str]] = []
     for dim, tag in model.getEntities():
         for kind, labels, nodes in zip(*model.mesh.getElements(dim, tag), strict=True):
@@ -36,7 +42,7 @@ def main(path: str, result: str = "") -> None:
         for dim, tag in model.getPhysicalGroups()
     ]
     named = json.dumps({"blocks": blocks, "groups": groups})
-    np.savez(result, named=np.frombuffer(named.encode(), dtype=np.uint8), **arrays)  # type: ignore[arg-type]
+    return {**arrays, "named": np.frombuffer(named.encode(), dtype=np.uint8)}
 
 
 if __name__ == "__main__":

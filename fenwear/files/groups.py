@@ -12,14 +12,17 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.files.mesh import (
+    ENTITIES,
     KINDS,
     SHOWN,
     USABLE,
@@ -35,7 +38,6 @@ from fenwear.files.mesh import (
 )
 
 BODIES = ("punch", "strip")
-ENTITIES = ("point", "curve", "surface", "volume")
 MEASURES = ("", "length", "area", "volume")
 POWERS = ("", "mm", "mm²", "mm³")
 PLANE = re.compile(r"\s*(?P<axis>[xyzr])\s*=\s*(?P<at>.+)")
@@ -59,7 +61,7 @@ class Group:
     dim: int
     cells: Mapping[int, Ints]
     source: str
-    elements: Ints | None = None
+    elements: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def count(self) -> int:
@@ -153,6 +155,30 @@ def grouped(
     return choice.result(dim)
 
 
+class _Sides:
+    """The sides of the elements of a body (n,)."""
+
+    def __init__(self, mesh: MeshFile, elements: Ints) -> None:
+        self.mesh, self.elements = mesh, elements
+
+    @cached_property
+    def boundary(self) -> Ints:
+        """Those of one element alone, by element and number (n, 2)."""
+        return self.mesh.boundary(self.elements)
+
+    @cached_property
+    def corners(self) -> Ints:
+        """The corners of all, ascending and filled with -1 (n, 4)."""
+        return self.mesh.side_corners(self.mesh.all_sides(self.elements))
+
+    def has(self, corners: Ints) -> NDArray[np.bool_]:
+        """Return which facets with these corners (n, k) are among them (n,)."""
+        facets = np.sort(np.pad(corners, ((0, 0), (0, 4 - corners.shape[1])), constant_values=-1), axis=1)
+        marked = np.zeros(len(self.mesh.points) + 1, dtype=bool)
+        marked[facets] = marked[-1] = True  # others cannot be any facet's
+        return _rows_in(facets, self.corners[marked[self.corners].all(axis=1)])
+
+
 class _Choice:
     def __init__(
         self,
@@ -178,7 +204,7 @@ class _Choice:
         if self.problems:
             raise CaseError(self.problems)
         groups = list(regions)
-        bodies = {body: self.body(regions, body) for body in BODIES}
+        bodies = {body: _Sides(self.mesh, self.elements_of(regions, body)) for body in BODIES}
         used = {source for _, sets in chosen.items() for source in sets if isinstance(source, MeshSet)}
         for name, sets in chosen.items():
             if any(name == region.name for region in regions):
@@ -217,15 +243,16 @@ class _Choice:
                 elif name:
                     found[group] += self.named(group, name)
         mapped = {one.name for sets in found.values() for one in sets if isinstance(one, MeshSet)}
+        alike: dict[str, list[MeshSet]] = {}
         for key, sets in self.by_name.items():
             group = self.by_role(key)
             if group.startswith(tuple(f"{body}_" for body in BODIES)) and group not in self.wanted:
-                own = [one for one in sets if one.name not in mapped]
-                if len({one.name for one in own}) > 1 and len({normal(one.name) for one in own}) > 1:
-                    text = f"several sets have this name: {listed(one.name for one in own)}. Name one of them, or all"
-                    self.wrong(f"geometry.groups.{group}", text)
-                elif own:
-                    found[group] = list(own)
+                alike.setdefault(group, []).extend(one for one in sets if one.name not in mapped)
+        for group, own in alike.items():
+            found[group] = list(own)
+            if len({normal(one.name) for one in own}) > 1:
+                text = f"several sets have this name: {listed(one.name for one in own)}. Name one of them, or all"
+                self.wrong(f"geometry.groups.{group}", text)
         return {group: sets for group, sets in found.items() if sets}
 
     def named(self, group: str, name: str) -> list[MeshSet]:
@@ -259,6 +286,8 @@ class _Choice:
             if unusable:
                 text = f"has {unusable[0]}: {self.mesh.place(self.first_of(elements, unusable[0]))}"
                 self.wrong(name, f"the set {self.where(cells[0])} {text}. Mesh it with other elements.")
+            if any(len(_unique(rows)) < len(rows) for rows in kinds.values()):
+                self.wrong(self.mesh.name, f"some elements of {name} are there twice. Remove one of them.")
             bad = bad_elements(self.mesh, elements)
             if len(bad):
                 text = ", ".join(self.mesh.place(int(one)) for one in bad[:SHOWN])
@@ -281,16 +310,14 @@ class _Choice:
     def first_of(self, elements: Any, kind: str) -> int:
         return next(int(e) for e in elements if KINDS[self.mesh.blocks[int(self.mesh.block_of(e))].kind].name == kind)
 
-    def body(self, regions: list[Group], body: str) -> Ints:
-        """Return the boundary of a body (n, 2)."""
-        elements = [one.elements for one in regions if one.name.startswith(f"{body}_") and one.elements is not None]
-        if not elements:
-            return np.zeros((0, 2), np.int64)
-        return self.mesh.boundary(np.unique(np.concatenate(elements)))
+    def elements_of(self, regions: list[Group], body: str) -> Ints:
+        """Return the elements of a body (n,)."""
+        own = [one.elements for one in regions if one.name.startswith(f"{body}_")]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *own]))
 
-    def lower(self, name: str, sets: list[MeshSet | str], bodies: Mapping[str, Ints], dim: int) -> list[Group]:
+    def lower(self, name: str, sets: list[MeshSet | str], bodies: Mapping[str, _Sides], dim: int) -> list[Group]:
         """Return a group of facets or points; none where something is wrong."""
-        boundary = bodies[name.partition("_")[0]]
+        body = bodies[name.partition("_")[0]]
         source = ", ".join(one if isinstance(one, str) else self.where(one) for one in sets)
         cells: dict[int, Ints] = {}
         points: list[Ints] = []
@@ -299,7 +326,7 @@ class _Choice:
                 text = f"has {ENTITIES[dim]} elements; expected {ENTITIES[dim - 1]} elements, their faces or nodes"
                 self.wrong(name, f"the set {self.where(one)} {text}. Name a surface or a node set.")
                 continue
-            found, alone = self.facets(name, one, boundary)
+            found, alone = self.facets(name, one, body)
             for kind, rows in found.items():
                 cells[kind] = stacked(cells.get(kind), rows)
             points += [alone] if len(alone) else []
@@ -318,9 +345,9 @@ class _Choice:
             return [one for one in sets if isinstance(one, str) or one.of == "nodes" or self.mesh.set_dim(one) < dim]
         return sets
 
-    def facets(self, name: str, one: MeshSet | str, boundary: Ints) -> tuple[dict[int, Ints], Ints]:
+    def facets(self, name: str, one: MeshSet | str, body: _Sides) -> tuple[dict[int, Ints], Ints]:
         """Return the facets that a set, or a plane, gives by their kind, or else its points."""
-        none = np.zeros(0, np.int64)
+        none, boundary = np.zeros(0, np.int64), body.boundary
         if isinstance(one, str) or one.of == "nodes":
             nodes = self.on_plane(name, one) if isinstance(one, str) else one.members
             own = self.facets_within(boundary, nodes)
@@ -337,7 +364,12 @@ class _Choice:
             return self.mesh.sides(one.members), none
         if self.mesh.set_dim(one) == 0:
             return {}, np.concatenate([rows.ravel() for rows in self.mesh.cells(one.members).values()])
-        return self.mesh.cells(one.members), none
+        cells = self.mesh.cells(one.members)
+        stray = sum(int((~body.has(rows[:, : KINDS[kind].corners])).sum()) for kind, rows in cells.items())
+        if stray and self.mesh.set_dim(one) == self.mesh.dim - 1:
+            text = f"has {stray} elements that are no sides of the elements of its body. Correct the set."
+            self.wrong(name, f"the set {self.where(one)} of {self.mesh.name} {text}")
+        return cells, none
 
     def on_plane(self, name: str, text: str) -> Ints:
         """Return the points on a plane such as "y = 0 mm"."""
@@ -366,7 +398,6 @@ class _Choice:
             kinds = {KINDS[kind].name: one for one in regions if one.name.startswith(f"{body}_") for kind in one.cells}
             if len(kinds) > 1:
                 names, last = " and ".join(kinds), list(kinds)[-1]
-                assert kinds[last].elements is not None
                 place = self.mesh.place(self.first_of(kinds[last].elements, last))
                 text = f"the {body} mixes {names} (such as {place}). Mesh it with elements of one kind."
                 self.wrong(self.mesh.name, text)
@@ -375,6 +406,9 @@ class _Choice:
                 text = f"no set of {ENTITIES[dim]} elements is named {body}_...: set geometry.groups.{body}_body"
                 self.wrong(self.mesh.name, f'{text} = "SET". It has {has}.')
             contacts = [one for one in groups if one.name.startswith(f"{body}_contact")]
+            if len(contacts) > 1 and f"{body}_contact" in (one.name for one in contacts):
+                text = f"has {body}_contact and {listed(one.name for one in contacts)}; expected one or the others"
+                self.wrong(self.mesh.name, text)
             for one in contacts:
                 if whole and one.dim != dim - 1:
                     text = f"{one.source} has no whole facet of the {body}; expected {ENTITIES[dim - 1]} elements"
@@ -382,9 +416,10 @@ class _Choice:
             if not contacts:
                 text = f"no set of facets or their nodes is named {body}_contact: set geometry.groups.{body}_contact"
                 self.wrong(self.mesh.name, f'{text} = "SET", or a plane: "y = 0 mm". It has {has}.')
-        for level in (dim, dim - 1):
-            for first, second, rows in _shared([one for one in groups if one.dim == level]):
-                kind = ENTITIES[level]
+        facets = ([one for one in groups if one.dim == dim - 1 and one.name.startswith(body)] for body in BODIES)
+        for alike in (regions, *facets):
+            for first, second, rows in _shared(alike):
+                kind = ENTITIES[first.dim]
                 text = f"{first.name} (set {first.source}) and {second.name} (set {second.source}) share {rows} {kind}"
                 other = second if first.name.endswith("_contact") else first
                 advice = f'Leave one out by geometry.groups: {other.name} = "", or name another set'
@@ -419,8 +454,8 @@ def _shared(groups: list[Group]) -> list[tuple[Group, Group, int]]:
     return found
 
 
-def into_gmsh(gmsh: Any, mesh: GroupedMesh) -> None:
-    """Add the groups to gmsh's current model: each is a discrete entity and a physical group."""
+def into_gmsh(gmsh: Any, mesh: GroupedMesh, name: Callable[[str], str]) -> None:
+    """Add the groups to gmsh's current model: each is a discrete entity and a physical group, with a name."""
     used = np.unique(np.concatenate([cells.ravel() for one in mesh.groups for cells in one.cells.values()]))
     first = True
     for tag, one in enumerate(sorted(mesh.groups, key=lambda group: -group.dim), start=1):
@@ -431,4 +466,4 @@ def into_gmsh(gmsh: Any, mesh: GroupedMesh) -> None:
         for kind, cells in one.cells.items():
             gmsh.model.mesh.addElementsByType(tag, kind, [], cells.ravel() + 1)
         gmsh.model.addPhysicalGroup(one.dim, [tag], tag)
-        gmsh.model.setPhysicalName(one.dim, tag, one.name)
+        gmsh.model.setPhysicalName(one.dim, tag, name(one.name))

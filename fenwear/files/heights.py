@@ -186,35 +186,18 @@ def _far(heights: Array) -> Mask:
 
 
 def _harmonic(heights: Array, holes: Mask) -> Array:
-    """Return heights whose holes have the mean of their neighbours."""
+    """Return heights whose holes, zero now, have the mean of their neighbours."""
     from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import laplacian
     from scipy.sparse.linalg import spsolve
 
-    if not holes.any():
-        return heights
-    number = np.cumsum(holes.ravel()).reshape(holes.shape) - 1
-    rows, columns, weights = [], [], []
-    right, diagonal = np.zeros(int(holes.sum())), np.zeros(int(holes.sum()))
-    for axis in range(heights.ndim):
-        for step in (1, -1):
-            here = [slice(None)] * heights.ndim
-            there = list(here)
-            here[axis], there[axis] = (slice(None, -1), slice(1, None))[::step]
-            own, other = holes[tuple(here)], holes[tuple(there)]
-            at = number[tuple(here)]
-            np.add.at(diagonal, at[own], 1.0)
-            known = own & ~other
-            np.add.at(right, at[known], heights[tuple(there)][known])
-            both = own & other
-            rows.append(at[both])
-            columns.append(number[tuple(there)][both])
-            weights.append(-np.ones(int(both.sum())))
-    each = np.arange(len(right))
-    matrix = coo_array(
-        (np.concatenate([diagonal, *weights]), (np.concatenate([each, *rows]), np.concatenate([each, *columns])))
-    ).tocsc()
+    number, size = np.arange(heights.size).reshape(heights.shape), heights.size
+    along = [np.moveaxis(number, axis, 0) for axis in range(heights.ndim)]
+    ends = np.concatenate([[one[:-1].ravel(), one[1:].ravel()] for one in along], axis=1)
+    joined = coo_array((np.ones(ends.shape[1]), ends), shape=(size, size)).tocsr()
+    rows = laplacian(joined + joined.T).tocsr()[number[holes]]
     found = heights.copy()
-    found[holes] = spsolve(matrix, right)
+    found[holes] = spsolve(rows[:, number[holes]].tocsc(), -(rows @ heights.ravel()))
     return found
 
 

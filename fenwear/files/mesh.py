@@ -12,10 +12,12 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
 
+import basix
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,8 +26,10 @@ from fenwear.errors import CaseError, InputError
 
 Ints = NDArray[np.int64]
 FLATTEST = 1e-6  # sine of a corner, or scaled Jacobian, below which an element is degenerate
-FLAT = 1e-9  # of the mesh's size: what a node may lie out of its plane
+FLAT = 1e-9  # of the mesh's size: what a node may lie out of its plane; of an element's: the shortest edge
 SHOWN = 8  # sets or elements that an error lists
+AT_ONCE = 20_000  # elements that are looked at at a time
+ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 
 
 @dataclass(frozen=True)
@@ -183,13 +187,18 @@ class MeshFile:
         """Return the blocks of elements."""
         return np.searchsorted(self.starts, elements, side="right") - 1
 
+    def by_block(self, elements: Ints) -> Iterator[tuple[Block, Ints, Ints]]:
+        """Yield each block of elements, those that are of it, and the rows of their nodes (n, k)."""
+        of = self.block_of(elements)
+        for number in np.unique(of):
+            block, own = self.blocks[number], elements[of == number]
+            yield block, own, block.nodes[own - self.starts[number]]
+
     def cells(self, elements: Ints) -> dict[int, Ints]:
         """Return the points of elements (n, k) by their kind."""
         found: dict[int, Ints] = {}
-        for number in np.unique(self.block_of(elements)):
-            block = self.blocks[number]
-            own = elements[self.block_of(elements) == number] - self.starts[number]
-            found[block.kind] = stacked(found.get(block.kind), block.nodes[own])
+        for block, _, nodes in self.by_block(elements):
+            found[block.kind] = stacked(found.get(block.kind), nodes)
         return found
 
     def sides(self, members: Ints) -> dict[int, Ints]:
@@ -209,12 +218,11 @@ class MeshFile:
 
     def all_sides(self, elements: Ints) -> Ints:
         """Return every side of elements (n, 2): the element and the number of the side."""
-        pairs = []
-        for number in np.unique(self.block_of(elements)):
-            own = elements[self.block_of(elements) == number]
-            for side in range(len(KINDS[self.blocks[number].kind].sides)):
+        pairs = [np.zeros((0, 2), np.int64)]
+        for block, own, _ in self.by_block(elements):
+            for side in range(len(KINDS[block.kind].sides)):
                 pairs.append(np.column_stack([own, np.full(len(own), side)]))
-        return np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64)
+        return np.concatenate(pairs)
 
     def side_corners(self, members: Ints) -> Ints:
         """Return the corners of sides, ascending and filled with -1 (n, 4)."""
@@ -249,6 +257,11 @@ class MeshFile:
             return measure(self.points, self.sides(one.members))
         dims = self.element_dims(one.members)
         return measure(self.points, self.cells(one.members[dims == dims.max(initial=0)]))
+
+
+def in_space(x: Array) -> Array:
+    """Return coordinates (n, 1 to 3) with all three (n, 3)."""
+    return np.pad(np.asarray(x, dtype=np.float64), ((0, 0), (0, 3 - x.shape[1])))
 
 
 def stacked(above: Ints | None, below: Ints) -> Ints:
@@ -311,37 +324,55 @@ def _volumes(points: Array, nodes: Ints, kind: Kind) -> Array:
     return total
 
 
+CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}
+AROUND = {"quadrilateral": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}  # basix' corners in gmsh's order
+
+
+@lru_cache
+def _slopes(number: int) -> Array:
+    """Return the derivatives of a kind's shape functions at its nodes (d, nodes, functions), in gmsh's order."""
+    kind = KINDS[number]
+    name = CELLS[kind.dim, kind.corners]
+    corners = basix.geometry(basix.CellType[name])[AROUND.get(name, slice(None))]
+    spans = [[k] for k in range(kind.corners)] + [list(span) or slice(None) for span in (*kind.edges, *kind.middles)]
+    points = np.array([corners[span].mean(axis=0) for span in spans])
+    degree = 1 if kind.nodes == kind.corners else 2
+    variant = basix.LagrangeVariant.equispaced
+    table = basix.create_element(basix.ElementFamily.P, basix.CellType[name], degree, variant).tabulate(1, points)
+    return np.asarray(table[1:, :, table[0, :, :, 0].argmax(axis=1), 0])
+
+
 def bad_elements(mesh: MeshFile, elements: Ints) -> Ints:
-    """Return those of the elements that are degenerate or twisted; mirrored ones are none of them."""
-    found = []
-    for number in np.unique(mesh.block_of(elements)):
-        block = mesh.blocks[number]
-        kind = KINDS[block.kind]
-        own = elements[mesh.block_of(elements) == number]
-        x = mesh.points[block.nodes[own - mesh.starts[number]][:, : kind.corners]]
-        signs = _corner_signs(x, kind)
-        good = (signs > FLATTEST).all(axis=1) | (signs < -FLATTEST).all(axis=1)
-        found.append(own[~good])
-    return np.concatenate(found) if found else np.zeros(0, np.int64)
+    """Return those of the elements that are degenerate or twisted at a node; mirrored ones are none of them."""
+    found = [np.zeros(0, np.int64)]
+    for block, own, nodes in mesh.by_block(elements):
+        if block.kind not in USABLE:
+            continue
+        slopes = _slopes(block.kind)
+        for some in (slice(k, k + AT_ONCE) for k in range(0, len(own), AT_ONCE)):
+            x = mesh.points[nodes[some]][:, :, : KINDS[block.kind].dim]
+            edges = np.tensordot(x, slopes, (1, 2)).transpose(0, 3, 2, 1)  # (n, nodes, along, d)
+            sizes = np.linalg.norm(edges, axis=3)
+            signs = np.linalg.det(edges) / np.maximum(np.prod(sizes, axis=2), 1e-300)
+            good = (signs > FLATTEST).all(axis=1) | (signs < -FLATTEST).all(axis=1)
+            good &= sizes.min(axis=(1, 2)) > FLAT * sizes.max(axis=(1, 2))
+            found.append(own[some][~good])
+    return np.concatenate(found)
 
 
-def _corner_signs(x: Array, kind: Kind) -> Array:
-    """Return the scaled Jacobian at each corner of elements of corners x (n, k, 3); of flat ones seen along z."""
-    if kind.dim == 2:
-        to_next, to_last = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
-        cross = to_next[..., 0] * to_last[..., 1] - to_next[..., 1] * to_last[..., 0]
-        lengths = np.linalg.norm(to_next, axis=2) * np.linalg.norm(to_last, axis=2)
-        return np.asarray(cross / np.where(lengths > 0, lengths, 1.0))
-    around = {4: [[1, 2, 3]], 8: [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2],
-                                  [6, 4, 3]]}.get(kind.corners)  # fmt: skip
-    if around is None:
-        return np.ones((len(x), 1))
-    signs = []
-    for corner, others in enumerate(around):
-        edges = x[:, others] - x[:, [corner]]
-        lengths = np.prod(np.linalg.norm(edges, axis=2), axis=1)
-        signs.append(np.linalg.det(edges) / np.where(lengths > 0, lengths, 1.0))
-    return np.column_stack(signs)
+def sound(mesh: MeshFile) -> MeshFile:
+    """Return the mesh with all middle nodes.
+
+    Raises:
+        CaseError: it has coordinates that are no numbers, or no elements of which bodies are made.
+    """
+    if not np.isfinite(mesh.points).all():
+        raise CaseError(InputError(mesh.name, "has coordinates that are no numbers. Write the file again."))
+    mesh = completed(mesh)
+    if not any(block.kind in USABLE for block in mesh.blocks if len(block.nodes)):
+        message = "has no triangles, quadrilaterals, tetrahedra or hexahedra to make bodies of. Export its mesh."
+        raise CaseError(InputError(mesh.name, message))
+    return mesh
 
 
 def completed(mesh: MeshFile) -> MeshFile:

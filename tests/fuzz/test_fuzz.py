@@ -118,7 +118,7 @@ def test_long_texts_are_shortened() -> None:
 # What it did before: a traceback of linprog or of an eigenvalue solver, a crash of dolfinx, or no end.
 BAD_MESHES = {
     "NaN": (lambda x, e: (["nan", *x[1:]], e), "coordinates that are no numbers"),
-    "out of the plane": (lambda x, e: ([*x[:2], x[0]], e), "it is not plane"),
+    "out of the plane": (lambda x, e: ([*x[:2], x[0]], e), "in no plane"),
     "twisted": (lambda x, e: (x, [e[0], e[2], e[1], e[3]]), "degenerate or twisted"),
     "two corners": (lambda x, e: (x, [e[0], e[1], e[0], e[1]]), "degenerate or twisted"),
     "corner twice": (lambda x, e: (x, [e[0], e[0], e[2], e[3]]), "degenerate or twisted"),
@@ -212,7 +212,7 @@ BEYOND = {
     "far pivot": ("bushing", ("punch", "pivot"), ["1e300 mm", 0], "the gap between the bodies is beyond all numbers"),
     "strained": ("stick carried", ("stick", "bulk_stress"), 1e25, "the strip would be strained by"),
     "above all pressures": ("cap", ("wear", "punch", "pressure_threshold"), 2**63, "so that nothing wears"),
-    "next to no elements": ("solid", ("geometry", "parameters", "core"), 1e-9, "that they carry nothing"),
+    "next to no elements": ("solid", ("geometry", "parameters", "core"), 1e-9, "degenerate or twisted"),
     "coarse bore": ("misaligned", ("geometry", "parameters", "beyond_elements"), 2, "too long for the curve"),
     "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.0000001"),
 }

@@ -33,16 +33,12 @@ class Foundation:
     directions: Array
     flexibility: Array
     by_temperature: None = None  # it does not expand
+    in_memory: bool = False  # products are made without a matrix
 
     @property
     def by_load(self) -> Array:
         """Displacement by the body's own loads (q, d), mm: none."""
         return np.zeros(self.directions.shape[:2])
-
-    @property
-    def cost(self) -> float:
-        """Of a product, in numbers that memory could give meanwhile."""
-        return float(self.directions.size)
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...) of forces (q, d, ...)."""

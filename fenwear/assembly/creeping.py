@@ -119,7 +119,7 @@ class CreepingBody:
     def displacement(self, phase: int, pressure: Array, ratio: Array, load: float) -> Array:
         """Return v (size,), mm."""
         face = self.faces[phase]
-        if face.cost is None:
+        if face.in_memory:
             found = self.matrix(phase, ratio) @ pressure
         else:
             traction = (face.pair.normal + ratio) * (face.pair.weights * pressure)[:, None]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -48,6 +49,7 @@ class CondensedBody:
     response: Array
     by_load: Array
     by_temperature: Array | None = None
+    in_memory: ClassVar[bool] = True
 
     def arrays(self) -> dict[str, Array]:
         """Return what was solved for, by its name."""
@@ -59,11 +61,6 @@ class CondensedBody:
         warm = None if self.by_temperature is None else self.by_temperature[:count]
         answers = self.response[:count, :, :count]
         return CondensedBody(self.patterns[:, :count], self.directions[:count], answers, self.by_load[:count], warm)
-
-    @property
-    def cost(self) -> float | None:
-        """None: its numbers are in memory."""
-        return None
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...) of forces (q, d, ...).
@@ -138,11 +135,11 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
         return _condensed(requests)
     places = [kept.known(comm, one.identity, fresh=fresh) for one in requests]
     both = list(zip(requests, places, strict=True))
-    computed = iter(_condensed([one for one, place in both if place.arrays is None]))
+    computed = iter(_condensed([one for one, place in both if not place.arrays]))
     condensed = []
     for one, place in both:
-        body = next(computed) if place.arrays is None else CondensedBody(one.patterns, one.along, **place.arrays)
-        if place.arrays is None:
+        body = CondensedBody(one.patterns, one.along, **place.arrays) if place.arrays else next(computed)
+        if not place.arrays:
             place.save(body.arrays())
         condensed.append(body)
     return condensed
@@ -176,7 +173,7 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
 def _guided(one: Request, response: Array, by_temperature: Array | None) -> tuple[Array, Array | None]:
     """Return the response (q, d, k, a) and that to temperature of a body whose guides hold it; collective."""
     answer = one.elastic.guide_answer
-    if answer is None:
+    if not len(answer.turning):
         return response, by_temperature
     rotations, moved = (one.seen(fields) for fields in (answer.rotations_there, answer.moved_there))
     couple, work = (np.einsum("kdg,kda->gka", seen, one.along) for seen in (rotations, moved))
@@ -214,7 +211,6 @@ def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
     found = [body.trace.pick(one[:, None])[:, :, 0] for body, one in zip(bodies, solutions, strict=True)]
     for number, body in enumerate(bodies):
         answer = body.guide_answer
-        if answer is not None:
-            work = total(body.body.mesh.comm, answer.moved.T @ body.load)
-            found[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
+        work = total(body.body.mesh.comm, answer.moved.T @ body.load)
+        found[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
     return found

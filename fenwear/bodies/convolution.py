@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.tensor import TensorWeights
 
-TRANSFORM = 85.0  # numbers that memory could give while one is transformed, there and back over two (measured)
 SAME = 1e-9  # of tables: none
 CACHE = 2**18  # bytes of waves that are transformed at a time
 EVERY = slice(None)
@@ -55,13 +54,6 @@ class Convolution:
     def size(self) -> tuple[int, ...]:
         """The period of products."""
         return tuple(scipy.fft.next_fast_len(2 * count - 1, real=True) for count in self.counts)
-
-    @property
-    def cost(self) -> float:
-        """Of a product, in numbers that memory could give meanwhile."""
-        transformed = 2.0 ** len(self.counts) / 4 * sum(self.table.shape[:2]) * float(np.prod(self.counts))
-        points = sum(max(factor.shape[1] for factor in weights.factors) for weights, _ in self.smooth)
-        return TRANSFORM * transformed + 2.0 * len(self.places) * points * self.table.shape[1]
 
     @cached_property
     def _kernel(self) -> Kernel:
@@ -120,15 +112,12 @@ class Convolution:
 class GridOperator(ABC):
     """An operator of a body that is a convolution on a grid."""
 
+    in_memory = False
+
     @property
     @abstractmethod
     def convolution(self) -> Convolution:
         """C along its directions, by forces along the model's axes."""
-
-    @property
-    def cost(self) -> float:
-        """Of a product."""
-        return self.convolution.cost
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""

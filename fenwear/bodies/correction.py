@@ -45,9 +45,12 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.material import Isotropic, measure, strain_of
+from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
 IN_PLANE, DEEP = 0.9, 0.25  # normal's component and depth over distance up to which a surface goes on in the plane
+EVERY = slice(None)
+SAME = 1e-9  # of a material's constants: one material
 POINTS = 4  # quadrature's degree above twice that of the elements: the half-space's field is no polynomial
 
 
@@ -131,19 +134,17 @@ class Correction:
         response: Displacement at each point along each direction, from unit forces at each (m, a, m, d), mm.
         fields: Displacement of this rank's own degrees of freedom from unit forces at each point along each direction
             (owned, m, a), mm: what loads do on them they do to the contact.
-        uneven: Largest asymmetry of the response, mm/N, in the plane mm/(N/mm).
-        moments: Of the tractions that unit forces at the points leave on the body, about what guides hold (m, d, g): of
-            the forces themselves, but for quadrature.
-        guided: What the body answers to its guides, their rotations and what their couples move at the points
-            (m, d, g); None without.
+        uneven: How much of the response was not symmetric, at most, mm/N, in the plane mm/(N/mm).
+        guided: What the body answers to its guides; the moments about what they hold of the tractions that unit forces
+            at the points leave on the body (m, d, g), those of the forces themselves but for quadrature; and what their
+            couples move at the points (m, d, g).
     """
 
     counts: tuple[int, ...]
     response: Array
     fields: Array
     uneven: float
-    moments: Array
-    guided: tuple[GuideAnswer, Array, Array] | None = None
+    guided: tuple[GuideAnswer, Array, Array]
 
 
 def chebyshev_points(count: int, low: float, high: float) -> Array:
@@ -205,7 +206,7 @@ def correct(elastic: ElasticBody, ground: Ground, counts: tuple[int, ...], along
     fields = moved.reshape(size, m, -1) + np.einsum("smd,ad->sma", own, along)
     uneven = float(2 * np.abs(rest).max())
     moments = np.moveaxis(elastic.couple_of(every).reshape(-1, m, d), 0, 2)
-    return Correction(counts, found, fields, uneven, moments)
+    return Correction(counts, found, fields, uneven, (elastic.guide_answer, moments, np.zeros_like(moments)))
 
 
 def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
@@ -304,3 +305,19 @@ def cell_constants(elastic: ElasticBody) -> Array:
         interpolate(ufl.as_ufl(one), function)
         found.append(function.x.array[cells.dofmap.list[:count, 0]])
     return np.stack(found, axis=1)
+
+
+def constants_of(elastic: ElasticBody, key: str, cells: NDArray[np.int64] | slice = EVERY) -> tuple[float, float]:
+    """Return G, MPa, and nu of the one material of this rank's cells, or of some of them; collective.
+
+    Raises:
+        CaseError: there are several materials, or the body is not isotropic.
+    """
+    if not isinstance(elastic.law, Isotropic):
+        raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: half-spaces are isotropic"))
+    found = np.concatenate(elastic.body.mesh.comm.allgather(cell_constants(elastic)[cells]))
+    if (np.ptp(found, axis=0) > SAME * found.max()).any():
+        message = "expected one material at the contact, got several: take 'condensed', or a smaller grid.size"
+        raise CaseError(InputError(key, message))
+    first, second = found[0]
+    return float(second), float(first / (2 * (first + second)))

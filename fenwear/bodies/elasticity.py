@@ -22,7 +22,7 @@ from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
-from fenwear.bodies.factor import Factor, Solver, make_together, solve_together
+from fenwear.bodies.factor import Factor, make_together, solve_together
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer, Guides, Loose, make_guides
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
@@ -64,7 +64,7 @@ class ElasticBody:
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
-        guides: Rotations that guides hold and free modes, and the couples and means that fix them; None without.
+        guides: Rotations that guides hold and free modes, and the couples and means that fix them.
         guided_resultant: The loads' moments about them (g,).
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
@@ -132,14 +132,12 @@ class ElasticBody:
         # None or one of each, of all bodies that differ by their loads.
         self._answers: list[GuideAnswer] = []
         self.known: dict[bytes, Any] = {}  # what an operator has solved for that does not depend on the grid
-        self._factors: list[Solver] = []
+        self._factors: list[Factor] = []
 
-    def _fixed_by_means(self, loose: Sequence[Loose], loads: Sequence[Load]) -> Guides | None:
-        """Return what guides hold, and where free motions are measured; None where supports hold all; collective."""
+    def _fixed_by_means(self, loose: Sequence[Loose], loads: Sequence[Load]) -> Guides:
+        """Return what guides hold, and where free motions are measured; collective."""
         mesh = self.body.mesh
         tags = [self.body.curve(load.on, f"{load.key(self.body.name, k)}.on") for k, load in enumerate(loads)]
-        if not loose:
-            return None
         ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
         loaded = ds(tuple(sorted(set(tags)))) if tags else None
         return make_guides(self.space, measure(mesh, self.law.kind), loaded, loose)
@@ -211,13 +209,15 @@ class ElasticBody:
         """Return values at the trace nodes of the mesh (N_mesh, ...) at those of the contact surface (N, ...)."""
         if self.reading is None:
             return values
-        return np.asarray(self.reading @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+        found = np.asarray(self.reading @ values.reshape(len(values), -1))
+        return found.reshape(len(found), *values.shape[1:])
 
     def on_trace(self, forces: Array) -> Array:
         """Return forces at the trace nodes of the contact surface (N, ...) at those of the mesh (N_mesh, ...)."""
         if self.reading is None:
             return forces
-        return np.asarray(self.reading.T @ forces.reshape(len(forces), -1)).reshape(-1, *forces.shape[1:])
+        found = np.asarray(self.reading.T @ forces.reshape(len(forces), -1))
+        return found.reshape(len(found), *forces.shape[1:])
 
     @property
     def size(self) -> int:
@@ -262,7 +262,7 @@ class ElasticBody:
         values = [constant.value for constant in form.constants()]
         values += [function.x.array for function in form.coefficients()]
         nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
-        guided = [] if self.guides is None else [self.guides.couples, self.guided_resultant]
+        guided = [self.guides.couples, self.guided_resultant]
         return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs, *guided]
 
     def solve(self, right: Array) -> Array:
@@ -271,20 +271,16 @@ class ElasticBody:
 
     def couple_of(self, forces: Array) -> Array:
         """Return the moments about what guides hold (g, k) of forces (owned, k), those on supports too; collective."""
-        if self.guides is None:
-            return np.zeros((0, forces.shape[1]))
         return total(self.body.mesh.comm, self.guides.rotations.T @ forces)
 
     @property
-    def guide_answer(self) -> GuideAnswer | None:
-        """Response of the body to its guides, solved for once; None without; collective at first use."""
-        if self.guides is None:
-            return None
+    def guide_answer(self) -> GuideAnswer:
+        """What the body answers to its guides, solved for once; collective at first use."""
         if not self._answers:
             guides, comm = self.guides, self.body.mesh.comm
             right = guides.couples.copy()
             right[self.supported] = 0.0
-            moved = self.solve(right)
+            moved = self.solve(right) if right.shape[1] else right
             there = [self.trace.pick(fields) for fields in (guides.rotations, moved)]
             self._answers.append(GuideAnswer(guides, moved, total(comm, right.T @ moved), *there))
         return self._answers[0]
@@ -298,8 +294,6 @@ class ElasticBody:
             couple: Their moments about what guides hold (g, k), with those on supports.
         """
         answer = self.guide_answer
-        if answer is None:
-            return displacement
         work = total(self.body.mesh.comm, answer.moved.T @ forces)
         return displacement + answer.change(answer.guides.rotations, answer.moved, couple, work)
 
@@ -314,14 +308,14 @@ class ElasticBody:
         return Boundary(self.space, self.surface_dofs)
 
     @property
-    def factor(self) -> Solver:
+    def factor(self) -> Factor:
         """The Cholesky factor of K, made once; collective at first use."""
         factor = self.begin_factor()
         if not factor.is_made:
             make_together([factor])
         return factor
 
-    def begin_factor(self, owner: int = 0, *, with_surface: bool = False, together: bool = False) -> Solver:
+    def begin_factor(self, owner: int = 0, *, with_surface: bool = False, together: bool = False) -> Factor:
         """Return the factor of K, made or yet to be made; collective at first use.
 
         Args:
@@ -387,7 +381,7 @@ class ElasticBody:
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             even = load.traction or np.array(load.force or np.zeros(self.dim)) / area
             traction: Any = fem.Constant(mesh, np.asarray(even, dtype=PETSc.ScalarType))
-            if load.through is not None or load.moment is not None:
+            if load.through is not None or any(load.moment or ()):
                 traction += self._turning_traction(load, ds(tag), area)
             total += self.surface_integral(traction, tag)
         return total

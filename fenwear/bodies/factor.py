@@ -19,7 +19,7 @@ import ctypes
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import scipy.linalg
@@ -123,7 +123,7 @@ class Factor:
             matrix.destroy()
 
     def join(self) -> None:
-        """Do nothing: no other rank has a part."""
+        """Join the ranks' parts, where each has one: here one has all; collective."""
 
     def solve(self, right: Array) -> Array:
         """Return the solutions for right-hand sides on this rank's own rows, (owned,) or (owned, k); collective."""
@@ -210,43 +210,7 @@ def factored(
     return factor
 
 
-class Solver(Protocol):
-    """Solver for right-hand sides of a matrix, on one rank or on all: made and asked together."""
-
-    comm: MPI.Comm
-    owner: int
-    is_spread: bool
-    is_moved: bool
-    is_made: bool
-    has_schur: bool
-
-    @property
-    def answers(self) -> bool:
-        """Whether this rank solves where all ask."""
-
-    def compute(self) -> None:
-        """Make this rank's part."""
-
-    def join(self) -> None:
-        """Join the parts; collective."""
-
-    def gather(self, right: Array) -> Array:
-        """Return right-hand sides (owned, k) where they are solved; collective."""
-
-    def solve_here(self, right: Array) -> Array:
-        """Return the solutions where they are solved."""
-
-    def scatter(self, found: Array, columns: int) -> Array:
-        """Return this rank's part of solutions (owned, k); collective."""
-
-    def solve_on_surface(self, right: Array) -> Array:
-        """Return the surface's part of the solutions for right-hand sides there (m, k), where they are solved."""
-
-    def free(self) -> None:
-        """Free its memory; collective where it is spread."""
-
-
-def make_together(factors: Sequence[Solver]) -> None:
+def make_together(factors: Sequence[Factor]) -> None:
     """Compute factors, each where it is solved, at once; collective.
 
     Raises:
@@ -306,7 +270,7 @@ def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None
     return solution
 
 
-def solve_together(factors: Sequence[Solver], rights: Sequence[Array]) -> list[Array]:
+def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[Array]:
     """Return the solutions of each factor for its right-hand sides (owned,) or (owned, k), at once; collective."""
     for factor in factors:
         all_together(factor.comm)

@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.convolution import Convolution, GridOperator
-from fenwear.bodies.correction import Correction, Ground, below, cell_constants, coefficients, correct, interpolation
+from fenwear.bodies.correction import Correction, Ground, below, coefficients, constants_of, correct, interpolation
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import entries
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.half_space import HalfSpace, extent_along
-from fenwear.bodies.material import Isotropic
 from fenwear.bodies.response import Request
 from fenwear.bodies.tensor import TensorWeights
 from fenwear.errors import CaseError, InputError
@@ -40,7 +39,6 @@ FALLS = 0.7  # of what polynomials leave out: by how much two more points along 
 UNEVEN = 0.1  # of the same mean: what may not be symmetric, by coarse elements or a strongly curved surface
 OF_SQUARE, OF_LINE = 2.97, 1.5  # mean of s / r, and of ln(s / r), over two points of a square or line of side s
 LARGE = 2**25  # entries of a factor, a quarter of a GiB, above which it is not kept beside the contact
-SAME = 1e-9  # of a material's constants: one material
 
 
 @dataclass(frozen=True)
@@ -100,10 +98,9 @@ def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Arra
     """Return what the loads of a body do to the points of its correction (m, d) by directions (d, a); collective."""
     comm = elastic.body.mesh.comm
     own = total(comm, np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64))
-    if correction.guided is not None:
-        answer, rotations, moved = correction.guided
-        work = total(comm, answer.moved.T @ elastic.load)
-        own = own + answer.change(rotations, moved, elastic.guided_resultant, work) @ along
+    answer, rotations, moved = correction.guided
+    work = total(comm, answer.moved.T @ elastic.load)
+    own = own + answer.change(rotations, moved, elastic.guided_resultant, work) @ along
     return np.asarray(own @ along.T)
 
 
@@ -142,11 +139,7 @@ def fine(request: Request) -> FineBody:
     if elastic.law.kind == "axisymmetric":
         raise CaseError(InputError(key, "expected 'condensed' for rings: 'fine' is of plane models and solids"))
     ground = _ground(elastic, key)
-    x = (request.patterns.T @ elastic.surface.trace) / np.asarray(request.patterns.sum(axis=0)).reshape(-1, 1)
-    x = x[:, grid.axes]
-    along = None if request.directions is None else request.directions
-    if along is not None:
-        along = along[:1] if np.abs(along - along[0]).max() <= SAME else None
+    x = request.places[:, grid.axes]
     half = HalfSpace(
         np.rint((x - grid.corner) / grid.spacing).astype(np.int64),
         grid.spacing,
@@ -155,7 +148,7 @@ def fine(request: Request) -> FineBody:
         axes=(*grid.axes, grid.normal),
         outward=ground.outward,
         depth=ground.depth,
-        along=along,
+        along=request.even_direction,
     )
     direction = np.ascontiguousarray(half.directions[0])
     found = elastic.known.get(direction.tobytes())
@@ -171,9 +164,7 @@ def fine(request: Request) -> FineBody:
     return FineBody(half, over, correction, weights, unresolved, by_loads(elastic, correction, direction))
 
 
-def _guided(
-    request: Request, correction: Correction, weights: TensorWeights
-) -> tuple[GuideAnswer, Array, Array] | None:
+def _guided(request: Request, correction: Correction, weights: TensorWeights) -> tuple[GuideAnswer, Array, Array]:
     """Return what a body answers to its guides, and rotations and displacements by couples at points; collective.
 
     The correction is of supports at points, about which couples turn the body far: what turns goes by the moments that
@@ -187,10 +178,8 @@ def _guided(
     Returns:
         Of the whole body, and (m, d, g) of each at the points.
     """
-    elastic, moments = request.elastic, correction.moments
-    answer, reach = elastic.guide_answer, elastic.reach
-    if answer is None:
-        return None
+    elastic, (answer, moments, _) = request.elastic, correction.guided
+    reach = elastic.reach
     bent = answer.moved_there - answer.rotations_there @ answer.turning
     if reach is None:
         seen = request.seen(elastic.on_surface(bent))
@@ -203,10 +192,8 @@ def _guided(
 
 def _held(correction: Correction, along: Array) -> Correction:
     """Return a correction with what guides hold, for displacements asked along directions (d, a)."""
-    if correction.guided is None:
-        return correction
     answer, rotations, moved = correction.guided
-    couple, work = (fields.reshape(-1, fields.shape[2]).T for fields in (rotations, moved))
+    couple, work = (fields.reshape(len(fields) * fields.shape[1], -1).T for fields in (rotations, moved))
     change = answer.change(rotations, moved, couple, work).reshape(*rotations.shape[:2], *rotations.shape[:2])
     return replace(correction, response=correction.response + np.einsum("da,idjk->iajk", along, change))
 
@@ -289,20 +276,12 @@ def _ground(elastic: ElasticBody, key: str) -> Ground:
     if elastic.reach is not None:
         grid = elastic.reach.grid
     assert grid is not None
-    if not isinstance(elastic.law, Isotropic):
-        raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: 'fine' is isotropic"))
     mesh = elastic.body.mesh
     facets = below(elastic, grid, elastic.body.facet_tags.find(contact_tag(elastic.body)))
-    constants = cell_constants(elastic)
     to_cell = mesh.topology.connectivity(elastic.dim - 1, elastic.dim)
     touching = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int64)
-    found = np.concatenate(comm.allgather(constants[touching]))
-    if not len(found):
+    if not comm.allreduce(len(touching)):
         raise CaseError(InputError("grid", f"lies off {elastic.body.name}_contact"))
-    if (np.ptp(found, axis=0) > SAME * found.max()).any():
-        message = "the contact grid lies over several materials, where it expects one: take 'condensed', or a smaller"
-        raise CaseError(InputError(key, f"{message} grid.size"))
-    first, second = found[0]
     low, high = extent_along(elastic, grid.normal)
     outward = float(np.sign(elastic.surface.outward[0, grid.normal]))
-    return Ground(grid, outward, float(second), float(first / (2 * (first + second))), high - low)
+    return Ground(grid, outward, *constants_of(elastic, key, touching), high - low)

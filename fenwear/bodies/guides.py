@@ -103,7 +103,8 @@ def make_guides(space: fem.FunctionSpace, weight: Any, loaded: ufl.Measure | Non
         loaded: The surfaces on which loads act; None without loads.
         parts: Motions of each part that supports leave free.
     """
-    comm, rotations, couples = space.mesh.comm, list[Array](), list[Array]()
+    comm, owned = space.mesh.comm, space.dofmap.index_map.size_local * space.dofmap.index_map_bs
+    rotations, couples = [np.zeros((owned, 0))], [np.zeros((owned, 0))]
     volume = ufl.dx(domain=space.mesh)
     for motions, turns, held, free in parts:
         mass = _weighed(space, weight, volume, motions)

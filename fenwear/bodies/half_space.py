@@ -28,18 +28,16 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from ufl.algorithms import extract_coefficients
 
 from fenwear.arrays import Array
 from fenwear.bodies.convolution import EVERY, Convolution, GridOperator
+from fenwear.bodies.correction import constants_of
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import Isotropic
 from fenwear.bodies.response import Request
 from fenwear.errors import CaseError, InputError
 
 UNEVEN = 0.01  # of the spacing: how far a node may be off the grid
 WIDE = 1.25  # of a cell: what a node has at most; 1.5 between cells of one spacing and of two
-SAME = 1e-9  # of a material's constants: one material
 
 
 @dataclass(frozen=True)
@@ -150,24 +148,20 @@ def half_space(request: Request) -> HalfSpace:
     if elastic.moved:
         message = "expected a load with 'half-space', which knows of no supports: none may move it"
         raise CaseError(InputError(f"{elastic.body.name}.supports", message))
-    surface, shares = elastic.surface, request.patterns.sum(axis=0)
-    x = (request.patterns.T @ surface.trace) / np.asarray(shares).reshape(-1, 1)
+    surface = elastic.surface
     mean = surface.weights @ surface.outward
     normal = int(np.abs(mean).argmax())
     inner = [axis for axis in range(elastic.dim) if axis != normal]
-    places, spacing = _grid(x[:, inner], surface.weights, key)
-    along = None if request.directions is None else request.directions
-    if along is not None:
-        along = along[:1] if np.abs(along - along[0]).max() <= SAME else None
+    places, spacing = _grid(request.places[:, inner], surface.weights, key)
     low, high = extent_along(elastic, normal)
     return HalfSpace(
         places,
         spacing,
-        *_constants(elastic, key),
+        *constants_of(elastic, key),
         axes=(*inner, normal),
         outward=float(np.sign(mean[normal])),
         depth=high - low if elastic.dim == 2 else np.inf,
-        along=along,
+        along=request.even_direction,
     )
 
 
@@ -191,34 +185,11 @@ def _grid(x: Array, weights: Array, key: str) -> tuple[NDArray[np.int64], tuple[
     return places, tuple(float(one) for one in spacing)
 
 
-def _constants(elastic: ElasticBody, key: str) -> tuple[float, float]:
-    """Return G and nu of the one material of a body; collective.
-
-    Raises:
-        CaseError: it is of several, or not isotropic.
-    """
-    if not isinstance(elastic.law, Isotropic):
-        raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: 'half-space' is isotropic"))
-    values = {}
-    for field in dict.fromkeys(field for one in elastic.law.lame for field in extract_coefficients(one)):
-        low, high = _range(elastic, field.x.array)
-        if high - low > SAME * abs(high):
-            raise CaseError(InputError(key, "expected 'condensed' for a body of several materials"))
-        values[field] = high
-    first, second = (float(one((0.0,) * elastic.dim, values)) for one in elastic.law.lame)
-    return second, first / (2 * (first + second))
-
-
 def extent_along(elastic: ElasticBody, axis: int) -> tuple[float, float]:
     """Return the ends of a body along an axis, mm; collective."""
-    return _range(elastic, elastic.body.mesh.geometry.x[:, axis])
-
-
-def _range(elastic: ElasticBody, values: Array) -> tuple[float, float]:
-    """Return the least and the largest of the values that all ranks have; collective."""
-    comm = elastic.body.mesh.comm
-    least = comm.allreduce(values.min(initial=np.inf), op=MPI.MIN)
-    return float(least), float(comm.allreduce(values.max(initial=-np.inf), op=MPI.MAX))
+    comm, x = elastic.body.mesh.comm, elastic.body.mesh.geometry.x[:, axis]
+    least = comm.allreduce(x.min(initial=np.inf), op=MPI.MIN)
+    return float(least), float(comm.allreduce(x.max(initial=-np.inf), op=MPI.MAX))
 
 
 def influence(x: Array, sides: Sequence[float], shear: float, poisson: float, depth: float = np.inf) -> Array:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from fenwear.errors import CaseError, InputError
 LIMIT = "FENWEAR_KEPT_GIB"  # environment variable: GiB of all files together; 0 keeps nothing
 DEFAULT = 4.0
 Arrays = Mapping[str, Array]
+NONE: Arrays = MappingProxyType({})
 
 _told: list[str] = []
 
@@ -105,12 +107,12 @@ def known(comm: MPI.Comm, parts: Callable[[], Iterable[object]], *, fresh: bool 
         else:
             digest.update(f"|{part}|".encode())
     key = hashlib.blake2b("".join(comm.allgather(digest.hexdigest())).encode(), digest_size=20).hexdigest()
-    path, arrays = folder() / f"{key}-{comm.rank}of{comm.size}.npz", None
+    path, arrays = folder() / f"{key}-{comm.rank}of{comm.size}.npz", dict[str, Array]()
     if not fresh:
         with suppress(OSError, ValueError, EOFError, zipfile.BadZipFile), np.load(path) as stored:  # absent, or broken
             arrays = dict(stored.items())
             os.utime(path)
-    return Kept(comm, path, arrays if comm.allreduce(arrays is not None, op=MPI.LAND) else None)
+    return Kept(comm, path, arrays if comm.allreduce(bool(arrays), op=MPI.LAND) else NONE)
 
 
 @dataclass(frozen=True)
@@ -120,12 +122,12 @@ class Kept:
     Attributes:
         comm: The ranks.
         path: Of the file; None where nothing is kept.
-        arrays: The kept results; None unless every rank has its own.
+        arrays: What is kept there; none unless every rank has its own.
     """
 
     comm: MPI.Comm
     path: Path | None = None
-    arrays: Arrays | None = None
+    arrays: Arrays = NONE
 
     def save(self, arrays: Arrays) -> None:
         """Keep this rank's arrays, and let go what was unused longest; collective."""

@@ -37,7 +37,7 @@ class SurfaceOperator(Protocol):
         by_load: Displacement of each pattern by the body's loads (q, d), mm.
         by_temperature: Displacement of each pattern along its one direction from the temperature of this
             rank's own nodes (q, owned), mm/K; None without heat.
-        cost: Of a product, in numbers that memory could give meanwhile; None where the operator is numbers in memory.
+        in_memory: Whether its numbers are in memory; else products cost less than all of them.
     """
 
     @property
@@ -53,8 +53,8 @@ class SurfaceOperator(Protocol):
         """Displacement from temperatures (q, owned), mm/K."""
 
     @property
-    def cost(self) -> float | None:
-        """Of a product."""
+    def in_memory(self) -> bool:
+        """Whether its numbers are in memory."""
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N/mm in the plane."""

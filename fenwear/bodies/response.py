@@ -19,10 +19,11 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import Factor, available, entries, moved, solve_together
+from fenwear.bodies.factor import available, entries, moved, solve_together
 from fenwear.parallel import total
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
+SAME = 1e-9  # of unit vectors: one direction
 SURFACE_SHARE = 10  # entries of the factor for each of the Schur complement, from which on that pays
 
 
@@ -47,6 +48,19 @@ class Request:
         """The directions of each pattern (q, d, a)."""
         q, d = self.patterns.shape[1], self.elastic.dim
         return np.broadcast_to(np.eye(d), (q, d, d)) if self.directions is None else self.directions[:, :, None]
+
+    @property
+    def places(self) -> Array:
+        """Where the patterns are (q, d), mm."""
+        shares = np.asarray(self.patterns.sum(axis=0)).reshape(-1, 1)
+        return np.asarray((self.patterns.T @ self.elastic.surface.trace) / shares)
+
+    @property
+    def even_direction(self) -> Array | None:
+        """The one direction of all patterns (1, d); None where they are more."""
+        if self.directions is None or np.abs(self.directions - self.directions[0]).max() > SAME:
+            return None
+        return self.directions[:1]
 
     @property
     def count(self) -> int:
@@ -152,7 +166,6 @@ class _Answer:
             nodes, which = np.nonzero(at_surface)
             shape = (len(columns), elastic.size)
             right = csr_array((at_surface[nodes, which], (which, dofs[nodes])), shape=shape)
-            assert isinstance(factor, Factor)
             solution = factor.solve_sparse(right)
             displacement = solution[dofs]
         if self._coupling is not None:

@@ -26,20 +26,20 @@ class Round:
 
     Attributes:
         middle: Of it, or a point on its axis (d,), mm.
-        axis: Of a cylinder in space, a unit vector (3,); else None.
+        axis: Of a cylinder in space, a unit vector; else zero (d,).
         radius: mm.
         sign: 1 where the body is inside, as of a shaft or a ball; -1 where it is around, as of a bore.
     """
 
     middle: Array
-    axis: Array | None
+    axis: Array
     radius: float
     sign: float
 
     def ways(self, x: Array) -> Array:
         """Return the ways from the middle or the axis to points (n, d), mm."""
         arm = np.asarray(x - self.middle)
-        return arm if self.axis is None else arm - (arm @ self.axis)[:, None] * self.axis
+        return np.asarray(arm - (arm @ self.axis)[:, None] * self.axis)
 
     def onto(self, x: Array) -> Array:
         """Return the points of it that lie where points (n, d) are seen from its middle, mm."""
@@ -92,22 +92,22 @@ def _fitted(x: Array, normal: Array) -> Round | None:
     return None
 
 
-def _candidates(x: Array, normal: Array) -> list[tuple[Array, Array | None, float]]:
+def _candidates(x: Array, normal: Array) -> list[tuple[Array, Array, float]]:
     """Return the circle or sphere that points (n, d) are next to, and in space the cylinder: middle, axis, radius."""
     origin = x.mean(axis=0)
     arm = x - origin
     # |x|^2 = 2 c x + (R^2 - |c|^2), in least squares; of a plane there is none.
     found, _, rank, _ = np.linalg.lstsq(np.column_stack([2 * arm, np.ones(len(x))]), (arm**2).sum(axis=1), rcond=1e-12)
-    candidates: list[tuple[Array, Array | None, float]] = []
+    candidates: list[tuple[Array, Array, float]] = []
     if rank == x.shape[1] + 1:
         centre = found[:-1]
-        candidates.append((origin + centre, None, float(np.sqrt(found[-1] + centre @ centre))))
+        candidates.append((origin + centre, np.zeros_like(centre), float(np.sqrt(found[-1] + centre @ centre))))
     if x.shape[1] == 3:
         candidates.append(_cylinder(x, normal))
     return candidates
 
 
-def _cylinder(x: Array, normal: Array) -> tuple[Array, Array | None, float]:
+def _cylinder(x: Array, normal: Array) -> tuple[Array, Array, float]:
     """Return middle, axis and radius of the cylinder next to points (n, 3), by Gauss and Newton."""
     axes = np.linalg.eigh(normal.T @ normal)[1]
     axis, across = axes[:, 0], axes[:, 1:]

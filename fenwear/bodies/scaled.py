@@ -44,9 +44,9 @@ class Scaled:
         return self.operator.by_temperature
 
     @property
-    def cost(self) -> float | None:
-        """Of a product."""
-        return self.operator.cost
+    def in_memory(self) -> bool:
+        """Whether its numbers are in memory."""
+        return self.operator.in_memory
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...) of forces (q, d, ...)."""

@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector, compiled, destroy, interpolate
+from fenwear.bodies.assembly import assembled, assembled_vector, compiled, interpolate
 from fenwear.bodies.contact_surface import ContactSurface, Trace, contact_surface, contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.factor import factored
 from fenwear.bodies.material import measure
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Kind
@@ -186,23 +187,17 @@ def _extended(
 
 
 def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) -> fem.Function:
-    matrix = fem.petsc.assemble_matrix(a, bcs=bcs)
-    matrix.assemble()
+    matrix, solution = assembled(a, bcs), fem.Function(space)
     load = fem.Function(space)  # its vector has ghosts, unlike the matrix's own
     fem.petsc.apply_lifting(load.x.petsc_vec, [a], [bcs])
     load.x.petsc_vec.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
     fem.petsc.set_bc(load.x.petsc_vec, bcs)
-    ksp = PETSc.KSP().create(space.mesh.comm)
-    ksp.setOptionsPrefix(PREFIX)
-    ksp.setOperators(matrix)
-    ksp.setType("preonly")
-    ksp.pc.setType("lu")
-    ksp.pc.setFactorSolverType("mumps")
-    ksp.setFromOptions()
-    solution = fem.Function(space)
-    ksp.solve(load.x.petsc_vec, solution.x.petsc_vec)
+    factor = factored(matrix, PREFIX, "lu", comm=space.mesh.comm, dim=space.mesh.geometry.dim)
+    owned = space.dofmap.index_map.size_local
+    solution.x.array[:owned] = factor.solve(load.x.array[:owned])
     solution.x.scatter_forward()
-    destroy(ksp, matrix)
+    factor.free()
+    matrix.destroy()
     return solution
 
 

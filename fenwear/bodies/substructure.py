@@ -22,7 +22,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_here
-from fenwear.bodies.factor import condense_only, factored_here, schur_complement, solved, without_factor
+from fenwear.bodies.factor import Factor, condense_only, factored_here, schur_complement, solved, without_factor
 
 Numbers = NDArray[np.int64]
 
@@ -64,8 +64,8 @@ class Boundary:
         self.size = float(comm.allreduce(size if len(local) < count else np.inf))
 
 
-class Substructures:
-    """K as substructures: answers as `fenwear.bodies.factor.Factor` does, and `make_together` computes it."""
+class Substructures(Factor):
+    """The factor of K as substructures."""
 
     is_spread = is_moved = False
     has_schur = True  # it solves on the surface alone
@@ -92,17 +92,12 @@ class Substructures:
             comm: The ranks.
             owner: The rank that joins the others.
         """
-        self._form, self._bcs, self._boundary, self._surface = form, bcs, boundary, surface
+        self._form, self._bcs, self._boundary, self._stays = form, bcs, boundary, surface
         self._prefix, self.comm, self.owner, self.is_made = prefix, comm, owner, False
         self._inside: PETSc.Mat | None = None  # the factor of what lies inside
         self._local: Array = np.zeros((0, 0))  # right-hand sides that are being solved for
         self._places: list[Numbers] = []  # of each rank's boundary among all, on the owner
         self._joint: Array = np.zeros((0, 0))  # Cholesky factor of all boundaries, there
-
-    @property
-    def answers(self) -> bool:
-        """Whether this rank solves where all ask."""
-        return bool(self.comm.rank == self.owner)
 
     def compute(self) -> None:
         """Eliminate the inside of this rank's own cells.
@@ -129,8 +124,8 @@ class Substructures:
         del self._schur
         if numbers is None or parts is None:
             return
-        inner = np.setdiff1d(np.unique(np.concatenate(numbers)), self._surface)
-        order = np.concatenate([inner, self._surface])
+        inner = np.setdiff1d(np.unique(np.concatenate(numbers)), self._stays)
+        order = np.concatenate([inner, self._stays])
         ascending = np.argsort(order)
         self._places = [ascending[np.searchsorted(order[ascending], own)] for own in numbers]
         joint = np.zeros((len(order), len(order)))
@@ -143,7 +138,7 @@ class Substructures:
 
     def solve_on_surface(self, right: Array) -> Array:
         """Return the surface's part of the solutions for right-hand sides there (m, k), on the owner alone."""
-        first = len(self._joint) - len(self._surface)
+        first = len(self._joint) - len(self._stays)
         return np.asarray(scipy.linalg.cho_solve((self._joint[first:, first:], True), right))
 
     def gather(self, right: Array) -> Array:

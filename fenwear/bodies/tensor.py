@@ -63,7 +63,7 @@ class TensorWeights:
         whole[tuple(self.at.T)] = flat
         for axis, factor in enumerate(factors):
             whole = along(factor, whole, axis)
-        return whole.reshape(-1, *values.shape[1:])
+        return whole.reshape(int(np.prod(whole.shape[:-1])), *values.shape[1:])
 
     def diagonal(self, between: Array) -> Array:
         """Return the diagonal (q, ...) of L C L^T, with C (m, m, ...) between points."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -260,16 +260,16 @@ class CourseLoad:
         on: Group of the geometry.
         through: Point that the force acts through; None for the centroid.
         fraction: Of the cycle, rising from 0 to 1 (k,).
-        force: (k, d), N; None for none.
-        moment: (k, 1), in a solid (k, 3), N mm; None for none.
+        force: (k, d), N.
+        moment: (k, 1), in a solid (k, 3), N mm.
         factor: Of both.
     """
 
     on: str
     through: tuple[float, ...] | None
     fraction: Array
-    force: Array | None
-    moment: Array | None
+    force: Array
+    moment: Array
     factor: float = 1.0
     steady: ClassVar[bool] = False
 
@@ -279,23 +279,18 @@ class CourseLoad:
 
     def at(self, fraction: float) -> Load:
         """Return the load at this fraction of the cycle."""
-        return self._load(
-            [None if given is None else [np.interp(fraction, self.fraction, part) for part in given.T]
-             for given in (self.force, self.moment)]
-        )  # fmt: skip
+        loads = (self.force, self.moment)
+        return self._load(*([np.interp(fraction, self.fraction, part) for part in given.T] for given in loads))
 
     def mean(self) -> Load:
         """Return the mean of the load over the cycle."""
-        return self._load(
-            [None if given is None else np.diff(self.fraction) @ (given[1:] + given[:-1]) / 2
-             for given in (self.force, self.moment)]
-        )  # fmt: skip
+        loads = (self.force, self.moment)
+        return self._load(*(np.diff(self.fraction) @ (given[1:] + given[:-1]) / 2 for given in loads))
 
-    def _load(self, parts: Sequence[Any]) -> Load:
-        force, moment = (None if p is None else tuple(self.factor * float(c) for c in p) for p in parts)
-        through = None if force is None else self.through
+    def _load(self, *parts: Sequence[float] | Array) -> Load:
+        force, moment = (tuple(self.factor * float(c) for c in part) for part in parts)
         load = Load.model_construct(
-            on=self.on, force=force, traction=None, through=through, moment=moment, over_cycle=None
+            on=self.on, force=force, traction=None, through=self.through, moment=moment, over_cycle=None
         )
         load._of_table = True
         return load

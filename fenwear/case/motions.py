@@ -47,16 +47,18 @@ class CycleCourse:
         duration: Of the cycle, s.
         turn: R, the strip's as the punch sees it (k, 3, 3).
         shift: s, the same (k, 3), mm.
-        force: On the punch, in its frame (k, 3), N; None where the table has none.
+        force: On the punch, in its frame (k, 3), N.
         moment: The same (k, 3), N mm.
+        loads: Whether the table has a force or a moment.
     """
 
     fraction: Array
     duration: float
     turn: Array
     shift: Array
-    force: Array | None
-    moment: Array | None
+    force: Array
+    moment: Array
+    loads: bool
 
     @property
     def rests(self) -> bool:
@@ -155,13 +157,11 @@ def course_of(
     back = np.transpose(punch, (0, 2, 1))
     turn, shift = back @ strip, np.einsum("kij,kj->ki", back, shifts[0] - shifts[1])
     _check_closed(turn, shift)
-    loads: list[Array | None] = []
-    for kind in ("force", "moment"):
-        has = any(f"{kind}_{axis}" in table for axis in AXES)
-        vectors = _vectors(table, kind, len(time))
-        loads.append((np.einsum("kij,kj->ki", back, vectors) if in_space else vectors) if has else None)
-    duration = float(period or time[-1] - time[0])
-    return CycleCourse((time - time[0]) / (time[-1] - time[0]), duration, turn, shift, loads[0], loads[1])
+    loads = [_vectors(table, kind, len(time)) for kind in ("force", "moment")]
+    if in_space:
+        loads = [np.einsum("kij,kj->ki", back, vectors) for vectors in loads]
+    duration, loaded = float(period or time[-1] - time[0]), not LOADS.keys().isdisjoint(table)
+    return CycleCourse((time - time[0]) / (time[-1] - time[0]), duration, turn, shift, loads[0], loads[1], loaded)
 
 
 def _vectors(table: Mapping[str, Array], name: str, rows: int) -> Array:
@@ -371,8 +371,7 @@ class Cycle(Part):
                 raise ValueError(f"order: expected all axes of the angles, that of {name} among them")
         if len(set(self.order)) < len(self.order):
             raise ValueError(f"order: expected no axis twice, got {self.order!r}")
-        course = self.course  # raises where the table does not fit
-        if (self.load is None) != (course.force is None and course.moment is None):
+        if self.course.loads != bool(self.load):  # raises where the table does not fit
             raise ValueError(f"load: expected together with columns of {', '.join(LOADS)}, and only then")
         return self
 
@@ -399,10 +398,9 @@ class Cycle(Part):
         """Return the load of the table on the punch, of a model with these axes; None without."""
         if self.load is None:
             return None
-        course, load, plane = self.course, self.load, len(axes) == 2
-        force, moment = course.force, course.moment
-        if plane:
-            force, moment = (None if force is None else force[:, [0, 2]]), (None if moment is None else moment[:, [1]])
+        course, load = self.course, self.load
+        of_force, of_moment = ([0, 2], [1]) if len(axes) == 2 else ([0, 1, 2], [0, 1, 2])
+        force, moment = course.force[:, of_force], course.moment[:, of_moment]
         return CourseLoad(load.on, load.through, course.fraction, force, moment, load.factor)
 
     @property

@@ -25,7 +25,7 @@ from scipy.linalg import block_diag
 from fenwear.arrays import Array, Mask, Nodes
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
-from fenwear.contact.operators import Blocks, Dense, Operator, Phases, Solve, eliminate
+from fenwear.contact.operators import Blocks, Dense, Operator, Solve, eliminate, joined
 from fenwear.errors import FULL_START, INTERIOR, SOFTER_START, ConvergenceError, Remedies
 from fenwear.interface import Interface
 from fenwear.interface.compliance import EVERY
@@ -186,9 +186,10 @@ class CondensedContact:
         self._wearing: WearCompliance | None = None
         self._mu: Callable[[Array], Array] | None = None  # of friction that follows the pressure
         self._by_mu: Array = np.zeros((0, 0))  # what unit pressures add by the traction of a unit of it (size, n)
-        self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
-        self._elastic: Operator | None = None
-        self._operator: Operator | None = None
+        self._slopes: list[
+            Array | float
+        ] = []  # of what wears in the step, and of what gives way, and what is made of it
+        self._operator: Operator
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
         self.most = np.inf if self.gridded or m > 1 else most
@@ -206,7 +207,7 @@ class CondensedContact:
             rigid, pair = interface.rigid, interface.pair
             self._modes[k] = rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
             self._balances[k] = rigid.equilibrium(ratio) * (self._pressure_scale / self._resultant_scale[:, None])
-            if interface.cost is None or (pair.punch.grid is None and len(pair.weights) <= MANY):
+            if interface.in_memory or (pair.punch.grid is None and len(pair.weights) <= MANY):
                 continue
             even = ratio
             if np.ptp(ratio, axis=0).any():
@@ -247,7 +248,12 @@ class CondensedContact:
         if changed:
             self._take(changed)
             self._slide(changed)
-            self._elastic = self._operator = None
+            self._forget()
+
+    def _forget(self) -> None:
+        """Forget the derivatives that were made."""
+        self.__dict__.pop("_linear", None)
+        self._slopes = []
 
     @property
     def can_follow(self) -> bool:
@@ -310,16 +316,10 @@ class CondensedContact:
         mean = np.full(self.shape, self._pressure_scale)
         return float(np.abs(self._wearing.opening(mean)).max()) / self._gap_scale
 
-    @property
+    @cached_property
     def _linear(self) -> Operator:
-        """The derivative of the residual without the wear of the step."""
-        if self._elastic is None:
-            if self.gridded and self._coupling is None:
-                elastic: Operator = GriddedPhases(self._grid)
-            else:
-                elastic = self._as_phases()
-            self._elastic = elastic
-        return self._elastic
+        """The derivative of the residual without what wears in the step."""
+        return GriddedPhases(self._grid) if self.gridded and self._coupling is None else self._as_phases()
 
     @cached_property
     def _grid(self) -> PhasesGrid:
@@ -329,7 +329,7 @@ class CondensedContact:
 
     def _as_phases(
         self, border: tuple[Array, Array] | None = None, local: Array | None = None, layer: Array | None = None
-    ) -> Phases:
+    ) -> Operator:
         """Return the derivative by matrices of all nodes."""
         blocks = self._blocks
         if self.gridded:
@@ -337,7 +337,7 @@ class CondensedContact:
             blocks = Blocks(np.array(matrices), self.shape[1])
         if layer is not None:
             blocks = blocks.added(layer)
-        return Phases(blocks, None if self._coupling is None else self._coupling * self._scale, border, local)
+        return joined(blocks, None if self._coupling is None else self._coupling * self._scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
         if self._mu is not None:
@@ -352,8 +352,7 @@ class CondensedContact:
         if slope is None:
             left, slope = self._wearing.border(pressure)
         layer = self._wearing.layer(pressure)
-        if self._operator is None or not self._known(slope, layer):
-            self._slopes = slope, layer
+        if self._changed([slope] if layer is None else [slope, layer]):
             layer = None if layer is None else layer * scale
             if left is not None:
                 self._operator = self._as_phases(border=(left, slope * scale), layer=layer)
@@ -365,18 +364,15 @@ class CondensedContact:
         """Return the derivative with the wear at a pressure (m, n), on a grid."""
         assert self._wearing is not None
         parts = *self._wearing.by_body(pressure), self._wearing.layer(pressure)
-        slopes = Opened(*(0.0 if one is None else scale * one for one in parts))
-        last = self._operator
-        if not isinstance(last, GriddedPhases) or not last.opened.same(slopes):
-            last = self._operator = GriddedPhases(self._grid, slopes)
-        return last
+        slopes = [0.0 if one is None else scale * one for one in parts]
+        if self._changed(slopes):
+            self._operator = GriddedPhases(self._grid, Opened(*slopes))
+        return self._operator
 
-    def _known(self, slope: Array, layer: Array | None) -> bool:
-        """Return whether the last derivative is that of these slopes."""
-        if self._slopes is None or (self._slopes[1] is None) != (layer is None):
-            return False
-        pairs = zip(self._slopes, (slope, layer), strict=True)
-        return all(one is None or other is None or np.array_equal(one, other) for one, other in pairs)
+    def _changed(self, slopes: list[Array | float]) -> bool:
+        """Take these slopes, and return whether the last derivative is of others."""
+        before, self._slopes = self._slopes, slopes
+        return len(before) != len(slopes) or not all(map(np.array_equal, before, slopes))
 
     def solve(
         self,
@@ -436,7 +432,8 @@ class CondensedContact:
         if not math.isfinite(self._offset.sum()):  # nor is a sum with one that is not
             raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
         if coupling is not self._coupling:
-            self._coupling, self._elastic, self._operator = coupling, None, None
+            self._coupling = coupling
+            self._forget()
         self._wearing = wearing
         x, f, iterations = self._solve(start)
         if self.gridded and isinstance(operator := self._linear, GriddedPhases):

@@ -61,17 +61,16 @@ class EndlessGrid:
 
     Args:
         of: The compliances on a box, whose first one is that of all.
-        passing: Of each phase; None where the strip does not wear.
+        passing: Of each phase; none where the strip does not wear.
     """
 
-    def __init__(self, of: OnBox, passing: Sequence[Passing] | None) -> None:
+    def __init__(self, of: OnBox, passing: Sequence[Passing] = ()) -> None:
         self.box = of.box
         self.period = tuple(scipy.fft.next_fast_len(int(MARGIN * count) + 2, real=True) for count in self.box.counts)
         waves = scipy.fft.rfftn(over_period(of.of[0].table[0, 0], self.period))
         symbol = _rows(waves).real * of.largest + float(of.local[0].mean())
         self._symbol = np.maximum(symbol, LEAST * np.median(np.abs(symbol)))
-        self._read = self._put = None
-        if passing is not None:
+        if passing:
             self._read = _short([self._transfer(one.read, -one.read_at) for one in passing])
             self._put = _short([self._transfer(one.put, one.put_at) for one in passing])
         self.take(np.zeros(1), np.zeros(1), 0.0)
@@ -94,7 +93,7 @@ class EndlessGrid:
         pairs: list[tuple[Waves, Waves]] = []  # of U (i, j, m) and V
         if common.any():
             pairs.append((np.ones((1, 1, len(common)), dtype=complex), common[None, None].astype(complex)))
-        if strip.any() and self._read is not None and self._put is not None:
+        if strip.any():
             pairs.append((self._read, strip * self._put))
         self.inverse: Array = 1 / symbol[:, None]
         self._worn: tuple[Waves, Waves, Waves] | None = None

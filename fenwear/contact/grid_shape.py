@@ -124,7 +124,7 @@ class _Near:
         self.on = on = self.equations.grid.boxes.around(touched)
         self.touching = on.box.spread(touching.astype(float))
         rate = np.array([own.diagonal()[touched].mean() for own in of.wear])
-        endless = EndlessGrid(on.products, None)
+        endless = EndlessGrid(on.products)
         endless.take(self.length * rate, np.zeros(m), 0.0)
         moved, balanced = (
             on.box.spread(values.reshape(-1, n)).reshape(m, r, *on.box.counts) * self.touching[:, None]

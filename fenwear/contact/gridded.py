@@ -50,10 +50,6 @@ class Opened(NamedTuple):
     strip: Array | float = 0.0
     own: Array | float = 0.0
 
-    def same(self, other: Opened) -> bool:
-        """Return whether another one is equal."""
-        return all(np.array_equal(a, b) for a, b in zip(self, other, strict=True))
-
 
 NOTHING = Opened()
 
@@ -131,7 +127,7 @@ class PhasesBox:
     def endless(self) -> EndlessGrid:
         """The inverse on an endless grid."""
         wears = any(pair.wear_projection.nnz for pair in self.grid.pairs)
-        return EndlessGrid(self.products, self.grid.passing if wears else None)
+        return EndlessGrid(self.products, self.grid.passing if wears else ())
 
     @cached_property
     def _strip(self) -> tuple[csr_array, csr_array]:

@@ -120,7 +120,7 @@ class Inequality:
         self._lower, self._upper = lower, upper
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: Factor | None = None
-        self._operator: Operator | None = None
+        self._operator: Operator  # of the last Jacobian
         self.by_digits = False  # whether solutions may cost by their digits
         self.sets_first = False  # whether sets are gone through before SNES starts, from afar, too
         self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
@@ -151,8 +151,6 @@ class Inequality:
 
     def multiply(self, x: Array) -> Array:
         """Return the present derivative times x."""
-        if self._operator is None:
-            raise ConvergenceError(f"{self.name} has no derivative yet")
         return self._operator.multiply(x)
 
     def factor(self, kept: Indices) -> Solve:
@@ -161,8 +159,6 @@ class Inequality:
         Raises:
             LinAlgError: they are singular.
         """
-        if self._operator is None:
-            raise ConvergenceError(f"{self.name} has no derivative yet")
         free = np.zeros(len(self._lower), dtype=bool)
         free[kept] = True
         return self._factor(self._operator, free.tobytes()).solve

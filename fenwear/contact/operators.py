@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -249,58 +250,67 @@ def _unlike(one: Array, other: Array) -> float:
     return float((most / np.where(least > 0, least, np.where(most > 0, TINY, 1.0))).max(initial=0.0))
 
 
-class Phases:
-    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + L_k R_j.
-
-    Where wear of the phases' own pressures opens all of them, D_k what unit pressure of phase k wears at its node,
-    L_k = 1 and R_j = D_j. The depth y that all phases have follows then from
-
-        (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
-
-    with the phases' factors, which do not change with the length of a step: 5 to 20 iterations of GMRES.
+def joined(
+    blocks: Blocks,
+    coupling: Array | None = None,
+    border: tuple[Array, Array] | None = None,
+    local: Array | None = None,
+) -> Dense | Phases:
+    """Return diag(A_k) + C_kj + L_k R_j, the phases of a cycle and what they meet in, as it is solved best.
 
     Args:
         blocks: A_k.
         coupling: C (m, n, m, n) on the nodes; None where there is none.
         border: L (m, n, q) and R (m, q, n), on the same; None where there is none.
-        local: D (m, n), in place of a border.
+        local: D (m, n), in place of a border: what unit pressures wear at their own nodes opens all phases.
+    """
+    m, size, _ = blocks.matrices.shape
+    apart = coupling is None and border is None and local is None
+    if m == 1 and apart:
+        return blocks.parts[0]
+    if m == 1 or coupling is not None or m * size <= DENSE:
+        return Dense(whole(blocks.matrices, coupling, border, local))
+    if local is not None:
+        return Bordered(blocks, *_as_border(local)) if blocks.nodes <= DIRECT else Worn(blocks, local)
+    return Phases(blocks) if border is None else Bordered(blocks, *border)
+
+
+class _Cut:
+    """Some unknowns of all phases (ascending), and the factors of each phase's."""
+
+    def __init__(self, blocks: Blocks, kept: Indices) -> None:
+        size, m = blocks.matrices.shape[1], len(blocks.parts)
+        self.kept = kept
+        self.cuts = list(pairwise(np.searchsorted(kept, np.arange(m + 1) * size)))
+        rows = [kept[low:high] - np.int32(k * size) for k, (low, high) in enumerate(self.cuts)]
+        self.nodes: list[Indices] = [own[own < blocks.nodes] for own in rows]
+        self.solves = [part.factor(own) for part, own in zip(blocks.parts, rows, strict=True)]
+
+    def solve(self, b: Array) -> list[Array]:
+        """Return the solution of each phase by itself."""
+        return [solve(b[low:high]) for solve, (low, high) in zip(self.solves, self.cuts, strict=True)]
+
+
+class Phases:
+    """Phases that meet nowhere: diag(A_k).
+
+    Args:
+        blocks: A_k.
     """
 
-    def __init__(
-        self,
-        blocks: Blocks,
-        coupling: Array | None = None,
-        border: tuple[Array, Array] | None = None,
-        local: Array | None = None,
-    ) -> None:
-        m, size, _ = blocks.matrices.shape
-        self.blocks, self.border, self.local = blocks, border, local
-        self._whole: Dense | None = None
-        if m == 1 and coupling is None and border is None and local is None:
-            self._whole = blocks.parts[0]
-        elif m == 1 or coupling is not None or m * size <= DENSE:
-            self._whole = Dense(whole(blocks.matrices, coupling, border, local))
-        elif local is not None and blocks.nodes <= DIRECT:
-            self.border = _as_border(local)
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
 
     @cached_property
     def matrix(self) -> Array:
         """All of it (m size, m size)."""
-        blocks = self.blocks.matrices
-        local = self.local if self.border is None else None
-        return whole(blocks, None, self.border, local) if self._whole is None else self._whole.matrix
+        return whole(self.blocks.matrices)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (m size,)."""
-        if self._whole is not None:
-            return self._whole.multiply(x)
         n, parts = self.blocks.nodes, x.reshape(len(self.blocks.parts), -1)
         result = np.matmul(self.blocks.matrices, parts[:, :, None])[:, :, 0]
-        if self.border is not None:
-            left, right = self.border
-            result[:, :n] += left @ np.einsum("kqn,kn->q", right, parts[:, :n])
-        elif self.local is not None:
-            result[:, :n] += (self.local * parts[:, :n]).sum(axis=0)
+        self._open(parts[:, :n], result[:, :n])
         return result.ravel()
 
     def factor(self, kept: Indices) -> Solve:
@@ -309,75 +319,102 @@ class Phases:
         Raises:
             LinAlgError: they are singular.
         """
-        if self._whole is not None:
-            return self._whole.factor(kept)
-        size, m = self.blocks.matrices.shape[1], len(self.blocks.parts)
-        cuts = list(np.searchsorted(kept, np.arange(m + 1) * size))
-        own: list[Indices] = [kept[cuts[k] : cuts[k + 1]] - np.int32(k * size) for k in range(m)]
-        solves = [part.factor(rows) for part, rows in zip(self.blocks.parts, own, strict=True)]
-        nodes = [rows[rows < self.blocks.nodes] for rows in own]
+        return self._solution(_Cut(self.blocks, kept))
 
-        def apart(b: Array) -> list[Array]:
-            return [solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)]
+    def _open(self, pressure: Array, gaps: Array) -> None:
+        """Add to gaps (m, n) what pressures (m, n) open in all phases: nothing."""
 
-        if self.border is not None:
-            return self._eliminated(self.border, own, solves, apart)
-        if self.local is None:
-            return lambda b: np.concatenate(apart(b))
-        wear, touched = self.local, np.unique(np.concatenate(nodes)).astype(np.int32)
-        at = [np.searchsorted(touched, one) for one in nodes]
-        near = self.blocks.near(wear.sum(axis=0), touched)
+    def _solution(self, cut: _Cut) -> Solve:
+        """Return the solution operator of some unknowns."""
+        return lambda b: np.concatenate(cut.solve(b))
 
-        def worn(parts: Sequence[Array]) -> Array:
-            depth = np.zeros(len(touched))
-            for there, k in zip(at, range(m), strict=True):
-                depth[there] += wear[k, nodes[k]] * parts[k][: len(there)]
-            return depth
 
-        def opened(depth: Array) -> list[Array]:
-            right = np.zeros(len(kept))
-            for k, there in enumerate(at):
-                right[cuts[k] : cuts[k] + len(there)] = depth[there]
-            return apart(right)
+class Bordered(Phases):
+    """Phases that meet in few quantities: diag(A_k) + L_k R_j, with L (m, n, q) and R (m, q, n)."""
 
-        def solve(b: Array) -> Array:
-            first = apart(b)
-            try:
-                y = solution(lambda v: v + worn(opened(v)), near, worn(first))
-            except np.linalg.LinAlgError:
-                return self._eliminated(_as_border(wear), own, solves, apart)(b)
-            return np.concatenate(first) - np.concatenate(opened(y))
+    def __init__(self, blocks: Blocks, left: Array, right: Array) -> None:
+        super().__init__(blocks)
+        self.left, self.right = left, right
 
-        return solve
+    @cached_property
+    def matrix(self) -> Array:
+        """All of it (m size, m size)."""
+        return whole(self.blocks.matrices, border=(self.left, self.right))
 
-    def _eliminated(
-        self,
-        border: tuple[Array, Array],
-        kept: Sequence[Indices],
-        solves: Sequence[Solve],
-        apart: Callable[[Array], list[Array]],
-    ) -> Solve:
+    def _open(self, pressure: Array, gaps: Array) -> None:
+        gaps += self.left @ np.einsum("kqn,kn->q", self.right, pressure)
+
+    def _solution(self, cut: _Cut) -> Solve:
         """Return the solution operator, with what lies between the phases eliminated.
 
         With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
         (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
         blocks, where an elimination of the whole would grow with its cube.
         """
-        left, right = border
-        columns, rights, schur = list[Array](), list[Array](), np.eye(left.shape[2])
-        for k, (solve_block, rows) in enumerate(zip(solves, kept, strict=True)):
-            own = rows[rows < self.blocks.nodes]
-            by_between = np.zeros((len(rows), left.shape[2]))
-            by_between[: len(own)] = left[k][own]
+        count = self.left.shape[2]
+        columns, rights, schur = list[Array](), list[Array](), np.eye(count)
+        for k, (solve_block, nodes, (low, high)) in enumerate(zip(cut.solves, cut.nodes, cut.cuts, strict=True)):
+            by_between = np.zeros((high - low, count))
+            by_between[: len(nodes)] = self.left[k][nodes]
             columns.append(solve_block(by_between))
-            rights.append(right[k][:, own])
-            schur += rights[k] @ columns[k][: len(own)]
+            rights.append(self.right[k][:, nodes])
+            schur += rights[k] @ columns[k][: len(nodes)]
         solve_schur = eliminate(schur)
 
         def solve(b: Array) -> Array:
-            parts = apart(b)
+            parts = cut.solve(b)
             y = solve_schur(np.sum([at @ part[: at.shape[1]] for at, part in zip(rights, parts, strict=True)], axis=0))
             return np.concatenate([part - by @ y for part, by in zip(parts, columns, strict=True)])
+
+        return solve
+
+
+class Worn(Phases):
+    """Phases that meet in a depth: unit pressure of phase k wears D_k (m, n) at its node, which opens all of them.
+
+    The depth y that all phases have follows from
+
+        (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
+
+    with the phases' factors, which do not change with the length of a step: 5 to 20 iterations of GMRES.
+    """
+
+    def __init__(self, blocks: Blocks, wear: Array) -> None:
+        super().__init__(blocks)
+        self.wear = wear
+
+    @cached_property
+    def matrix(self) -> Array:
+        """All of it (m size, m size)."""
+        return whole(self.blocks.matrices, local=self.wear)
+
+    def _open(self, pressure: Array, gaps: Array) -> None:
+        gaps += (self.wear * pressure).sum(axis=0)
+
+    def _solution(self, cut: _Cut) -> Solve:
+        wear, touched = self.wear, np.unique(np.concatenate(cut.nodes)).astype(np.int32)
+        at = [np.searchsorted(touched, nodes) for nodes in cut.nodes]
+        near = self.blocks.near(wear.sum(axis=0), touched)
+
+        def worn(parts: Sequence[Array]) -> Array:
+            depth = np.zeros(len(touched))
+            for k, there in enumerate(at):
+                depth[there] += wear[k, cut.nodes[k]] * parts[k][: len(there)]
+            return depth
+
+        def opened(depth: Array) -> list[Array]:
+            right = np.zeros(len(cut.kept))
+            for there, (low, _) in zip(at, cut.cuts, strict=True):
+                right[low : low + len(there)] = depth[there]
+            return cut.solve(right)
+
+        def solve(b: Array) -> Array:
+            first = cut.solve(b)
+            try:
+                y = solution(lambda v: v + worn(opened(v)), near, worn(first))
+            except np.linalg.LinAlgError:
+                return Bordered(self.blocks, *_as_border(wear))._solution(cut)(b)
+            return np.concatenate(first) - np.concatenate(opened(y))
 
         return solve
 
@@ -389,7 +426,12 @@ def _as_border(local: Array) -> tuple[Array, Array]:
     return np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
 
 
-def whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None, local: Array | None) -> Array:
+def whole(
+    blocks: Array,
+    coupling: Array | None = None,
+    border: tuple[Array, Array] | None = None,
+    local: Array | None = None,
+) -> Array:
     """Return the matrix as one (m size, m size)."""
     m, size, _ = blocks.shape
     matrix: Array = np.zeros((m * size, m * size))

@@ -109,7 +109,7 @@ class SteadyInequality:
     def _grid(self, ratios: Sequence[Array], scale: float, modes: Array, balances: Array) -> PhasesGrid | None:
         """Return what multiplies on the grid that all compliances are convolutions on; None where they are not."""
         interfaces = self.system.interfaces
-        if self.system.pair.punch.grid is None or any(own.cost is None for own in interfaces):
+        if self.system.pair.punch.grid is None or any(own.in_memory for own in interfaces):
             return None
         known: dict[bytes, Array] = {}
         found = [own.compliance(ratio, scale, known).on_grid for own, ratio in zip(interfaces, ratios, strict=True)]

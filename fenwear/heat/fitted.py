@@ -231,7 +231,7 @@ def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> Reduced
         yield from (body.initial(), body.held, body.storage, body.convected)
 
     place = kept.known(comm, parts, fresh=fresh)
-    if place.arrays is not None:
+    if place.arrays:
         return ReducedBasis(body, place.arrays["lift"], place.arrays["columns"])
     basis = make()
     place.save({"lift": basis.lift, "columns": basis.columns})

@@ -60,12 +60,17 @@ class Interface:
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
         """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
-        return Interface(rigid, punch, strip, self.strip_moves, self.frame, like=self.like or self, layer=self.layer)
+        return Interface(rigid, punch, strip, self.strip_moves, self.frame, like=self._made, layer=self.layer)
 
     @property
     def pair(self) -> ContactPair:
         """The nodes and the transfer."""
         return self.rigid.pair
+
+    @property
+    def _made(self) -> Interface:
+        """That for which what the bodies answer is made and kept."""
+        return self.like or self
 
     @cached_property
     def axes(self) -> Array:
@@ -78,15 +83,13 @@ class Interface:
         return self.pair.placement.back(self.axes.reshape(-1, self.axes.shape[2])).reshape(self.axes.shape)
 
     @property
-    def cost(self) -> float | None:
-        """Of a product, in numbers that memory could give meanwhile; None where the bodies answer by numbers."""
-        if self.punch.cost is None or self.strip.cost is None:
-            return None
-        return self.punch.cost + self.strip.cost
+    def in_memory(self) -> bool:
+        """Whether a body answers by numbers in memory."""
+        return self.punch.in_memory or self.strip.in_memory
 
     def apply(self, forces: Array) -> Array:
         """Return the relative displacements (n, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
-        if self.cost is None:
+        if self.in_memory:
             return product(self.dense(), forces)
         found = self.opened(*self.displaced(forces))
         found[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
@@ -128,7 +131,7 @@ class Interface:
         Args:
             rows, columns: Their numbers.
         """
-        if self.cost is None:
+        if self.in_memory:
             kept = self.dense()
             if isinstance(rows, slice) or isinstance(columns, slice):
                 return kept[rows][:, :, columns]
@@ -137,13 +140,11 @@ class Interface:
 
     def diagonal(self) -> Array:
         """Return displacements at each node from unit forces at itself (n, a, d)."""
-        return self._diagonal
+        return self._made._diagonal
 
     @cached_property
     def _diagonal(self) -> Array:
-        if self.like is not None:
-            return self.like.diagonal()
-        if self.cost is None:
+        if self.in_memory:
             every = np.arange(len(self.pair.weights))
             return self.dense()[every, :, every]
         gridded = self.pair.punch.grid is not None
@@ -161,11 +162,11 @@ class Interface:
 
     def dense(self) -> Array:
         """Return all entries (n, a, n, d), which are kept."""
-        return self._dense
+        return self._made._dense
 
     @cached_property
     def _dense(self) -> Array:
-        return self.asked(EVERY, EVERY) if self.like is None else self.like.dense()
+        return self.asked(EVERY, EVERY)
 
     def asked(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the same as `entries`, from the bodies: for who keeps what it makes of them."""
@@ -210,11 +211,13 @@ class Interface:
             "id,id->i", pair.normal_on_strip, by_load
         )
 
-    @cached_property
+    @property
     def by_even(self) -> Array:
         """Gap that an even unit pressure opens without friction (n,), mm/MPa."""
-        if self.like is not None:
-            return self.like.by_even
+        return self._made._by_even
+
+    @cached_property
+    def _by_even(self) -> Array:
         return self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
 
     def compliance(
@@ -242,14 +245,16 @@ class Interface:
         by_gap = closed / self.elastic_length if closed > 0 and self.elastic_length > 0 else 1.0
         return self.rigid.mean_pressure if self.rigid.carried > 0 else by_gap
 
-    @cached_property
+    @property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps.
 
         Over all nodes; where no numbers are in memory, over some of them.
         """
-        if self.like is not None:
-            return self.like.elastic_length
+        return self._made._elastic_length
+
+    @cached_property
+    def _elastic_length(self) -> float:
         pair, modes = self.pair, self.rigid.rigid_normal
         rigid = np.zeros(modes.T.shape)  # what modes take up of S, which is symmetric but for the weights
         if rigid.size:
@@ -257,7 +262,7 @@ class Interface:
             opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
             rigid = opened.T * pair.weights
         count, compliance = len(pair.weights), self.compliance(0.0)
-        step = 1 if self.cost is None else max(count // SOME, 1)
+        step = 1 if self.in_memory else max(count // SOME, 1)
         runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]
         parts = [np.abs(compliance.entries(run, EVERY) - modes[run] @ rigid).sum(axis=1) for run in runs]
         return float(np.concatenate(parts).mean())
@@ -280,19 +285,14 @@ class Compliance:
         n, _, self.components = traction.shape
         self._n, self._local = n, interface.layer * np.einsum("id,id->i", interface.axes[:, 0], traction[:, :, 0])
         self._force = traction * interface.pair.weights[:, None, None]
-        self._keeps = self.components > 1 and (interface.cost is None or n <= MATRIX)
-
-    @property
-    def cost(self) -> float | None:
-        """Of a product; see `Interface`."""
-        return self.interface.cost
+        self._keeps = self.components > 1 and (interface.in_memory or n <= MATRIX)
 
     @cached_property
     def on_grid(self) -> GridCompliance | None:
         """The same as a convolution; None where the surfaces are on no common grid, or pass each other."""
         own = self.interface
         few = self.components > 1 and self._n < GRIDDED
-        if few or own.strip_moves or own.cost is None or own.pair.placement.turn != ZERO:
+        if few or own.strip_moves or own.in_memory or own.pair.placement.turn != ZERO:
             return None
         axes, bodies = own.axes[:, : self.components], [own.punch, own.strip]
         return on_one_grid(bodies, axes, self._traction, own.pair.weights, self._local, self._known)

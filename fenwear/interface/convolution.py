@@ -59,11 +59,6 @@ class GridCompliance:
     weights: Array
     local: Array
 
-    @property
-    def cost(self) -> float:
-        """Of a product, in numbers that memory could give meanwhile."""
-        return self.of.cost
-
     @cached_property
     def boxes(self) -> Boxes[FrameBox]:
         """The same on boxes of the grid, along all axes of a frame."""

@@ -47,7 +47,7 @@ class ContactPair:
         wear_projection: Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, and
             no entry negative, so that no surface ever grows.
         initial_gap: Distance along e_n before any deformation and wear (n,), mm.
-        passed: Where the strip's material is, where it moves under a strip that stays; None where it is the strip.
+        material_place: Where the strip's material is, which may move under a strip that stays.
     """
 
     punch: ContactSurface
@@ -59,12 +59,7 @@ class ContactPair:
     wear_interpolation: csr_array
     wear_projection: csr_array
     initial_gap: Array
-    passed: Placement | None = None
-
-    @property
-    def material_place(self) -> Placement:
-        """Where the strip's material is."""
-        return self.placement if self.passed is None else self.passed
+    material_place: Placement
 
     @cached_property
     def places(self) -> tuple[Array, Array]:
@@ -140,7 +135,7 @@ def pair(
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
     wear_projection = _wear_projection(parts, weights, strip.weights)
-    return ContactPair(punch, strip, placement, normal, weights, transfer, material, wear_projection, gap)
+    return ContactPair(punch, strip, placement, normal, weights, transfer, material, wear_projection, gap, placement)
 
 
 def _on_grids(punch: ContactSurface, strip: ContactSurface, placement: Placement) -> ContactPair:
@@ -158,7 +153,7 @@ def _on_grids(punch: ContactSurface, strip: ContactSurface, placement: Placement
         raise CaseError(InputError("grid", f"the stroke runs off the strip's grid: {placement}"))
     back = csr_array((transfer.multiply(punch.weights[:, None])).T / strip.weights[:, None])
     gap = _profiles(punch, strip, transfer)
-    return ContactPair(punch, strip, placement, -punch.outward, punch.weights, transfer, transfer, back, gap)
+    return ContactPair(punch, strip, placement, -punch.outward, punch.weights, transfer, transfer, back, gap, placement)
 
 
 def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
@@ -180,7 +175,7 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     gap = middle.initial_gap + _profiles(middle.punch, middle.strip, material)
     gap -= _profiles(middle.punch, middle.strip, middle.wear_interpolation)
     return replace(
-        middle, passed=placement, wear_interpolation=material, wear_projection=wear_projection, initial_gap=gap
+        middle, material_place=placement, wear_interpolation=material, wear_projection=wear_projection, initial_gap=gap
     )
 
 
@@ -244,8 +239,8 @@ def check_distance(pair: ContactPair) -> None:
 def _larger_than_its_bore(punch: ContactSurface, strip: ContactSurface) -> str:
     """Say so of a shaft or ball that is larger than the bore or cup opposite; "" of all others."""
     radii = {surface.body: radius_of(surface) for surface in (punch, strip)}
-    bore, inner = (next((b for b, r in radii.items() if r is not None and sign * r > 0), "") for sign in (-1, 1))
-    sizes = {body: abs(radius) for body, radius in radii.items() if radius is not None}
+    bore, inner = (next((body for body, radius in radii.items() if sign * radius > 0), "") for sign in (-1, 1))
+    sizes = {body: abs(radius) for body, radius in radii.items()}
     if not bore or not inner or sizes[inner] <= sizes[bore]:
         return ""
     there = f"{bore}_contact around it, {sizes[bore]:.4g} mm"

@@ -116,12 +116,12 @@ def _sides(directions: Array) -> list[tuple[int, float, Mask]]:
     return [(int(k), float(end), (nearest == k) & (towards == end)) for k, end in keys]
 
 
-def radius_of(surface: ContactSurface) -> float | None:
-    """Return the radius of a round surface, mm, negative where its body lies around it; None of all others."""
+def radius_of(surface: ContactSurface) -> float:
+    """Return the radius of a round surface, mm, negative where its body lies around it; 0 of all others."""
     normal = facet_normals(surface)
     middle = None if _is_graph(normal) else _middle(surface, normal)
     if middle is None:
-        return None
+        return 0.0
     ways = middle.ways(Side(surface, surface.trace, normal).middles)
     outwards = np.einsum("fc,fc->", ways, normal @ middle.across.T) > 0
     radius = float(np.median(np.linalg.norm((surface.trace - middle.point) @ middle.across.T, axis=1)))

@@ -93,8 +93,7 @@ def round_shape(
 
 def _placed(one: Round, placement: Placement) -> Round:
     """Return a circle where its body is."""
-    axis = None if one.axis is None else placement.vectors(one.axis[None])[0]
-    return Round(placement.points(one.middle[None])[0], axis, one.radius, one.sign)
+    return Round(placement.points(one.middle[None])[0], placement.vectors(one.axis[None])[0], one.radius, one.sign)
 
 
 def _opposite(parts: Sequence[Patch], count: int, strip: ContactSurface) -> Array:

@@ -309,7 +309,7 @@ def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array
     for one in (coupling, theta, force):
         one.destroy()
     right = np.stack(forces, axis=1)
-    none = np.zeros((0 if elastic.guides is None else elastic.guides.rotations.shape[1], right.shape[1]))
+    none = np.zeros((elastic.guides.rotations.shape[1], right.shape[1]))
     return elastic.trace.pick(elastic.held(elastic.solve(right), right, none))  # expansion turns nothing
 
 

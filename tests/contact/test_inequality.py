@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from fenwear import ConvergenceError, Tribosystem, jump, march, steady
 from fenwear.arrays import Array
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Blocks, Dense, Phases, Updating, whole
+from fenwear.contact.operators import Blocks, Dense, Updating, joined, whole
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -206,7 +206,7 @@ def test_phases(m: int, bordered: bool, coupled: bool) -> None:
     if coupling is not None:
         whole[:, :n, :, :n] += coupling
     matrix = whole.reshape(m * size, m * size)
-    operator = Phases(Blocks(blocks, n), coupling, border)
+    operator = joined(Blocks(blocks, n), coupling, border)
     x = random.uniform(-1, 1, m * size)
     np.testing.assert_allclose(operator.multiply(x), matrix @ x, atol=1e-12)
     for share in (1.0, 0.6):
@@ -238,7 +238,7 @@ def test_wear_that_opens_all_phases(m: int, restarts: int, monkeypatch: pytest.M
     for length in (1e-4, 1e-2, 1.3e-2, 1.0, 0.7, 100.0):
         border = np.array([np.eye(n)] * m), np.array([np.diag(length * own) for own in pattern])
         exact = whole(matrices, None, border, None)
-        operator, x = Phases(blocks, local=length * pattern), random.uniform(-1, 1, m * (n + 2))
+        operator, x = joined(blocks, local=length * pattern), random.uniform(-1, 1, m * (n + 2))
         np.testing.assert_allclose(operator.multiply(x), exact @ x, atol=1e-12 * max(1.0, length))
         free = random.uniform(size=(m, n + 2)) < 0.7
         free[:, n:] = True

@@ -90,7 +90,7 @@ def _pressed(x: Array, spacing: float, load: float, gap: Array) -> RigidEquilibr
         ContactSurface(body, trace, _squares(x, spacing), "quadrilateral", 1, np.arange(n), weights, outward, same)
         for body, outward in (("punch", -up), ("strip", up))
     )
-    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap)
+    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap, HERE)
     return RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",), of_punch=1)
 
 
@@ -120,7 +120,8 @@ def on_grid(
         ContactSurface(body, trace, facets, cell, 1, np.arange(n), weights, outward, same)
         for body, outward in (("punch", -up), ("strip", up))
     )
-    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, np.sum(x**2, axis=1) / (2 * radius))
+    gap = np.sum(x**2, axis=1) / (2 * radius)
+    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap, HERE)
     rigid = RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",), of_punch=1)
     steps, axes, depth = (spacing,) * len(counts), tuple(range(d)), 1e3 * radius if d == 2 else np.inf
     bodies = [

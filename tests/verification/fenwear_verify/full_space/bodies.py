@@ -84,7 +84,7 @@ def whole_bodies(bodies: Bodies, position: Position, *, moves: bool) -> WholeBod
         ),
         (sizes[0], sizes[1]),
     )
-    return found if all(body.guides is None for body in both) else _guided(found, both, free, position.weights)
+    return found if not any(body.guides.couples.size for body in both) else _guided(found, both, free, position.weights)
 
 
 def _guided(whole: WholeBodies, both: tuple[ElasticBody, ElasticBody], free: Any, weights: Array) -> WholeBodies:
@@ -108,8 +108,7 @@ def _guided(whole: WholeBodies, both: tuple[ElasticBody, ElasticBody], free: Any
 
 def _whole(body: ElasticBody, name: str) -> csr_array:
     """Return rotations or couples of guides on all degrees of freedom of a body (N, g), on every rank; collective."""
-    own = np.zeros((body.stiffness.getLocalSize()[0], 0)) if body.guides is None else getattr(body.guides, name)
-    return csr_array(np.concatenate(body.body.mesh.comm.allgather(own)))
+    return csr_array(np.concatenate(body.body.mesh.comm.allgather(getattr(body.guides, name))))
 
 
 def _gathered(body: ElasticBody) -> csr_array:

@@ -428,8 +428,7 @@ def _couples(elastic: ElasticBody, guided: RigidEquilibrium, of_punch: bool) -> 
     comm, count = lasting(elastic.body.mesh.comm), len(guided.resultant)
     size = elastic.stiffness.getSizes()[0]
     values = np.zeros((size[0], count))
-    if elastic.guides is not None:
-        values[:, slice(guided.of_punch) if of_punch else slice(guided.of_punch, None)] = elastic.guides.couples
+    values[:, slice(guided.of_punch) if of_punch else slice(guided.of_punch, None)] = elastic.guides.couples
     values[elastic.supported] = 0.0
     return _matrix(csr_array(values), (size, (count if comm.rank == 0 else 0, count)), comm)
 
@@ -450,12 +449,7 @@ def _normals(elastic: ElasticBody, patterns: csr_array, normal: Array) -> PETSc.
 
 def guided_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
     """Return the rotations that guides hold, whose couples balance what contact and loads do; collective."""
-    motions = [
-        np.zeros((*body.surface.trace.shape, 0))
-        if body.guides is None
-        else body.on_surface(body.trace.pick(body.guides.rotations))
-        for body in (punch, strip)
-    ]
+    motions = [body.on_surface(body.trace.pick(body.guides.rotations)) for body in (punch, strip)]
     resultants = np.concatenate([punch.guided_resultant, strip.guided_resultant])
     return RigidEquilibrium(
         pair, relative_motion(pair, *motions), resultants, ("guided",) * len(resultants), motions[0].shape[2]

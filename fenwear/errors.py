@@ -96,7 +96,6 @@ SOFTER_START = "contact solved by way of softer bodies"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
 MARCHED = "cycle marched in place of a jump"
-NONE: Counter[str] = Counter()
 GRAZING = "nodes conduct whose pressure tends to nothing"
 
 
@@ -112,7 +111,5 @@ class Remedies:
 
     def take(self) -> Counter[str]:
         """Return what was noted since the last time; mostly nothing."""
-        if not self._noted:
-            return NONE
         noted, self._noted = self._noted, Counter()
         return noted

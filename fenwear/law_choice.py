@@ -42,21 +42,18 @@ class ResolvedCase:
     """A case whose law is decided.
 
     Attributes:
-        case: With the law.
-        system: Ready to slide or stick.
-        choice: Of "auto"; None where the law was given.
+        system: Ready to slide or stick; its case has the law.
+        share: Of the stroke that the bodies take up elastically; None where it was not asked for.
     """
 
-    case: Case
     system: Tribosystem
-    choice: LawChoice | None
+    share: float | None = None
 
     @property
     def numbers(self) -> dict[str, Any]:
         """The entries of the summary of a run."""
-        known = None if self.choice is None else self.choice.share
-        share = elastic_share(self.system) if known is None else known
-        return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
+        share = elastic_share(self.system) if self.share is None else self.share
+        return {"contact_law": self.system.case.contact.law, "elastic_share_of_stroke": share}
 
 
 def choose_law(system: Tribosystem) -> LawChoice:
@@ -96,26 +93,23 @@ def resolve_law(
     Raises:
         CaseError: what only the geometry can tell is wrong.
     """
+    if case.contact.law == "auto" and case.stick != Stick():
+        log("contact.law: 'coulomb' is taken, as the table stick is given")
+        case = with_law(case, "coulomb")
     if case.contact.law != "auto":
-        return ResolvedCase(case, assemble(case, comm, heat=heat, fresh=fresh), None)
-    if case.stick != Stick():
-        choice = LawChoice("coulomb", "contact.law: 'coulomb' is taken, as the table stick is given")
-        log(choice.text)
-        taken = with_law(case, choice.law)
-        return ResolvedCase(taken, assemble(taken, comm, heat=heat, fresh=fresh), choice)
+        return ResolvedCase(assemble(case, comm, heat=heat, fresh=fresh))
     system = assemble(case, comm, heat="none", fresh=fresh)
     choice = choose_law(system)
     log(choice.text)
     taken = with_law(case, choice.law)
     if choice.law == "coulomb":
-        return ResolvedCase(
-            taken, law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh), choice
-        )
+        system = law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh)
+        return ResolvedCase(system, choice.share)
     system = replace(system, case=taken)
     if heat != "none":
         prepare = with_reduced_heat if heat == "reduced" else with_exchange
         system = prepare(system, keep=True, fresh=fresh)
-    return ResolvedCase(taken, system, choice)
+    return ResolvedCase(system, choice.share)
 
 
 def with_law(case: Case, law: Law) -> Case:

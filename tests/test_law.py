@@ -46,10 +46,10 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     told: list[str] = []
     case = load_case("fretting-partial-slip", [*SMALL, *settings])
     found = resolve_law(case, told.append)
-    assert found.case.contact.law == found.numbers["contact_law"] == law
+    assert found.system.case.contact.law == found.numbers["contact_law"] == law
     assert found.system.sticks == (law == "coulomb")
-    assert found.case.folder == case.folder
-    assert found.case.materials == case.materials
+    assert found.system.case.folder == case.folder
+    assert found.system.case.materials == case.materials
     assert len(told) == 1
     assert f"'{law}' is taken" in told[0]
     assert reason in told[0]
@@ -66,7 +66,7 @@ def test_the_estimate_decides_where_it_says() -> None:
         )
         share = found.numbers["elastic_share_of_stroke"]
         ways.append(share * amplitude)
-        laws.append(found.case.contact.law)
+        laws.append(found.system.case.contact.law)
         assert (share > 0.1) == (laws[-1] == "coulomb")
     assert laws == ["coulomb", "gross-sliding"]
     assert ways == pytest.approx([ways[0]] * 2, rel=1e-9)

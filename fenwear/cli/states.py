@@ -392,7 +392,7 @@ def shape_command(
     from fenwear.results.export import write_shape
 
     law_state = resolve_law(load(case, settings), log, heat="none")
-    loaded, system = law_state.case, at_step(law_state.system)
+    loaded, system = law_state.system.case, at_step(law_state.system)
     wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
     if pressure:
         if loads:

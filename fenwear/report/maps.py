@@ -64,7 +64,10 @@ def map_figure(history: xarray.Dataset, field: Field, half_cycles: Sequence[int]
         arrows = [surface.arrow(int(d)) for d in history.direction.sel(half_cycle=list(half_cycles)).values]
         titles = [title.replace("\n", f" {arrow}\n") for title, arrow in zip(titles, arrows, strict=True)]
     figure, axes = map_panels(surface, titles, look, within=_reached(history, field.body))
-    fill_maps(surface, axes, values, label, look, levels=levels, colours=field.colours, extend=extend)
+    for k, ax in enumerate(axes):
+        shown = np.clip(values[k], levels[0], None)
+        drawn = surface.contours(ax, shown, levels=levels, cmap=field.colours, extend=extend)
+    colour_bar(figure, drawn, axes, label, **bar_place(look))
     if field.variable == "pressure":
         for k, ax in enumerate(axes):
             level = EDGE_OF_CONTACT * float(values[k].max())
@@ -126,36 +129,14 @@ def map_panels(
     return figure, shown
 
 
-def fill_maps(
-    surface: Surface,
-    axes: Sequence[Axes],
-    values: Array,
-    label: str,
-    look: Style,
-    *,
-    levels: Array,
-    colours: str,
-    extend: str = "neither",
-) -> None:
-    """Draw values at the nodes (k, n) as areas between levels on each of k maps, with a bar of the colours."""
-    drawn: Any = None
-    for k, ax in enumerate(axes):
-        drawn = surface.contours(ax, np.clip(values[k], levels[0], None), levels=levels, cmap=colours, extend=extend)
-    colour_bar(axes[0].figure, drawn, list(axes), label, **bar_place(look))
-
-
-def even_levels(low: float, high: float) -> Array:
-    """Return round steps of colours between two values."""
-    locator = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10])
-    return np.asarray(locator.tick_values(low, high if high > low else low + 1.0))
-
-
 def _levels(history: xarray.Dataset, field: Field, values: Array, half_cycles: Sequence[int]) -> tuple[Array, str]:
-    """Return the steps of the colours, and whether what is above them is cut off."""
+    """Return round steps of the colours, and whether what is above them is cut off."""
     low, high = float(values.min()), float(values.max())
     top = pressure_top(history, half_cycles) if field.variable == "pressure" else np.inf
     low = 0.0 if 0 <= low < high / 2 else low
-    return even_levels(low, min(high, top)), "max" if high > top else "neither"
+    most, locator = min(high, top), MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10])
+    levels = np.asarray(locator.tick_values(low, most if most > low else low + 1.0))
+    return levels, "max" if high > top else "neither"
 
 
 def with_surfaces(history: xarray.Dataset, half_cycles: Sequence[int]) -> xarray.Dataset:
@@ -235,7 +216,8 @@ def _spread(places: Array, count: int) -> NDArray[np.int64]:
 def flash_map(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the rise of both surfaces at the instant at which one of them is hottest, and the edge of the contact."""
     first, second = found.pressure.dims[1:]
-    at = _hottest(found)
+    warmth = np.maximum(found.flash_punch.values, found.flash_strip.values)
+    at = int(warmth.max(axis=(1, 2)).argmax())  # the instant at which a surface is hottest
     x, y = found[first].values, found[second].values
     figure, axes = panels_of_maps(1, 2, np.array([np.ptp(x), np.ptp(y)]), look)
     rises = [found[f"flash_{body}"].values[at].T for body in BODIES]
@@ -268,12 +250,6 @@ def flash_course(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
     from_zero(axes[0])
     legend_beside(axes[0], "")
     return figure
-
-
-def _hottest(found: xarray.Dataset) -> int:
-    """Return the number of the instant at which a surface is hottest."""
-    rise = np.maximum(found.flash_punch.values, found.flash_strip.values)
-    return int(rise.max(axis=(1, 2)).argmax())
 
 
 def flash_figures(found: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:

@@ -2,8 +2,8 @@
 
 CSV files are made from history.nc alone: the course of a run, and the profiles of both surfaces. Nothing here knows the
 kind of the model: a variable over the records is a column of the course, one over the records and the nodes of a
-surface a column of that surface's profile for each chosen record. A record is a kept half-cycle; in partial slip a kept
-cycle, whose time steps make a file of their own: the loops of force and displacement.
+surface a column of that surface's profile for each chosen record. A record is a kept half-cycle; in partial slip time
+steps make a file of their own: the loops of force and displacement.
 
 A shape to machine is written as its profile, its surface as triangles, and the case of the bodies made with it; worn
 surfaces for fenwear again, too, as a profile, triangles, and a mesh with depths.
@@ -37,13 +37,13 @@ from fenwear.errors import CaseError, InputError
 from fenwear.initial_shape import InitialShape
 from fenwear.parallel import on_root
 from fenwear.results.disk import write_text, writing
-from fenwear.results.history import CASE, HISTORY, make_directory, write_case
-from fenwear.results.reading import by_cycles, load_history, resolves
+from fenwear.results.history import CASE, make_directory, write_case
+from fenwear.results.quantity import RECORD
+from fenwear.results.reading import by_cycles, read_history, resolves
 from fenwear.results.surfaces import surface_cells
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"
-RECORDS = {"half_cycle": "half-cycle"}  # what the records of a run are, and its word
 SURFACES = {"profile_punch.csv": ("x", "node"), "profile_strip.csv": ("x_strip", "node_strip")}
 STEPS = "step"
 RAISED = {"": 1, "_strip": -1}  # wear lowers the strip; the punch's surface, which looks down, it raises
@@ -67,16 +67,15 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
         CaseError: there is no readable history, or a half-cycle was not kept.
         OutputError: a file cannot be written.
     """
-    history = load_history(directory)
-    record = _record(directory / HISTORY, history)
-    rows = chosen_rows(history, record, at)
-    tables = {COURSE: _course(history, record)}
+    history = read_history(directory)
+    rows = chosen_rows(history, at)
+    tables = {COURSE: _course(history)}
     if resolves(history):
         tables[LOOPS] = _loops(history, rows)
     for name, dimensions in SURFACES.items():
         for dimension in dimensions:
             if dimension in history.sizes:
-                tables[name] = _profile(history, record, dimension, rows)
+                tables[name] = _profile(history, dimension, rows)
     target = directory / FOLDER if folder is None else folder
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
@@ -85,49 +84,35 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
     return [target / name for name in tables]
 
 
-def _record(path: Path, history: xarray.Dataset) -> str:
-    """Return the dimension of the records.
-
-    Raises:
-        CaseError: the file is no history, or holds no record yet.
-    """
-    record = next((name for name in RECORDS if name in history.sizes and name in history.variables), None)
-    if record is None:
-        raise CaseError(InputError(str(path), "no history of a run: it has other variables"))
-    if history.sizes[record] == 0:
-        raise CaseError(InputError(str(path), f"holds no {RECORDS[record]} yet"))
-    return record
-
-
-def chosen_rows(history: xarray.Dataset, record: str, at: str) -> list[int]:
-    """Return the rows of the chosen records, in their order.
+def chosen_rows(history: xarray.Dataset, at: str) -> list[int]:
+    """Return the rows of the chosen half-cycles, in their order.
 
     Raises:
         CaseError: one was not kept, or is no number.
     """
-    kept: list[int] = [int(number) for number in history[record].values]
+    kept: list[int] = [int(number) for number in history.half_cycle.values]
     rows = {str(number): row for row, number in enumerate(kept)}
     rows |= {"first": 0, "last": len(kept) - 1}
     words = [word.strip() for word in at.split(",") if word.strip()]
     plain = [word.lstrip("0") or "0" if word.isdecimal() else word for word in words]
     wrong = [word for word in plain if not (word.isdecimal() or word in ENDS)]
     if wrong or not words:
-        text = f"expected numbers of kept {RECORDS[record]}s, first or last, with commas, got {(wrong or [at])[0]!r}"
+        text = f"expected numbers of kept half-cycles, first or last, with commas, got {(wrong or [at])[0]!r}"
         raise CaseError(InputError("--at", text))
     missing = [word for word in plain if word not in rows]
     if missing:
         wanted = int(missing[0])
         near = min(kept, key=lambda number: abs(number - wanted))
         text = (
-            f"{RECORDS[record]} {missing[0]} was not kept, but {near} was, the nearest of {len(kept)} "
+            f"half-cycle {missing[0]} was not kept, but {near} was, the nearest of {len(kept)} "
             f"from {kept[0]} to {kept[-1]}"
         )
         raise CaseError(InputError("--at", text))
     return sorted({rows[word] for word in plain})
 
 
-def _course(history: xarray.Dataset, record: str) -> list[Column]:
-    names = [record, *(name for name in history.data_vars if history[name].dims == (record,))]
+def _course(history: xarray.Dataset) -> list[Column]:
+    names = ["half_cycle", *(name for name in history.data_vars if history[name].dims == RECORD)]
     return [(_heading(history, name), history[name].values.tolist()) for name in names]
 
 
@@ -145,16 +130,15 @@ def _loops(history: xarray.Dataset, rows: Sequence[int]) -> list[Column]:
     return columns
 
 
-def _profile(history: xarray.Dataset, record: str, dimension: str, rows: Sequence[int]) -> list[Column]:
-    """Return the places on a surface, its unworn height where known, and what there is of each chosen record."""
+def _profile(history: xarray.Dataset, dimension: str, rows: Sequence[int]) -> list[Column]:
+    """Return the places on a surface, its unworn height where known, and what there is of each chosen half-cycle."""
     places = [name for name in history.variables if history[name].dims == (dimension,)]
     columns: list[Column] = [(_heading(history, name), history[name].values.tolist()) for name in places]
     end = "_strip" if dimension.endswith("_strip") else ""
     for row in rows:
-        number = int(history[record].values[row])
-        at = f" at {RECORDS[record]} {number}"
+        at = f" at half-cycle {int(history.half_cycle.values[row])}"
         for name in history.data_vars:
-            if history[name].dims != (record, dimension):
+            if history[name].dims != (*RECORD, dimension):
                 continue
             values = history[name][row].values
             columns.append((_heading(history, name, at), values.tolist()))
@@ -310,8 +294,8 @@ def export_worn(directory: Path, folder: Path | None = None, at: str = "last") -
 
 def _depths(directory: Path, at: str) -> dict[str, Array]:
     """Return the worn depths (n,) of the chosen half-cycle of each body, mm."""
-    history = load_history(directory)
-    rows = chosen_rows(history, next(iter(RECORDS)), at)
+    history = read_history(directory)
+    rows = chosen_rows(history, at)
     if len(rows) != 1:
         raise CaseError(InputError("--at", f"expected one half-cycle for worn surfaces, got {at!r}"))
     names = {"punch": "wear", "strip": "wear_strip"}

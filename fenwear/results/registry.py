@@ -129,16 +129,13 @@ NODES = {"x": "node", "x_strip": "node_strip"}
 
 def on_surfaces(found: Iterable[Quantity]) -> list[Quantity]:
     """Return quantities of plane models as those of solids and rings."""
-    rows = [(one, *in_model(one, on_surface=True)) for one in found if one.name != "contact_width"]
+    rows = [
+        (one, *ON_SURFACES.get(one.name, (one.unit, one.long_name))) for one in found if one.name != "contact_width"
+    ]
     return [
         replace(one, dims=tuple(NODES.get(d, d) for d in one.dims), unit=unit, long_name=text)
         for one, unit, text in rows
     ]
-
-
-def in_model(one: Quantity, *, on_surface: bool) -> tuple[str, str]:
-    """Return the unit and the meaning of a quantity in the plane, or in solids and rings."""
-    return ON_SURFACES.get(one.name, (one.unit, one.long_name)) if on_surface else (one.unit, one.long_name)
 
 
 def _in_cycle(records: Block | SteadyCycle) -> float:
@@ -157,12 +154,13 @@ IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pre
 def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
     """Return the quantities of a system by their names."""
     case = system.case
+    heat, track = case.heat is not None, case.heat is not None and case.heat.track is not None
     found = [
         *IN_RUN,
         *(() if case.wear.strip is None else OF_STRIP),
-        *(one for one in OF_PROGRAM if case.program is not None and (one.name != "ambient" or case.heat is not None)),
-        *(() if case.heat is None else OF_HEAT),
-        *(() if case.heat is None or case.heat.track is None else OF_TRACK),
+        *(one for one in OF_PROGRAM if case.program is not None and (heat or one.name != "ambient")),
+        *(OF_HEAT if heat else ()),
+        *(OF_TRACK if track else ()),
         *sheet.quantities(system),
         *(one for room in (between, place, roughness, steps) for one in room.quantities(system)),
         IN_CYCLE,

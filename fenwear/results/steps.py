@@ -405,11 +405,8 @@ def _tracks(placed: ContactSetup) -> Array:
     return np.array([x, *(screw.at(1.0).points(material) for screw in screws)])
 
 
-def sliding_numbers(last: Block) -> dict[str, float]:
-    """Return those of the last cycle for the sheet, or nothing where it is no table."""
-    cycle = table_cycle(last)
-    if cycle is None:
-        return {}
+def sliding_numbers(last: Block, cycle: TableCycle) -> dict[str, float]:
+    """Return the ways of a last cycle for the sheet."""
     areas = last.system.pair.weights * (cycle.pressure.max(axis=0) > 0 if last.system.sticks else 1.0)
     return {
         "mean_way_of_cycle_mm": float(areas @ cycle.ways / areas.sum()),
@@ -417,12 +414,9 @@ def sliding_numbers(last: Block) -> dict[str, float]:
     }
 
 
-def body_numbers(last: Block, body: str) -> dict[str, float]:
-    """Return those of a body that wears, "punch" or "strip", by the wear of the last cycle; or nothing."""
-    cycle, pair = table_cycle(last), last.system.pair
-    if cycle is None:
-        return {}
-    depth: Array = getattr(cycle.worn, body)
+def body_numbers(last: Block, cycle: TableCycle, body: str) -> dict[str, float]:
+    """Return the wear per million cycles of a body, "punch" or "strip", and its cross-shear in a last cycle."""
+    pair, depth = last.system.pair, getattr(cycle.worn, body)
     areas = last.system.bodies.punch.thickness * (pair.weights if body == "punch" else pair.strip.weights)
     return {
         "worn_volume_per_million_cycles_mm3": MILLION * float(areas @ depth),

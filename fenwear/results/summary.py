@@ -227,9 +227,12 @@ def sheet_of(last: Block) -> dict[str, Any]:
     """Return what the registry has for the tables of a summary, and for its top."""
     known = list(quantities_of(last.system).values())
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
-    sliding |= {**numbers(last, "sliding", known), **steps.sliding_numbers(last)}
-    bodies = {body: sheet.body_numbers(last, body, known) for body in sheet.BODIES}
-    bodies = {body: own | steps.body_numbers(last, body) for body, own in bodies.items() if own}
+    sliding |= numbers(last, "sliding", known)
+    bodies = {body: own for body in sheet.BODIES if (own := sheet.body_numbers(last, body, known))}
+    cycle = steps.table_cycle(last)
+    if cycle is not None:
+        sliding |= steps.sliding_numbers(last, cycle)
+        bodies = {body: own | steps.body_numbers(last, cycle, body) for body, own in bodies.items()}
     states = {between.STATES: found} if (found := between.states(last)) else {}
     return {"sliding": sliding, **bodies, **states, **numbers(last, "end", known)}
 

@@ -115,14 +115,9 @@ def rim(surface: ContactSurface) -> Mask:
 
 def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
-    return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_changes)
-
-
-def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool) -> dict[str, Column]:
-    """Return coordinates and facets of the punch's contact surface, and of the strip's own, by name."""
-    chart = sliding_chart(field, pair)
+    pair, chart = placed.pair, sliding_chart(placed.sliding.field, placed.pair)
     columns = _columns(chart, pair.punch, "")
-    return columns | _columns(chart, pair.strip, "_strip") if with_strip else columns
+    return columns | _columns(chart, pair.strip, "_strip") if placed.strip_changes else columns
 
 
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:

@@ -31,7 +31,6 @@ coefficients, which the coarser run cannot show, are no part of it.
 
 from fenwear.accuracy.contributions import (
     Uncertainty,
-    foreseen,
     uncertainty,
     uncertainty_of_steady,
     uncertainty_table,
@@ -43,7 +42,6 @@ __all__ = [
     "Quantity",
     "Uncertainty",
     "Value",
-    "foreseen",
     "uncertainty",
     "uncertainty_of_steady",
     "uncertainty_table",

@@ -14,7 +14,6 @@ from fenwear.assembly import ContactSetup, Tribosystem, answers_anywhere, relaid
 from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case
 from fenwear.cycle import Block, Span, follow_program, jump, march
-from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError
 
@@ -34,12 +33,10 @@ class Again:
     Attributes:
         system: Of the run's case with other elements or steps.
         until: The half-cycle it ends with.
-        watch: Asked between solves.
     """
 
     system: Tribosystem
     until: int
-    watch: Watch = unwatched
 
     @property
     def case(self) -> Case:
@@ -80,7 +77,7 @@ class Again:
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
-        shared: dict[str, Any] = {"leave": leave, "watch": self.watch, "loading": span.loading}
+        shared: dict[str, Any] = {"leave": leave, "loading": span.loading}
         if run.integration != "jump":
             yield from march(system, span.until, implicit=run.integration == "implicit", start=start, **shared)
             return

@@ -20,7 +20,6 @@ import numpy as np
 from fenwear.accuracy.again import (
     LESS,
     Again,
-    Coarser,
     are_dear,
     coarser,
     in_few_steps,
@@ -33,7 +32,6 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.case import Case
 from fenwear.cycle import Block, SteadyState, steady
-from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import RunState, all_phases, pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.results.quantity import KELVIN, degrees_of
@@ -138,16 +136,12 @@ class Uncertainty:
         return max(self.contributions, key=lambda source: self.contributions[source].get(quantity, 0.0))
 
 
-def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertainty:
+def uncertainty(case: Case, last: Block) -> Uncertainty:
     """Return the numerical uncertainty of a run's end; collective.
 
     Args:
         case: Of the run, whole, with its law of contact.
         last: The last half-cycles of the run.
-        watch: Asked between solves of the runs that are compared.
-
-    Raises:
-        InterruptedRunError: as `watch`.
     """
     begin = time.perf_counter()
     values, until = values_of(last), int(last.half_cycle[-1])
@@ -161,7 +155,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         by_jumps = case.run.integration == "jump"
         longer = by_jumps and are_dear(last)
         share = float(by_jumps) * (LESS if longer else 1.0)  # of what its jumps leave: what those of the run do
-        again = Again(set_up(in_longer_jumps(base) if longer else base, last.system, lower), until, watch)
+        again = Again(set_up(in_longer_jumps(base) if longer else base, last.system, lower), until)
         first, end, a_cycle_ago = again.ends()
         before, short = values_of(end), values_of(by_short_jumps(end))
         if lower.differs:
@@ -271,37 +265,6 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
 def _of_solver(values: Values, last: Block) -> Contribution:
     left = float(last.equilibrium_error.max()) + float(last.complementarity_error.max()) + ROUNDING
     return {quantity: left * abs(value.number) for quantity, value in values.items()}
-
-
-def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
-    """Return what the uncertainty of a run's end will be about, before it is run; collective.
-
-    The run is made on elements of the next two lower degrees, by jumps where it is long, and what the finer of the two
-    leaves is taken to the run's own by the assumed order. Where there is only one lower degree it is the run itself.
-
-    Args:
-        system: Of the run's case.
-        watch: Asked between solves.
-
-    Raises:
-        ConvergenceError: a half-cycle did not converge.
-    """
-    begin = time.perf_counter()
-    case, until = system.case, system.case.run.half_cycles
-    below = coarser(case, system) if case.geometry.degree > 2 or case.grid is not None else Coarser(case)
-    base = in_few_steps(below.case, system, until)
-    if base.run.integration == "jump":
-        until = until // system.motion.half_cycles * system.motion.half_cycles
-    one = set_up(base, system, below) if below.differs else replace(system, case=base)
-    _, last, _ = Again(one, until, watch).ends()
-    found = uncertainty(base, last, watch)
-    if below.differs and "mesh" in found.contributions:
-        mesh = {
-            quantity: own / below.ratio ** order_of(quantity, found.values[quantity])
-            for quantity, own in found.contributions["mesh"].items()
-        }
-        found = replace(found, contributions={**found.contributions, "mesh": mesh})
-    return replace(found, seconds=time.perf_counter() - begin)
 
 
 def _why(error: CaseError | ConvergenceError) -> str:

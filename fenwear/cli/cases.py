@@ -91,9 +91,6 @@ def run(
 def check_command(
     case: CaseArgument,
     settings: SetOption = [],  # noqa: B006
-    accuracy: Annotated[
-        bool, typer.Option("--accuracy", help="Estimate the numerical uncertainty of the run.")
-    ] = False,
     full: Annotated[bool, typer.Option("--full", help="Print the case with all defaults, as a case file.")] = False,
     heat_seconds: Annotated[
         float, typer.Option("--heat-seconds", help="Longest time for the checks of the heat.")
@@ -102,11 +99,11 @@ def check_command(
 ) -> None:
     """Validate a case with its geometry, and print its size, its free motions and warnings."""
     if not as_json:
-        _check(case, settings, heat_seconds, accuracy=accuracy, full=full)
+        _check(case, settings, heat_seconds, full=full)
         return
     with recorded() as said:
         try:
-            _check(case, settings, heat_seconds, accuracy=accuracy, full=False)
+            _check(case, settings, heat_seconds, full=False)
         except CaseError as error:
             problems = [
                 {"key": with_names(problem.key), "message": with_names(problem.message)} for problem in error.problems
@@ -118,7 +115,7 @@ def check_command(
         print_json({"valid": True, "warnings": warnings, "messages": messages})
 
 
-def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: bool, full: bool) -> None:
+def _check(case: str, settings: list[str], heat_seconds: float, *, full: bool) -> None:
     """Validate a case and say what it comes to."""
     from fenwear.assembly import assemble, elastic, law_named, place_case, resources_of
     from fenwear.law_choice import choose_law, with_law
@@ -126,7 +123,7 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
 
     loaded = load(case, settings)
     if loaded.sticks:
-        _check_stick(assemble(with_law(loaded, "coulomb")), accuracy=accuracy, full=full)
+        _check_stick(assemble(with_law(loaded, "coulomb")), full=full)
         return
     level_of(loaded)
     placed = place_case(loaded)
@@ -138,13 +135,13 @@ def _check(case: str, settings: list[str], heat_seconds: float, *, accuracy: boo
         loaded = with_law(loaded, choice.law)
         if choice.law == "coulomb":
             stuck = law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False)
-            _check_stick(stuck, accuracy=accuracy, full=full)
+            _check_stick(stuck, full=full)
             return
         system = replace(system, case=loaded)
-    _check_sliding(system, heat_seconds, accuracy=accuracy, full=full)
+    _check_sliding(system, heat_seconds, full=full)
 
 
-def _check_sliding(system: Tribosystem, heat_seconds: float, *, accuracy: bool, full: bool) -> None:
+def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> None:
     """Say what a case comes to whose surfaces slide as a whole."""
     from fenwear.cycle import stability_number
     from fenwear.heat.periodic import cycle_memory
@@ -179,8 +176,6 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, accuracy: bool, 
     for body, modes in (("punch", rigid.mode_names[: rigid.of_punch]), ("strip", rigid.mode_names[rigid.of_punch :])):
         if modes:
             log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact has to balance it")
-    if accuracy:
-        _foresee(warm)
 
 
 def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[str]]:
@@ -214,15 +209,7 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     return warm, warnings
 
 
-def _foresee(system: Tribosystem) -> None:
-    """Say how uncertain the numbers of a run will be."""
-    from fenwear.accuracy import foreseen, uncertainty_text
-
-    found = foreseen(system)
-    log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {uncertainty_text(system, found)}")
-
-
-def _check_stick(system: Tribosystem, *, accuracy: bool, full: bool) -> None:
+def _check_stick(system: Tribosystem, *, full: bool) -> None:
     """Say what the first cycle of a case with stick comes to."""
     text, warnings = check_text(system)
     for warning in plausibility_warnings(system.case):
@@ -232,8 +219,6 @@ def _check_stick(system: Tribosystem, *, accuracy: bool, full: bool) -> None:
     log(text)
     for warning in warnings:
         log(f"{WARNING}{warning}")
-    if accuracy:
-        _foresee(system)
 
 
 def check_text(system: Tribosystem) -> tuple[str, list[str]]:

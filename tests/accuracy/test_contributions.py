@@ -209,11 +209,3 @@ def test_run_tells_it(fenwear: Callable[..., Any], tmp_path: Any) -> None:
     without = ("--set", "output.uncertainty=false", "--set", "output.report=false")
     fenwear("run", "example1", *short, *without, "-o", tmp_path / "b")
     assert "uncertainty" not in json.loads((tmp_path / "b" / "summary.json").read_text())
-
-
-def test_check_foresees_it(fenwear: Callable[..., Any]) -> None:
-    """Before the run, from lower degrees."""
-    done = fenwear("check", "example1", "--accuracy", "--set", FEW, "--set", "run.half_cycles=40")
-    assert done.returncode == 0
-    assert "numerical uncertainty: worn depth" in done.stderr
-    assert "to lower it: geometry.degree = 5" in done.stderr

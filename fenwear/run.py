@@ -25,8 +25,7 @@ from fenwear.cycle import (
     stationary_growth,
 )
 from fenwear.cycle.program import at_loads
-from fenwear.cycle.state import RunState, all_phases, on_other_grid
-from fenwear.cycle.totals import none_yet
+from fenwear.cycle.state import RunState, all_phases, beginning, on_other_grid
 from fenwear.errors import (
     CaseError,
     ConvergenceError,
@@ -228,7 +227,7 @@ class _Run:
         on_root(self.comm, lambda: write_case(directory, self.case))
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
+        self.state = start or beginning(system)
         self.last: Block | None = None
         self._level = level_of(self.case)
         self.numbers: dict[str, float] = {}
@@ -246,14 +245,13 @@ class _Run:
             log(f"warning: {warning}")
         self._heat_watch = HeatMonitor(self.extremes)
         if self.case.program is None:  # else the motion and surroundings of its stages are what counts
-            self._see_heat(system, start)
+            self._see_heat(system, self.state)
         self._fields_at = frozenset(self.case.output.fields_at or ())
 
-    def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
-        """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
-        known = (None, None)
-        if state is not None and len(pressure := all_phases(state.contacts).pressure):
-            known = pressure, state.temperature
+    def _see_heat(self, system: Tribosystem, state: RunState) -> None:
+        """Look at the heat of a system with the contact of a state; of unworn bodies where it has none; collective."""
+        pressure = all_phases(state.contacts).pressure
+        known = (pressure, state.temperature) if len(pressure) else (None, None)
         for warning in self._heat_watch.see(system, *known):
             self.log(f"warning: {warning}")
         self.extremes.update(self._heat_watch.numbers)
@@ -339,7 +337,7 @@ class _Run:
         elif block.system.bodies.warmed is not self.system.bodies.warmed:
             self.log(f"after half-cycle {self.state.half_cycle:,} properties are those of the temperatures there")
         if block.system.exchange is not self.system.exchange:
-            self._see_heat(block.system)
+            self._see_heat(block.system, beginning(block.system))
             self._see_heat(block.system, block.end)
         self.system = block.system
         self.extremes |= between.worn_through(block, self.state, self.extremes)

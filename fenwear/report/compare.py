@@ -42,7 +42,6 @@ COURSES = {
     "friction_work_increment": "work of friction in a half-cycle (mJ)",
 }
 DRAWN = ("wear", "wear_strip", "pressure")  # along the contact, at the end
-PLACES = np.array([-0.5, -0.25, 0.0, 0.25, 0.5])  # of the length that all runs have
 OF_EACH = ("x_mm", "wear_mm", "pressure_MPa", "temperature_punch_", "temperature_strip_")  # at other places in each run
 
 
@@ -78,16 +77,16 @@ class Comparison:
     def text(self) -> str:
         """Return the tables for people, a column per run: names and units of results, keys of cases."""
         parts = []
-        tables = {"differences of the cases": self.cases, "differences of the versions": self.versions}
-        for title, table in {**self.named(), **tables}.items():
+        differences = {"differences of the cases": self.cases, "differences of the versions": self.versions}
+        for title, table in {"results": self.named(), **differences}.items():
             if table:
                 parts.append(_columns(title, self.names, {self.bodies.told(key): row for key, row in table.items()}))
         if not self.cases:
             parts.append("the cases are equal")
         return "\n\n".join(parts)
 
-    def named(self) -> dict[str, dict[str, list[Any]]]:
-        """Return the results by their names and units, and values at the same places."""
+    def named(self) -> dict[str, list[Any]]:
+        """Return the results by their names and units."""
         results, order = {}, {key: number for number, key in enumerate(ALL_LINES)}
         for path in sorted(self.numbers, key=lambda p: order.get(p, order.get(p.rpartition(".")[2], len(order)))):
             row, (of, _, key) = self.numbers[path], path.rpartition(".")
@@ -96,26 +95,7 @@ class Comparison:
                 suffix = f", {of}" if key in ALL_LINES and of not in ("", "sliding") else ""
                 heading = line._replace(label=line.label + suffix).heading
                 results[heading] = [shown(value, line) if isinstance(value, float) else value for value in row]
-        return {"results": results, "at the same places": at_same_places(self.histories)}
-
-
-def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
-    """Return depths and pressures at the end of plane runs at places that all of them have, by names with units."""
-    if any(model_of(history) != "plane" for history in histories):
-        return {}
-    low, high = max(float(history.x.min()) for history in histories), min(float(h.x.max()) for h in histories)
-    places = np.round((low + high) / 2 + (high - low) * PLACES, 9) + 0.0
-    found: dict[str, list[Any]] = {}
-    fields = {name: field for history in histories for name, field in fields_of(history).items() if name in DRAWN}
-    for name, field in fields.items() if high > low else ():
-        rows = []
-        for history in histories:
-            line = tracks_of(history)[0].line
-            last = field.factor * history[name].values[-1] if name in history else np.full(history.sizes["x"], np.nan)
-            rows.append(np.interp(places, *line(last, field.body if name in history else "punch")))
-        for k, x in enumerate(places):
-            found[f"{field.label} at x = {x:.4g} mm"] = [float(row[k]) for row in rows]
-    return found
+        return results
 
 
 def compare(directories: Sequence[Path]) -> Comparison:

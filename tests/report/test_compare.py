@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, load_case
-from fenwear.report.compare import at_same_places, compare, comparison_figure, draw_comparison
+from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "run.half_cycles=6")
@@ -95,23 +95,12 @@ def test_command(folders: list[Path], tmp_path: Path, fenwear: Callable[..., Any
     assert "Traceback" not in done.stderr
 
 
-def test_names_and_places(folders: list[Path]) -> None:
-    """The table has names with units; depths and pressures are those of the histories at the same places."""
-    comparison = compare(folders[:2])
-    text = comparison.text()
+def test_names_with_units(folders: list[Path]) -> None:
+    """The table has names with units, and no values at places of their own in each run."""
+    text = compare(folders[:2]).text()
     assert "worn volume, punch (mm³)" in text
     assert "largest_pressure_MPa" not in text
     assert "wear_mm" not in text
-    (row,) = [
-        row for name, row in comparison.named()["at the same places"].items() if name.endswith("µm) at x = 15 mm")
-    ]
-    for value, history in zip(row, comparison.histories, strict=True):
-        assert value == pytest.approx(1e3 * float(history.wear[-1].interp(x=15.0)))
-    narrow = comparison.histories[1].sel(x=slice(-30, 20))
-    places = at_same_places([comparison.histories[0], narrow])
-    last = float(narrow.x.max())
-    assert float(list(places)[-1].partition("x = ")[2].removesuffix(" mm")) == pytest.approx(last, abs=1e-3)
-    assert not any(name.endswith("at x = 30 mm") for name in places)
 
 
 def test_worn_strips_are_drawn(tmp_path: Path) -> None:
@@ -128,4 +117,3 @@ def test_worn_strips_are_drawn(tmp_path: Path) -> None:
     comparison = compare([tmp_path / "one", tmp_path / "other"])
     titles = [ax.get_title("left") for ax in comparison_figure(comparison).axes]
     assert any("strip at the end" in title for title in titles)
-    assert any(name.startswith("worn depth of the strip") for name in comparison.named()["at the same places"])

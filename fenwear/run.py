@@ -251,7 +251,7 @@ class _Run:
     def _see_heat(self, system: Tribosystem, state: RunState) -> None:
         """Look at the heat of a system with the contact of a state; of unworn bodies where it has none; collective."""
         pressure = all_phases(state.contacts).pressure
-        known = (pressure, state.temperature) if len(pressure) else (None, None)
+        known: tuple[Any, Any] = (pressure, state.temperature) if len(pressure) else (None, None)
         for warning in self._heat_watch.see(system, *known):
             self.log(f"warning: {warning}")
         self.extremes.update(self._heat_watch.numbers)

@@ -16,7 +16,7 @@ sigma apart, beyond which less than 1e-9 of the asperities touch.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -29,7 +29,6 @@ LEAST = 1e-12  # of the largest pressure: where a power below 1 has a slope that
 FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F is inverted; how often it is tabulated
 NONE = np.zeros(())
 NUDGE, ROUNDS = 1e-6, 20  # of the largest pressure, for differences; iterations of a pressure by that of asperities
-STEPS = 4  # of Newton's method that find the distances at even places
 
 
 class Closure(Protocol):
@@ -158,41 +157,29 @@ class RoughClosure:
 
     height: float | Array
     stiffness: float | Array
-    _asked: list[Array] = field(default_factory=list, init=False, repr=False, compare=False)  # the last, and its answer
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        found = _asperities().closure.value(np.log(self._integral(pressure)))
-        found *= self.height
-        self._asked[:] = pressure, found.copy()
-        return found
+        return np.asarray(self.height * _asperities().closure(np.log(self._integral(pressure))))
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
         integral = self._integral(pressure)
-        return np.asarray(self.height * _asperities().closure.slope(np.log(integral)) / (integral * self.stiffness))
+        return np.asarray(self.height * _asperities().slope(np.log(integral)) / (integral * self.stiffness))
 
     def nearness(self, pressure: Array, gap: Array) -> Array:
         """Return the closure less the gap, over the standard deviation of the heights (n,)."""
-        if not self._asked or self._asked[0].tobytes() != pressure.tobytes():  # else a solution was just found with it
-            self.closure(pressure)
-        closed = self._asked[1]
-        return np.asarray((closed.reshape(gap.shape) - gap) / self.height)
+        return np.asarray((self.closure(pressure) - gap) / self.height)
 
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
         known = _asperities()
-        found = np.exp(known.logarithm.value(np.maximum(nearness, NONE)))
-        found -= known.first
-        found *= self.stiffness
+        found = self.stiffness * (np.exp(known.logarithm(np.maximum(nearness, NONE))) - known.first)
         return np.maximum(found, NONE)
 
     def _integral(self, pressure: Array) -> Array:
         """Return F (...)."""
-        found = np.maximum(pressure, NONE)
-        found /= self.stiffness
-        found += _asperities().first
-        return found
+        return np.asarray(np.maximum(pressure, NONE) / self.stiffness + _asperities().first)
 
 
 class Rigid:
@@ -248,61 +235,18 @@ def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
 
 
 class _Asperities:
-    """ln F at even closures FIRST - h, and these at even places of ln F."""
+    """ln F by the closure FIRST - h, and the closure by ln F."""
 
     def __init__(self) -> None:
-        h = np.linspace(FIRST, LAST, POINTS)
-        values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
-        known = np.log(values)
-        self.first = np.array(values[0])
-        self.logarithm = _Cubics(0.0, FIRST - LAST, known, -slopes / values)
-        places = np.linspace(known[0], known[-1], POINTS)
-        h = np.interp(places, known, h)
-        for _ in range(STEPS):
-            values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
-            h = h - (np.log(values) - places) * values / slopes
-        h[0] = FIRST
-        slopes = asperity_integral(h) / (1.5 * asperity_integral(h, 0.5))
-        self.closure = _Cubics(places[0], places[-1], FIRST - h, slopes)
-
-
-class _Cubics:
-    """A function by Hermite's cubics between values and slopes at even places, of no search.
-
-    A third of a half-cycle would go into places that are searched for.
-    """
-
-    def __init__(self, begin: float, end: float, values: Array, slopes: Array) -> None:
         from scipy.interpolate import CubicHermiteSpline
 
-        places, width = np.linspace(begin, end, len(values)), (end - begin) / (len(values) - 1)
-        self._cubics = list(CubicHermiteSpline(places, values, slopes).c * width ** np.arange(3.0, -1.0, -1.0)[:, None])
-        # Arrays of one number: numpy takes twice as long for numbers of Python.
-        self._begin, self._density, self._last = map(np.array, (begin, 1 / width, len(values) - 2.0))
-
-    def value(self, places: Array) -> Array:
-        """Return it (...) at places (...)."""
-        number, t = self._at(places)
-        a, b, c, d = self._cubics
-        found = a[number]
-        for other in (b, c, d):
-            found *= t
-            found += other[number]
-        return found
-
-    def slope(self, places: Array) -> Array:
-        """Return its derivative (...)."""
-        number, t = self._at(places)
-        a, b, c = (one[number] for one in self._cubics[:3])
-        return np.asarray(((3 * a * t + 2 * b) * t + c) * self._density)
-
-    def _at(self, places: Array) -> tuple[NDArray[np.intp], Array]:
-        """Return the numbers of the cubics at places (...), and where these are in them (...)."""
-        t = places - self._begin
-        t *= self._density
-        whole = np.floor(np.fmin(np.fmax(t, NONE), self._last))  # the first for what is no number
-        t -= whole
-        return whole.astype(np.intp), t
+        h = np.linspace(FIRST, LAST, POINTS)
+        values = asperity_integral(h)
+        known, slopes = np.log(values), 1.5 * asperity_integral(h, 0.5) / values
+        self.first = np.array(values[0])
+        self.logarithm = CubicHermiteSpline(FIRST - h, known, slopes)
+        self.closure = CubicHermiteSpline(known, FIRST - h, 1 / slopes)
+        self.slope = self.closure.derivative()
 
 
 @lru_cache(maxsize=1)

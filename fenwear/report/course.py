@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.heat.exchange import TERMS
 from fenwear.report.style import (
     BLUE,
     BODY_COLOURS,
@@ -34,12 +33,15 @@ from fenwear.results.sheet import BODIES
 BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
 SHORT = 0.01  # of cycles, m or s: an end whose labels are long, so that few of them go beside each other
+TINY = 1e-9  # in the unit of the history: what is no more is nothing
 GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
 ENDS = {**BODIES, "layer": "_layer"}
 
 
 class Line(NamedTuple):
-    """Lines of a variable: of each sliding direction, or of each body where its name has a place for the body.
+    """Lines of a variable: of each body where its name has a place for it, of each direction where the label has one.
+
+    Else one line, where it has any value beyond zero.
 
     Attributes:
         variable: Its name; `{}` stands for the end that a body gives it.
@@ -55,6 +57,11 @@ class Line(NamedTuple):
     def of_bodies(self) -> bool:
         """Whether each body has a line."""
         return "{}" in self.variable
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether one line is drawn of all half-cycles."""
+        return "{}" not in self.label
 
     def ends(self, history: xarray.Dataset) -> dict[str, str]:
         """Return the names of the variables that a history has, by the body."""
@@ -129,6 +136,16 @@ COURSES = {
         Panel("work of friction in a half-cycle (µJ)", (Line("friction_work_increment"),), 1e3),
         Panel("energy ratio (-)", (Line("energy_ratio"),)),
     )),
+    "heat_balance": Course("heat_friction", (
+        Panel("heat per half-cycle (J)", (
+            Line("heat_friction", "made by friction"),
+            Line("heat_convected", "lost to the surroundings"),
+            Line("heat_held", "lost where temperature is held"),
+            Line("heat_stored", "gained by both bodies"),
+            Line("heat_debris", "carried off by debris"),
+            Line("heat_carried", "carried out by the strip"),
+        ), 1e-3, "free"),
+    )),
     "roughness": Course("roughness", (
         Panel("roughness (µm)", (Line("roughness_Sa{}", "mean, {}"),
                                  Line("roughness_Sq{}", "root mean square, {}", "--")), 1e3),
@@ -149,8 +166,11 @@ def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) ->
     figure, axes = panels(len(shown), 2.6, look=look)
     x, known = look.course(history), levels(history)
     for ax, panel in zip(axes, shown, strict=True):
-        for line in panel.lines:
-            (_of_bodies if line.of_bodies else _of_directions)(ax, history, line, panel.factor, x)
+        for number, line in enumerate(panel.lines):
+            if line.is_alone and float(abs(history[line.variable]).max()) > TINY:
+                ax.plot(x, panel.factor * history[line.variable], label=line.label, **run_style(number), **mark_few(x))
+            elif not line.is_alone:
+                (_of_bodies if line.of_bodies else _of_directions)(ax, history, line, panel.factor, x)
             if line.variable in known:
                 level_line(ax, *known[line.variable])
         ax.set_ylabel(panel.label.format(temperature_unit(history)))
@@ -158,7 +178,8 @@ def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) ->
             ax.set_yscale("log")
         elif panel.begins == "zero":
             from_zero(ax)
-        legend_beside(ax, "" if panel.lines[0].of_bodies else strip_moves(history))
+        of_directions = not (panel.lines[0].of_bodies or panel.lines[0].is_alone)
+        legend_beside(ax, strip_moves(history) if of_directions else "")
     run_axis(axes[-1], history, look, logarithmic=course.logarithmic)
     return figure
 
@@ -172,8 +193,6 @@ def course_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str,
         found["place"] = place_figure(history, look)
     if "load_factor" in history:
         found["program"] = program_figure(history, look)
-    if "heat_friction" in history:
-        found["heat_balance"] = heat_balance_figure(history, look)
     return found
 
 
@@ -241,33 +260,6 @@ def bores_of(history: xarray.Dataset) -> dict[str, str]:
     """Return how the names of variables of a shaft's place end, by the name of the bore; "" of the only one."""
     start = "attitude_angle"
     return {name[len(start) + 1 :]: name[len(start) :] for name in map(str, history) if name.startswith(start)}
-
-
-WHERE_HEAT_GOES = {
-    "convected": "lost to the surroundings",
-    "held": "lost where temperature is held",
-    "stored": "gained by both bodies",
-    "debris": "carried off by debris",
-    "carried": "carried out by the strip",
-}
-assert WHERE_HEAT_GOES.keys() == set(TERMS) - {"friction"}
-
-
-def heat_balance_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Return where the friction heat of each half-cycle goes; ways that none goes are left out."""
-    figure, (ax,) = panels(1, 3.8, look=look)
-    friction, x = history.heat_friction, look.course(history)
-    largest = float(np.abs(friction).max())
-    scale, unit = (1e-3, "J") if largest > 1e4 else (1.0, "mJ")
-    ax.plot(x, scale * friction, color="0", linewidth=2.5, label="made by friction")
-    for number, (name, text) in enumerate(WHERE_HEAT_GOES.items()):
-        values = history[f"heat_{name}"]
-        if float(np.abs(values).max()) > 1e-6 * largest:
-            ax.plot(x, scale * values, label=text, **run_style(number))
-    ax.set_ylabel(f"heat per half-cycle ({unit})")
-    legend_beside(ax, "")
-    run_axis(ax, history, look)
-    return figure
 
 
 ACTED = {

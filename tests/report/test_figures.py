@@ -13,7 +13,7 @@ from PIL import Image
 
 from fenwear import CaseError, load_case
 from fenwear.report.bodies import element_edges
-from fenwear.report.course import course_figure, heat_balance_figure
+from fenwear.report.course import course_figure
 from fenwear.report.figures import all_figures, draw_figures
 from fenwear.report.lines import (
     LATE,
@@ -106,7 +106,7 @@ def test_curves_of_heat_are_the_history(history: xarray.Dataset) -> None:
     for ax, body in zip(lines_figure(history, fields, [10, 20]).axes, bodies, strict=True):
         for number, drawn in _lines(ax).items():
             np.testing.assert_array_equal(drawn, history[f"temperature_{body}"].sel(half_cycle=number))
-    (ax,) = heat_balance_figure(history).axes
+    (ax,) = course_figure(history, "heat_balance").axes
     made, *others = [np.asarray(line.get_ydata()) for line in ax.lines]
     np.testing.assert_allclose(made, np.sum(others, axis=0), rtol=1e-6)
     named = [text.get_text() for text in ax.get_legend().get_texts()]

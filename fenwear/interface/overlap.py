@@ -16,6 +16,7 @@ import basix
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
@@ -378,39 +379,12 @@ def _intersect(first: Array, second: Array) -> tuple[Indices, Indices, Array]:
 def _boxes_that_meet(first: Array, second: Array) -> tuple[Indices, Indices]:
     """Return the pairs of polygons (m, c, d - 1) whose boxes overlap."""
     (low1, high1), (low2, high2) = ((polygons.min(axis=1), polygons.max(axis=1)) for polygons in (first, second))
-    if first.shape[2] == 1:
-        return _intervals_that_meet(low1[:, 0], high1[:, 0], low2[:, 0], high2[:, 0])
-    # Strips as wide as the boxes are high, one after the other on a line: there boxes are intervals.
-    bottom, width = min(low1[:, 1].min(), low2[:, 1].min()), np.concatenate([high1 - low1, high2 - low2])[:, 1].mean()
-    left, right = min(low1[:, 0].min(), low2[:, 0].min()), max(high1[:, 0].max(), high2[:, 0].max())
-    parts = []
-    for low, high in ((low1, high1), (low2, high2)):
-        strip = ((low[:, 1] - bottom) / width).astype(np.int64)
-        box, place = _expand(strip, ((high[:, 1] - bottom) / width).astype(np.int64) + 1)
-        start = 2 * place * (right - left)
-        parts.append((box, low[box, 0] - left + start, high[box, 0] - left + start, place == strip[box]))
-    (box1, from1, to1, lowest1), (box2, from2, to2, lowest2) = parts
-    i, j = _intervals_that_meet(from1, to1, from2, to2)
-    once = lowest1[i] | lowest2[j]  # of the strips where both are, in the lowest
-    i, j = box1[i[once]], box2[j[once]]
+    reach = ((high1 - low1).max(initial=0.0) + (high2 - low2).max(axis=1)) / 2
+    near = cKDTree((low1 + high1) / 2).query_ball_point((low2 + high2) / 2, reach, p=np.inf, return_sorted=True)
+    i = np.concatenate([np.zeros(0, dtype=np.int64), *near]).astype(np.int64)
+    j = np.repeat(np.arange(len(near)), [len(one) for one in near])
     meet = ((low1[i] < high2[j]) & (low2[j] < high1[i])).all(axis=1)
     return i[meet], j[meet]
-
-
-def _intervals_that_meet(low1: Array, high1: Array, low2: Array, high2: Array) -> tuple[Indices, Indices]:
-    """Return the pairs of intervals that overlap: one of the two begins in the other."""
-    order1, order2 = np.argsort(low1, kind="stable"), np.argsort(low2, kind="stable")
-    starts1, starts2 = low1[order1], low2[order2]
-    i, inside = _expand(np.searchsorted(starts2, low1, side="left"), np.searchsorted(starts2, high1, side="left"))
-    k, within = _expand(np.searchsorted(starts1, low2, side="right"), np.searchsorted(starts1, high2, side="left"))
-    return np.concatenate([i, order1[within]]), np.concatenate([order2[inside], k])
-
-
-def _expand(start: Indices, stop: Indices) -> tuple[Indices, Indices]:
-    """Return all numbers in each range [start, stop), with the range that each belongs to."""
-    count = np.maximum(stop - start, 0)
-    owner = np.repeat(np.arange(len(count)), count)
-    return owner, np.arange(len(owner)) - (np.cumsum(count) - count - start)[owner]
 
 
 def _clip(subject: Array, clip: Array) -> tuple[Indices, Array]:

@@ -144,20 +144,9 @@ class _Growing:
         stored = _gram(body, uniform)[0, 0]
         self._first = int(stored > 0)  # how many columns the uniform temperature has: none where it is held everywhere
         column = uniform[:, : self._first] / np.sqrt(stored if stored > 0 else 1.0)
-        self._room = np.array(column, order="F")
-        self._stored_room = np.array(body.store(column), order="F")  # M V: so nothing else is multiplied by M
-        self._filled = self._first
+        self.columns = np.array(column, order="F")  # V (owned, dim)
+        self._stored = np.array(body.store(column), order="F")  # M V: so nothing else is multiplied by M
         self._added: list[Array] = []  # in coordinates of the basis as it was then
-
-    @property
-    def columns(self) -> Array:
-        """The basis V (owned, dim)."""
-        return self._room[:, : self._filled]
-
-    @property
-    def _stored(self) -> Array:
-        """M V (owned, dim)."""
-        return self._stored_room[:, : self._filled]
 
     def _coordinates(self, fields: Array) -> Array:
         """Return V^T M times fields (owned, k), (dim, k)."""
@@ -192,13 +181,13 @@ class _Growing:
 
     def compress(self, tolerance: float) -> None:
         """Keep the principal parts of all that was added, and the uniform temperature; of fields as they are."""
-        dim, first = self._filled, self._first
+        dim, first = self.columns.shape[1], self._first
         if dim == first:
             return
         added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
-        columns = self.columns[:, first:].copy()
+        columns = self.columns[:, first:]
         parts, values, _ = np.linalg.svd(added, full_matrices=False)
-        self._filled = first
+        self.columns, self._stored = self.columns[:, :first], self._stored[:, :first]
         self._append(columns @ parts[:, values > max(tolerance, ROUNDING) * values[0]])
 
     def start_from(self, field: Array, relaxed: Array, tolerance: float) -> None:
@@ -223,8 +212,8 @@ class _Growing:
         """Return fields without what the basis has of them; first without the uniform one, which may be far larger."""
         comm = self.body.body.mesh.comm
         fields = np.asfortranarray(fields)  # one layout, whoever has made them: the same bits on any number of ranks
-        for some in (slice(self._first), slice(self._filled)):
-            columns, stored = self._room[:, some], self._stored_room[:, some]
+        for some in (slice(self._first), slice(None)):
+            columns, stored = self.columns[:, some], self._stored[:, some]
             fields = fields - columns @ total(comm, stored.T @ fields)
         return fields
 
@@ -238,20 +227,8 @@ class _Growing:
             if not fields.shape[1]:
                 return
             fields = self._beside(fields @ _orthogonal(self.body, fields))
-        before, self._filled = self._filled, self._filled + fields.shape[1]
-        self._room = _with_room(self._room, before, fields)
-        self._stored_room = _with_room(self._stored_room, before, self.body.store(fields))
-
-
-def _with_room(columns: Array, filled: int, more: Array) -> Array:
-    """Return columns of which so many are filled, with more after these, and room for half as many again."""
-    after = filled + more.shape[1]
-    if after > columns.shape[1]:
-        larger: Array = np.empty((len(more), after + filled // 2), order="F")
-        larger[:, :filled] = columns[:, :filled]
-        columns = larger
-    columns[:, filled:after] = more
-    return columns
+        self.columns = np.asfortranarray(np.hstack([self.columns, fields]))
+        self._stored = np.asfortranarray(np.hstack([self._stored, self.body.store(fields)]))
 
 
 def _lasting_fluxes(

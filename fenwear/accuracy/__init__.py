@@ -34,7 +34,6 @@ from fenwear.accuracy.contributions import (
     uncertainty,
     uncertainty_of_steady,
     uncertainty_table,
-    uncertainty_text,
 )
 from fenwear.accuracy.values import Quantity, Value, values_of
 
@@ -45,6 +44,5 @@ __all__ = [
     "uncertainty",
     "uncertainty_of_steady",
     "uncertainty_table",
-    "uncertainty_text",
     "values_of",
 ]

@@ -5,7 +5,7 @@ from those of smaller steps and of the whole mesh, relative to themselves. The p
 thermal gap that is larger by as much; worn depths differ by no more than it does beside a rigid motion, and by no more
 than the pressure that wears them.
 
-The result is a table of summary.json, and a text with the keys that lower the uncertainty.
+The result is a table of summary.json, with the keys that lower the uncertainty.
 """
 
 from __future__ import annotations
@@ -362,14 +362,6 @@ def _last_less(rows: Array, change: Array) -> Array:
 
 
 HIGHEST = 8  # degree of elements
-WORDS = {
-    "largest_depth": "worn depth",
-    "worn_volume": "worn volume",
-    "largest_pressure": "largest pressure",
-    "largest_pressure_in_cycle": "largest pressure",
-    "mean_pressure": "mean pressure",
-    "largest_temperature": "temperature",
-}
 
 
 def uncertainty_table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
@@ -446,26 +438,3 @@ def _finer(case: Case) -> str:
         if degree < HIGHEST
         else "more elements"
     )
-
-
-def in_words(source: str) -> str:
-    """Return a source of uncertainty for people."""
-    return source.replace("_", " ")
-
-
-def uncertainty_text(system: Tribosystem, found: Uncertainty) -> str:
-    """Return a text (a few lines): the uncertainty of each number, its largest source and the key that lowers it."""
-    told, helps, total = [], remedies(system, found), found.total
-    for name, words in WORDS.items() if found.is_whole else ():
-        shares = {q: total[q] / max(abs(v.number), 1e-300) for q, v in found.values.items() if q.name == name}
-        if not shares:
-            continue
-        worst = max(shares, key=lambda quantity: shares[quantity])
-        by = f", most by the {in_words(found.largest(worst))}" if name in helps else ""
-        # A share of kelvins tells nothing, nor one of a rise above a temperature that bodies have in part.
-        size = f"{total[worst]:.2g} K" if name == "largest_temperature" else f"{100 * shares[worst]:.2g} %"
-        told.append(f"{words} {size}{by}")
-    lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
-    lines += [f"uncertainty from the {in_words(source)} not estimated: {why}" for source, why in found.untold.items()]
-    lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]
-    return "\n".join(lines)

@@ -148,11 +148,20 @@ def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
 
 def _uncertain(state: SteadyState) -> dict[str, Any]:
     """Return how uncertain a state's numbers are, and say it."""
-    from fenwear.accuracy import uncertainty_of_steady, uncertainty_table, uncertainty_text
+    from fenwear.accuracy import uncertainty_of_steady, uncertainty_table
+    from fenwear.report.key_numbers import NO_NUMBERS, flat, line_of
+    from fenwear.results.sheet import columns_text, shown
 
-    found = uncertainty_of_steady(state)
-    log(uncertainty_text(state.system, found))
-    return {"uncertainty": uncertainty_table(state.system, found)}
+    table = uncertainty_table(state.system, uncertainty_of_steady(state))
+    rows = []
+    for path, within in flat({key: value for key, value in table.items() if key not in NO_NUMBERS}).items():
+        line, of = line_of(path), path.rpartition(".")[0]
+        rows.append((f"{line.heading}, {of}" if of else line.heading, [shown(within, line)]))
+    log(columns_text(("uncertainty",), rows))
+    for source, why in table.get("untold", {}).items():
+        log(f"uncertainty from the {source.replace('_', ' ')} not estimated: {why}")
+    log(f"to lower it: {'; '.join(sorted(set(table['remedies'].values())))}")
+    return {"uncertainty": table}
 
 
 def _show_final(name: str, system: Tribosystem, *, as_json: bool) -> None:

@@ -156,9 +156,9 @@ def _run(
             ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": time.perf_counter() - begin}
             summary = run.finish(run.last, ended)
     # Who interrupts a run is in a hurry: its figures can be drawn later.
-    if run.last is not None and not isinstance(failure, InterruptedRunError):
-        if not agreed(system.comm, signals.received):
-            summary |= run.tell_more(run.last, summary, uncertain=failure is None)
+    hurry = isinstance(failure, InterruptedRunError) or agreed(system.comm, signals.received)
+    if run.last is not None and not hurry:
+        summary |= run.tell_more(run.last, summary, uncertain=failure is None)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary

@@ -116,7 +116,8 @@ def _state(block: Block, kept: str, number: int) -> Array:
 
 def states(last: Block) -> dict[str, dict[str, Any]]:
     """Return mean, smallest and largest of the states that laws remember at the end of a run, for summary.json."""
-    weights = {ALONG: last.system.pair.weights, ON_STRIP: last.system.pair.strip.weights}
+    pair = last.system.pair
+    weights: dict[tuple[str, ...], Array] = {ALONG: pair.weights, ON_STRIP: pair.strip.weights}
     return {
         one.name.removeprefix(STATE): {"unit": one.unit, **_extent(weights[one.dims], one.compute(last)[-1])}
         for one in _of_states(last.system)

@@ -7,7 +7,6 @@ NetCDF on the nodes, for fenwear's own pictures.
 
 from __future__ import annotations
 
-from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,9 +78,11 @@ def body_fields(
     """
     traction = friction_ratio
     traction = _traction(system, phase, pressure, temperatures, worn) if traction is None else in_space(traction)
-    warm = [] if temperatures is None else list(zip(system.bodies.heat, temperatures, strict=False))
+    given: list[tuple[HeatBody, Array] | None] = [None, None]
+    if temperatures is not None and system.bodies.heat:
+        given = [*zip(system.bodies.heat, temperatures, strict=True)]
     loaded = _loaded(system, phase, pressure, rigid, traction)
-    punch, strip = (_solve(*body, given) for body, given in zip_longest(loaded, warm))
+    punch, strip = (_solve(*body, warm) for body, warm in zip(loaded, given, strict=True))
     return punch, strip
 
 
@@ -126,7 +127,8 @@ def _traction(
 def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody, Array] | None) -> Fields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
     found: Fields = {}
-    change, thermal = None, np.zeros(1)
+    change: fem.Function | None = None
+    thermal: Array = np.zeros(1)
     if warm is not None:
         heat, temperature = warm
         change = heat.function(temperature - heat.heat.initial)

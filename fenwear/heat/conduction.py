@@ -52,7 +52,7 @@ WARMER = 100.0  # K: the mean rise that a convection is proposed for
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a body meets beyond its mesh, and how its material moves through it.
+    """Boundary of a body beyond its mesh, and motion of its material through the mesh.
 
     Attributes:
         renewed: Whether material that enters is new, at theta_in; else what has left comes back as it was.
@@ -197,7 +197,7 @@ class HeatBody:
         Args:
             speed: Of the material, mm/s, or rad/s where it turns.
             duration: Of the step, s.
-            surroundings: What lies beyond the mesh.
+            surroundings: Boundary beyond the mesh.
 
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
@@ -317,7 +317,7 @@ class HeatBody:
 
 
 class _Flow:
-    """What of a body's conduction depends on how its material moves, v for a unit speed.
+    """Part of a body's conduction that depends on the motion of its material, v for a unit speed.
 
     Attributes:
         velocity: v, a vector of UFL with the components of the model.

@@ -100,7 +100,7 @@ class HeatExchange:
         return Team.of(self.bases[0].body.body.mesh.comm)
 
     def _led(self, function: Callable[[], T]) -> T:
-        """Call what is the same on all ranks: on rank 0 for all, unless every rank could go on alone."""
+        """Call what is the same on all ranks: on rank 0 for all, unless every rank could continue alone."""
         return function() if self.reduced else self.team.lead(function)
 
     def _unheated(self) -> tuple[tuple[HeatBody, ...], list[Array]]:
@@ -347,7 +347,7 @@ class HeatExchange:
 
     @property
     def _stages(self) -> tuple[float, ...]:
-        """How often each stage of a step counts."""
+        """Weight of each stage of a step."""
         return (1.0,) if self._steady else (EARLIER, 1.0)
 
     def _read(self, phase: int, values: Array, fluxes: list[Array]) -> tuple[Array, Array]:
@@ -380,7 +380,7 @@ class HeatExchange:
         """Return the coordinates at the end of a stage, the fluxes q_1 and q_2, and surface temperatures without them.
 
         Args:
-            further: What else flows into both (2 n, k).
+            further: Further fluxes into both (2 n, k).
         """
         free = [
             side.field.advance(kind, part, sources=sources)
@@ -475,7 +475,7 @@ class HeatExchange:
         Args:
             plan: The step.
             before, after: Of both bodies, at the start and at the end of the stages.
-            counted: How often the constant parts of a stage count in a step; 0 for changes.
+            counted: Weights of the constant parts of a stage in a step; 0 for changes.
         """
         stored, convected, held, carried = (np.zeros(after[0].shape[1:]) for _ in range(4))
         seconds = plan.seconds
@@ -581,7 +581,7 @@ class Isothermal(HeatExchange):
 
     @property
     def reduced(self) -> bool:
-        """Whether every rank could go on alone: it has no temperatures of all nodes."""
+        """Whether every rank could continue alone: it has no temperatures of all nodes."""
         return True
 
     def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:  # noqa: ARG002

@@ -32,7 +32,7 @@ CHUNK = 256  # right-hand sides at once
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """What coordinates of a body's temperature mean: by themselves, the temperatures of this rank's own nodes.
+    """Meaning of the coordinates of a body's temperature: by themselves, the temperatures of this rank's own nodes.
 
     Attributes:
         body: The body.
@@ -95,7 +95,7 @@ class TrackBasis(ReducedBasis):
 
     Attributes:
         reference: K.
-        modes: How many over a section.
+        modes: Number over a section.
         cells: Of the track.
     """
 
@@ -139,7 +139,8 @@ class HeatState:
     Attributes:
         bases: Of the punch and of the strip; none of bodies that stay at their initial temperature.
         values: Coordinates on the punch's and then on the strip's basis.
-        told: What is on its way back on a closed track, see `track`, where no basis has it; None for the initial state.
+        told: Temperatures that return on a closed track, see `track`, where no basis has them; None for the initial
+            state.
         surfaces: Temperatures of both contact surfaces at the interface nodes (n,), K, at the end of a step: a basis
             may leave out what fades within one. None where the coordinates say all.
     """
@@ -163,7 +164,7 @@ class HeatState:
 
     @property
     def track(self) -> Array | None:
-        """What is on its way back on the strip's closed track, see `TrackBasis.track`."""
+        """Temperatures that return on the strip's closed track, see `TrackBasis.track`."""
         basis = self.bases[1]
         return basis.track(self.values) if isinstance(basis, TrackBasis) else self.told
 
@@ -252,7 +253,7 @@ class Field(Protocol):
 
     @property
     def basis(self) -> Basis:
-        """What the coordinates mean."""
+        """Meaning of the coordinates."""
 
     @property
     def responses(self) -> Sequence[Array]:

@@ -2,17 +2,17 @@
 
 The reduced temperatures of a body, kept on disk for the next start like its condensed elasticity.
 
-How the temperature at the contact answers to the fluxes there, by the end of a step of the full field.
+The response of the contact's temperature to the fluxes there, by the end of a step of the full field.
 
 That is C A^-1 L, C the temperature at the contact nodes and L the loads of unit fluxes. Both touch the trace's degrees
 of freedom s alone, so that the Schur complement S of these in A has all of it, (A^-1)_ss = S^-1: one elimination in
 place of a solution for each contact node.
 
-How far the reduced temperatures of a body are from those of its whole mesh, at the contact.
+The difference of a body's reduced temperatures from those of its whole mesh, at the contact.
 
 Both are led through a cycle of its steps from rest, and to the steady state of the cycle's mean flux, by an even
-pressure, one that grows along the contact, and one at random. What is compared is what contact feels: the temperature
-at its nodes and the thermal gap beside a rigid motion, at the end of the cycle.
+pressure, one that grows along the contact, and one at random. The comparison is of the values that contact feels: the
+temperature at its nodes and the thermal gap beside a rigid motion, at the end of the cycle.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FLAT = 1e-6  # of the thermal gap: what of it is less beside a rigid motion coun
 
 @dataclass(frozen=True)
 class Trial:
-    """What a body's reduced temperatures are tried with.
+    """Trial of a body's reduced temperatures.
 
     Attributes:
         inflow: Loads of unit fluxes (owned, q).
@@ -50,7 +50,8 @@ class Trial:
         contact: Temperature at the contact nodes at the end of the cycle (n, owned).
         opened: Gap there (n, k), mm, by changes of the temperature of this rank's nodes (owned, k); collective.
         rigid: Gaps of rigid motions, orthonormal (n, r).
-        through: What takes temperatures where the fluxes enter to the contact nodes (n, q); None where they are these.
+        through: Interpolation of temperatures from the places of the fluxes to the contact nodes (n, q); None where
+            they are these.
     """
 
     inflow: csc_array
@@ -69,7 +70,7 @@ def certificate(
     Args:
         step: A stage of the whole body, which it advances by.
         velocity: Of its material in it, mm/s or rad/s.
-        surroundings: What the body meets.
+        surroundings: Boundary beyond the mesh.
         small: Its reduced temperature with this stage.
         trial: Fluxes, and what is compared.
     """
@@ -239,7 +240,7 @@ def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> Reduced
 
 
 def _parts(argument: object) -> Iterator[object]:
-    """Yield what tells an argument: arrays, and what has a text that tells all of it."""
+    """Yield the arrays of an argument, and objects whose text is complete."""
     if isinstance(argument, csc_array):
         yield from (argument.data, argument.indices, argument.indptr)
     elif isinstance(argument, Surroundings):
@@ -256,16 +257,16 @@ TRIES = 3  # of the basis, each ten times as sharp as the one before, and follow
 
 @dataclass(frozen=True)
 class BasisRequest:
-    """What a basis is to be made of, and how good.
+    """Parts of a basis, and its tolerance.
 
     Attributes:
         velocities: Of the body's material in all its steps, and in those of other stages that share the basis.
         duration: Of the shortest step, s.
         tolerance: Singular values below this fraction of the largest are dropped.
         difference: From the whole mesh that is let pass, relative.
-        surroundings: What the body meets.
+        surroundings: Boundary beyond the mesh.
         cycle: Which step each one of a cycle is.
-        way: How a basis is come by: made, or taken from what is kept.
+        way: Origin of a basis: made, or taken from what is kept.
     """
 
     velocities: Sequence[float]
@@ -293,8 +294,8 @@ def fitted_field(
         body: The body.
         steps: Prepared ones, the shortest first.
         own: Velocity of its material in each of them.
-        trial: What it is held against the whole mesh with, where the material has one velocity.
-        wish: What is wanted.
+        trial: Trial against the whole mesh, where the material has one velocity.
+        wish: Parts and tolerance of the basis.
         lasting: Temperature at the contact nodes, for a basis of what is felt a step later; None for all.
 
     Raises:

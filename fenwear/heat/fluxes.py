@@ -54,7 +54,7 @@ class Sources:
 
 @dataclass(frozen=True)
 class Exchanged:
-    """What the fluxes of a step follow from.
+    """Equations of the fluxes of a step.
 
     Attributes:
         responses: T_1 and T_2 (n, n), K mm²/mW.
@@ -146,7 +146,7 @@ class FluxFactor:
     """They by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 follows from q_1.
 
     Attributes:
-        step: What they follow from.
+        step: Their equations.
     """
 
     def __init__(self, step: Exchanged) -> None:
@@ -226,7 +226,7 @@ class FluxUpdate:
     Attributes:
         base: That factor.
         changed: Rows of the system that differ (2 k,).
-        added: What is added to their right-hand sides, y.
+        added: Addition to their right-hand sides, y.
     """
 
     def __init__(self, base: FluxFactor, step: Exchanged, nodes: NDArray[np.int64], rows: Array) -> None:
@@ -234,8 +234,8 @@ class FluxUpdate:
 
         Args:
             base: The factor.
-            step: What the fluxes follow from.
-            nodes: Those that differ (k,).
+            step: Equations of the fluxes.
+            nodes: Nodes that differ (k,).
             rows: Z, their rows times the inverse of the factor's matrix (2 k, 2 n).
         """
         self.base, self.changed = base, np.concatenate([nodes, nodes + len(step.conductance)])

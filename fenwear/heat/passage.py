@@ -28,7 +28,7 @@ class Passage:
 
     Args:
         middle: Both surfaces in the middle position.
-        sliding: How the strip's material moves for a unit of the motion, where its phases have no fields of their own.
+        sliding: Motion of the strip's material for a unit of the motion, where its phases have no separate fields.
         motion: To and fro, or a cycle as a table.
 
     Raises:
@@ -58,7 +58,7 @@ class Passage:
 
     @cached_property
     def ends(self) -> list[csr_array]:
-        """What takes values at `nodes` to the contact nodes at the end of each phase (n, q) each."""
+        """Interpolation from `nodes` to the contact nodes at the end of each phase (n, q) each."""
         return [csr_array(self._at(end)[:, self.nodes]) for end in self.motion.ends(self._sliding)]
 
     def steps(self, count: int) -> tuple[list[csr_array], list[list[int]]]:

@@ -39,7 +39,7 @@ class ReciprocatingField:
 
     Attributes:
         contacts: Temperature at the interface nodes over the places of each step (n,), K.
-        given_back: What of the convection is given back, for each kelvin of this rank's nodes in each step (k, owned).
+        given_back: Convection that is returned, for each kelvin of this rank's nodes in each step (k, owned).
     """
 
     def __init__(
@@ -124,12 +124,12 @@ class PassingStrip:
         heat: Settings of the heat.
         body: Conduction in the strip.
         passage: Where the punch is on it.
-        way: How a basis is come by.
+        way: Origin of the basis.
 
     Attributes:
         nodes: Temperature at the trace nodes of the passage (q, owned).
         loads: Unit loads there (owned, q).
-        around: What it meets beyond its mesh.
+        around: Boundary beyond its mesh.
     """
 
     def __init__(self, heat: Heat, body: HeatBody, passage: Passage, way: Way) -> None:

@@ -125,7 +125,7 @@ class JumpEnd:
 
     Args:
         propagator: State after a cycle from that at its start (dim, dim).
-        cycles: How many; infinitely many lead to the periodic state.
+        cycles: Their number; infinitely many lead to the periodic state.
     """
 
     def __init__(self, propagator: Array, cycles: float) -> None:
@@ -161,7 +161,7 @@ class CycleJump:
     Args:
         start: The state at its begin (dim,).
         cycle: The cycle.
-        cycles: How many; infinitely many lead to the periodic state.
+        cycles: Their number; infinitely many lead to the periodic state.
         gap_rows: Thermal gap of the coordinates at the end of each phase (n, dim), mm.
         gap_constants: The same where they are zero (n,), mm.
     """
@@ -196,7 +196,7 @@ class CycleJump:
         """Return the thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa; None for none.
 
         Args:
-            factors: What pressures are multiplied by for the heat (m, n).
+            factors: Factor of pressures for the heat (m, n).
         """
         return self._end.coupling(self._cycle, self._gap_rows) * factors
 

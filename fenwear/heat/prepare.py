@@ -146,8 +146,8 @@ def _in_place(
         inflow: Loads of unit fluxes (owned, n).
         rows: Of the gap that its expansion opens (n, owned), mm/K.
         plans: The steps of each phase.
-        around: What it meets.
-        rated: What its basis is to be like, and what it is tried with; None for the whole mesh.
+        around: Boundary beyond its mesh.
+        rated: Requirements of its basis, and its trial; None for the whole mesh.
         thickness: Of a plane model, mm.
     """
     field: FullField | ReducedField | TrackField
@@ -222,8 +222,8 @@ def opened_gap(
     Args:
         body: The body.
         pair: The contact.
-        rows: What each kelvin moves the surface along the normal at the contact nodes, or at those of the passage.
-        moved: What moves the surface in their place; None for the rows.
+        rows: Motion of the surface along the normal by each kelvin, at the contact nodes, or at those of the passage.
+        moved: Motion of the surface in their place; None for the rows.
         passage: Of a strip that passes under the punch: its end is looked at.
     """
     if moved is None:

@@ -7,12 +7,12 @@ scale, the slowest first: of each, what lies beside the basis so far. Of few flu
 in the end, of all scales together.
 
 Where there are many fluxes, most of them differ over a short wave length l, and warm a layer as thin as
-that for a time of l²/(4 pi² a) with the diffusivity a. What a step leaves of such fields no later one
-sees: there the singular values are those of the fields one step later, so that the basis stays as small
-on any mesh, and `ReducedField` adds what it leaves out to the contact temperature of the step itself.
-The fluxes whose fields last are found from random ones, in place of all n of them, a block beside the other until
-the last one brings what does not count (Halko, Martinsson and Tropp, SIAM Review 53, 2011). Each scale takes them a
-block after the other, until one brings nothing new.
+that for a time of l²/(4 pi² a) with the diffusivity a. Later steps do not see the rest of such fields: there the
+singular values are those of the fields one step later, so that the basis stays as small on any mesh, and `ReducedField`
+adds what it leaves out to the contact temperature of the step itself. The fluxes whose fields last are found from
+random ones, in place of all n of them, a block beside the other until the last one brings what does not count (Halko,
+Martinsson and Tropp, SIAM Review 53, 2011). Each scale takes them a block after the other, until one brings nothing
+new.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def reduced_basis(
         speeds: Velocities of its material; over a cycle they average out where they have both signs.
         duration: Of one step, s: the shortest time scale.
         tolerance: Singular values below this fraction of the largest are dropped.
-        surroundings: What lies beyond the mesh.
+        surroundings: Boundary beyond the mesh.
         lasting: Whether it holds what is felt a step later alone.
         passes: Over how many steps what moving material carries is followed, of the shortest scales.
     """
@@ -236,8 +236,8 @@ def _lasting_fluxes(
 ) -> Array:
     """Return loads (owned, k) of the fluxes whose fields are felt a step later, the most felt first; collective.
 
-    The principal ones of fields in material at rest, where they last longest. Those that hardly last leave the same
-    on any time scale: they count against the largest field of the slowest one, which the most felt fluxes make.
+    The principal ones of fields in material at rest, where they last longest. Short-lived fields leave the same on any
+    time scale: they count against the largest field of the slowest one, which the most felt fluxes make.
 
     Args:
         even: Loads of single fluxes of the same power (owned, n).

@@ -1,8 +1,8 @@
-"""What the exchange of heat knows of each body, and of the steps of a phase.
+"""Data of each body, and of the steps of a phase, for the exchange of heat.
 
 The time steps of a motion: which stages each body takes in them, and where on a strip that passes they are.
 
-How far the steps of a half-cycle are from the limit: what halving them changes of the contact temperatures.
+The error of the steps of a half-cycle: what halving them changes of the contact temperatures.
 
 Where the strip's material passes one way, its steady state is the same by any steps, and what they change is largest at
 the end of the first half-cycle, from rest on.
@@ -34,12 +34,12 @@ EARLIER = (1 - STAGE) / STAGE  # r: how often the first one counts
 
 @dataclass(frozen=True)
 class Reading:
-    """What is seen of a body at the end of a phase, with the contact where it is then.
+    """Temperatures and expansions of a body at the contact at the end of a phase.
 
     Attributes:
         contact: Temperature at the interface nodes (n,), K.
         gap: Gap that its thermal expansion opens (n,), mm.
-        left_out: What a unit flux of the last step adds to `contact` beside the coordinates (n, n); None for nothing.
+        left_out: Addition of a unit flux of the last step to `contact` beside the coordinates (n, n); None for nothing.
     """
 
     contact: Functional
@@ -54,7 +54,7 @@ class Side:
     Attributes:
         field: The coordinates and their steps.
         contacts: Temperature at the interface nodes over the places of every prepared step (n,), K.
-        readings: What is seen of it at the end of each phase.
+        readings: Its values at the contact at the end of each phase.
         balance: Heat stored, heat convected per second, and for every prepared step what enters per
             second at held temperatures by the end and by the start state, and what the moving
             material carries out; then for every prepared step what is given back; per thickness.
@@ -109,7 +109,7 @@ class StepPlan:
 
 @dataclass(frozen=True)
 class Fineness:
-    """How fine steps and basis are.
+    """Fineness of steps and basis.
 
     Attributes:
         steps: In each half-cycle.
@@ -227,7 +227,7 @@ class HeatedPassage:
     Attributes:
         body: On its whole mesh.
         velocity: Of its material, mm/s or rad/s.
-        surroundings: What it meets.
+        surroundings: Boundary beyond its mesh.
         load: That heats it (owned,), mW/mm.
         contact: Temperature at the contact nodes (n, owned).
         duration: Of the half-cycle, s.

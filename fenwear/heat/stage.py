@@ -5,10 +5,10 @@ and from the friction heat the fluxes follow, see `fenwear.heat.fluxes`:
 
     s' = D s + b + R (q + h_b (theta_c - theta_a)),
 
-where h_b gives back what a strip convects under the contact (see `fenwear.heat.passing_strip`; else it is zero). With D
-diagonal, or of one body, and C D kept, a stage takes a few products with matrices of as many rows as there are nodes.
+where h_b returns the convection of a strip under the contact (see `fenwear.heat.passing_strip`; else it is zero). With
+D diagonal, or of one body, and C D kept, a stage takes a few products with matrices of as many rows as there are nodes.
 
-What a step, or a stage of it, does to the small coordinates of both bodies at given conductances, as a linear map.
+The linear map of the reduced coordinates of both bodies over a step, or a stage of it, at given conductances.
 
     s' = P s + b + Q (friction heat),    P = P_0 + R M^-1 r(theta_0),
 
@@ -47,7 +47,7 @@ class HeatBalance:
 
 
 class PreparedStage:
-    """What a stage is, whatever conducts.
+    """Parts of a stage that do not depend on the conducting nodes.
 
     Args:
         motions: Of punch and strip.
@@ -91,7 +91,7 @@ class PreparedStage:
 
         Args:
             fluxes: At its conductances.
-            crossing: What a unit of a node's flux carries across the contact in the stage (n,), mm s.
+            crossing: Heat that a unit of a node's flux carries across the contact in the stage (n,), mm s.
         """
         made = fluxes.sources(np.eye(len(self.given_back)))
         by_temperature = np.hstack([made.first, made.second])
@@ -135,9 +135,9 @@ class Stage:
     """A stage at given conductances.
 
     Attributes:
-        prepared: What it is whatever conducts.
-        by_contact: What enters, q + h_b (theta_c - theta_a), and what of q crosses the contact into each body, from
-            theta_c - theta_a (2 n + 2, 2 n).
+        prepared: Its parts that do not depend on the conducting nodes.
+        by_contact: The flux that enters, q + h_b (theta_c - theta_a), and the part of q that crosses the contact into
+            each body, from theta_c - theta_a (2 n + 2, 2 n).
         by_heat: From the friction heat (2 n + 2, n).
         constant: At the ambient temperature without any (2 n + 2,).
     """

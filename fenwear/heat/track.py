@@ -6,15 +6,15 @@ carried out of the mesh for F T_0,
 
     C / N dT_c/dt = F (T_{c-1} - T_c) - G / N (T_c - theta_a),
 
-implicitly in each step together with the temperatures of the mesh, which T_N enters. What differs over the section
-comes back, too, less what has decayed until then: each mode phi_j of `fenwear.heat.track` by lambda_j over C / F,
+implicitly in each step together with the temperatures of the mesh, which T_N enters. Differences over the section
+return, too, as far as they have not decayed: each mode phi_j of `fenwear.heat.track` by lambda_j over C / F,
 
     C / N dB_c/dt = F (B_{c-1} - e^(lambda_j C / (N F)) B_c),   F B_0 = integral of rho c (v . n) theta phi_j,
 
 over the end by which the material leaves, in whose steady state e^(-lambda_j C / F) of what leaves comes back; at rest
 it decays by lambda_j. These modes carry no heat in all.
 
-What is left of the temperature's differences over the section of a closed track until its material comes back.
+Differences of temperature over the section of a closed track that remain until its material returns.
 
 Of material that enters the mesh through its free end, v . n < 0, a slab as thick as what enters in a second conducts
 heat over the section alone. Its modes phi_j, orthonormal in the flow of heat capacity, decay by lambda_j:
@@ -61,7 +61,7 @@ class Section:
 
     Attributes:
         entering: Loads of material that enters with a mode's temperature (owned, m), mW/(mm K).
-        leaving: What of a mode leaves for each kelvin (owned, m), mW/(mm K).
+        leaving: Flow of a mode out of the mesh for each kelvin (owned, m), mW/(mm K).
         rates: lambda (m,), 1/s.
     """
 
@@ -73,9 +73,9 @@ class Section:
         """Return the modes that steady temperatures of the mesh bring back to more than a share of their rise.
 
         Args:
-            leaving: What leaves of each mode over the flow of capacity (m, k), K, in k cases.
+            leaving: Outflow of each mode over the flow of capacity (m, k), K, in k cases.
             rise: Of the contact in each of them (k,), K.
-            until_back: How long the material is away, s.
+            until_back: Time of the material away from the mesh, s.
         """
         returns = np.abs(leaving) / np.expm1(self.rates * until_back)[:, None]
         kept = (returns > NOTED * rise).any(axis=1)
@@ -87,9 +87,9 @@ def section_modes(body: HeatBody, sliding: SlidingField, way: float, until_back:
 
     Args:
         body: The strip.
-        sliding: How its material moves for a unit speed.
+        sliding: Motion of its material for a unit speed.
         way: 1 or -1: of the speed.
-        until_back: How long material is away from the mesh at most speed, s.
+        until_back: Time of the material away from the mesh at the largest speed, s.
     """
     flow = body.flow(sliding)
     domain, law = body.body.mesh, body.law
@@ -190,14 +190,14 @@ GONE = 40.0  # e-folds after which nothing comes back
 
 @dataclass(frozen=True)
 class _Coupling:
-    """How the cells of a track meet the mesh in a step, each of them m modes over the section, and its bulk.
+    """Exchange of a track's cells with the mesh in a step, each with m modes over the section, and its bulk.
 
     Attributes:
         enters: Coordinates at the end for each kelvin that the material of the last cell enters warmer (dim, m + 1).
-        leaves: What is carried out a second into the first cell for each coordinate (m + 1, dim), mW/mm.
+        leaves: Flow into the first cell for each coordinate (m + 1, dim), mW/mm.
         constant: The same without any, and what the cells lose at the reference, as a gain (cells (m + 1),), mW/mm.
         stays: Capacity of a cell over the duration of the step, mW/(mm K).
-        takes: What a kelvin takes in all, inverted (cells (m + 1), cells (m + 1)), mm K/mW.
+        takes: Inverse of the heat that a kelvin takes (cells (m + 1), cells (m + 1)), mm K/mW.
     """
 
     enters: Array
@@ -214,7 +214,7 @@ class TrackField:
         inner: Of the strip, whose last inflows are what enters at a kelvin of each mode and of the bulk, scaled.
         steps: Of the strip.
         speeds: Of its material in each of them.
-        kelvins: What of the last inflows a kelvin is at unit speed (m + 1,).
+        kelvins: Share of the last inflows of a kelvin at unit speed (m + 1,).
         duration: Of a step, s.
         track: The bulk.
         section: The modes over its section.

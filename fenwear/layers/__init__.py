@@ -1,4 +1,4 @@
-"""What lies between the surfaces: debris, layers that give way, states that laws remember."""
+"""Layers between the surfaces: debris, compliant layers, states that laws remember."""
 
 from fenwear.layers.between import Layers, common_modulus, layers_of
 from fenwear.layers.conductance import conductance_of

@@ -1,14 +1,14 @@
-"""What lies between two surfaces, as one: what it adds to the gap of the nodes, and the rows of its state.
+"""All layers between two surfaces as one object: what it adds to the gap of the nodes, and the rows of its state.
 
     gap = bodies + winkler p + delta(p) - t + D,    p <= hardness
 
 with the linear closure, that of a law and of coatings by what is left of them (`closure`), the thickness of
 debris (`debris`) and the plastic depth D, which grows where the pressure is at the hardness. In one phase that is an
 upper bound of the inequality, and D grows by what the gap would be below zero (0 <= dD, p <= hardness, dD (p -
-hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface gives way in a solve by
-s (p - hardness) beyond it, s being SOFT times the elastic closure by a unit of pressure. This is put into the gap, and
-the contact is solved again: the excess falls to a part of itself each time (augmented Lagrangians; M. R. Hestenes, J.
-Optim. Theory Appl. 4, 1969, 303), until it is CAPPED of the hardness. What is linear in the pressure belongs to the
+hardness) = 0). Where phases flow together, in jumps, or nodes are many, the surface yields in a solve by s (p -
+hardness) beyond it, s being SOFT times the elastic closure by a unit of pressure. This is put into the gap, and the
+contact is solved again: the excess falls to a fraction each time (augmented Lagrangians; M. R. Hestenes, J.
+Optim. Theory Appl. 4, 1969, 303), until it is CAPPED of the hardness. Closures linear in the pressure belong to the
 compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
 """
 
@@ -56,19 +56,20 @@ Regions = tuple[Mapping[str, Array], Mapping[str, Array]]
 
 @dataclass(frozen=True)
 class Layers:
-    """What lies between the surfaces at n nodes.
+    """The layers between the surfaces at n nodes.
 
     Attributes:
         nodes: n.
-        closure: The law by which it gives way; None where it does not, or in proportion to the pressure.
+        closure: The law of its closure; None where it does not, or in proportion to the pressure.
         winkler: Closure over pressure of a linear layer (n,), mm/MPa; 0 without.
         debris: Of the third body.
         hardness: Largest pressure, MPa.
-        softness: By how much surfaces give way in a solve, over the pressure beyond the hardness, mm/MPa.
+        softness: Yield of the surfaces in a solve, over the pressure beyond the hardness, mm/MPa.
         memory: States of laws of one's own.
         begun: These at the start.
         strip_carries: Whether debris lies on the strip's material.
-        soft: Coatings of punch and strip that may give way beside their base; none where no law of wear is known.
+        soft: Coatings of punch and strip that may have a compliance beside their base; none where no law of wear is
+            known.
     """
 
     nodes: int
@@ -105,7 +106,7 @@ class Layers:
 
     @property
     def gives(self) -> Closure:
-        """The law by which it gives way, beside a linear layer; that of nothing where there is none."""
+        """The law of its closure, beside a linear layer; that of nothing where there is none."""
         return RIGID if self.closure is None else self.closure
 
     def given(self, pressure: Array, closure: Closure | None = None) -> Array:
@@ -119,16 +120,16 @@ class Layers:
 
     @property
     def curved(self) -> bool:
-        """Whether something gives way by a law that is not linear."""
+        """Whether a layer has a closure that is not linear."""
         return self.closure is not None or self.hardness < np.inf
 
     def gives_way(self, *, capped: bool) -> bool:
-        """Return whether something gives way by a law that is not linear, apart from what `capped` pressures flow."""
+        """Return whether a layer has a closure that is not linear, apart from the flow of `capped` pressures."""
         return self.softens or (self.closure is not None if capped else self.curved)
 
     @cached_property
     def softens(self) -> bool:
-        """Whether a coating gives way beside its base."""
+        """Whether a coating has a compliance beside its base."""
         return any(coating.modulus < np.inf for coating in self.soft)
 
     def coatings_left(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> tuple[Array, Array]:
@@ -146,12 +147,12 @@ class Layers:
         )
 
     def coatings_closure(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> CoatedClosure:
-        """Return by what coatings give way in each phase (m, n) at depths; arguments as of `coatings_left`."""
+        """Return the compliant coatings in each phase (m, n) at depths; arguments as of `coatings_left`."""
         left = self.coatings_left(pairs, punch, strip)
         return CoatedClosure(RIGID, tuple((own, soft.modulus) for own, soft in zip(left, self.soft, strict=True)))
 
     def closure_at(self, pair: ContactPair, worn: WornDepths) -> Closure | None:
-        """Return the law by which all that lies between gives way where these depths are worn, at one place."""
+        """Return the law of closure of all layers where these depths are worn, at one place."""
         if not self.softens:
             return self.closure
         coats = self.coatings_closure([pair], worn.punch, worn.strip).coatings
@@ -187,7 +188,7 @@ class Layers:
     def facing(self, pair: ContactPair, worn: WornDepths | None) -> Array:
         """Return the thickness of the debris between the surfaces at one place (n,), mm, by default that at the start.
 
-        What the strip carries is what lies opposite each node, which laws know of: where it is heaped up, quadratic
+        Values that the strip carries are those opposite each node, for the laws: where it is heaped up, quadratic
         elements fall below nothing beside it.
         """
         if worn is None or (self.strip_carries and not len(worn.carried)):
@@ -260,7 +261,7 @@ class Layers:
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 
     def closing(self, pressure: Array, *, capped: bool = False) -> Array:
-        """Return by how much pressures (m, n) close what gives way in a step by laws that are not linear, mm.
+        """Return the closure by pressures (m, n) in a step of layers that are not linear, mm.
 
         Where pressures are `capped` at the hardness what flows is left out.
         """
@@ -288,7 +289,7 @@ class Layers:
             pressure_of: Pressures (m, n) of what it returns.
 
         Raises:
-            ConvergenceError: phases go on to flow in turn.
+            ConvergenceError: phases continue to flow in turn.
         """
         flowed = np.zeros(self.nodes)
         found = solve(flowed)

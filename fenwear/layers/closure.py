@@ -1,4 +1,4 @@
-"""Layers that give way: the closure delta of a place by the pressure on it, beside the elasticity of the bodies.
+"""Compliant layers: the closure delta of a place by the pressure on it, beside the elasticity of the bodies.
 
     power          delta = r (p / p_1)^m
     exponential    p = p_1 (exp(delta / l) - 1)
@@ -183,7 +183,7 @@ class RoughClosure:
 
 
 class Rigid:
-    """Nothing gives way."""
+    """No compliance."""
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm: none."""
@@ -199,11 +199,11 @@ RIGID = Rigid()
 
 @dataclass(frozen=True)
 class CoatedClosure:
-    """A law and coatings that give way beside each other, each by what is left of it.
+    """A law and coatings in series, each coating by its remaining thickness.
 
     Attributes:
-        law: What else gives way.
-        coatings: What is left of each (..., n), mm, and its modulus M, MPa.
+        law: Further compliance.
+        coatings: Remaining thickness of each (..., n), mm, and its modulus M, MPa.
     """
 
     law: Closure

@@ -30,7 +30,7 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
     """Return h_c of the nodes (n,), N/(mm s K), by their pressures (n,), MPa; None where the case gives it otherwise.
 
     Args:
-        layers: What lies between.
+        layers: The layers.
         case: With heat.conductance = "layer".
         regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
         pair: The surfaces opposite each other.

@@ -15,8 +15,8 @@ wears W at a constant rate, that is exactly
     t -> e t + share W (1 - e) / x,        x = d q,   e = exp(-x),
 
 and one phase after the other makes a cycle t -> E t + G, linear in t. At a constant G that is the solution after whole
-cycles n of dt/dn = X (G / (1 - E) - t), X = -ln E, so that jumps take this as its rate. What is ejected in a march is
-metered by its own integral: there worn = stored + ejected is a check.
+cycles n of dt/dn = X (G / (1 - E) - t), X = -ln E, so that jumps take this as its rate. The debris ejected in a march
+has its own integral: there worn = stored + ejected is a check.
 
 Debris that the strip carries lies on its material: a place of it loses and gets in a phase what is its share of the
 contact then, as of wear, and takes it along. There it is the same cycle, of the strip's nodes.
@@ -81,12 +81,12 @@ class DebrisCycle:
 
     @cached_property
     def _stays(self) -> Array:
-        """What is left at the end of a unit worn in each phase (m, n)."""
+        """Share at the end of a unit worn in each phase (m, n)."""
         return self.share * self.kept
 
     @cached_property
     def _leaves(self) -> Array:
-        """What is ejected by then."""
+        """Debris ejected by then."""
         return 1 - self._stays
 
     @cached_property
@@ -150,7 +150,7 @@ class Debris:
         Args:
             slid: The distances.
             conditions: Of the phases, for a loss that changes with them.
-            onto: What puts it on the material of the body that carries it in each phase, as wear is put there; none
+            onto: Weights that put it on the material of the body that carries it in each phase, as wear; none
                 where it lies at the contact's nodes.
         """
         if not self.present:

@@ -1,4 +1,4 @@
-"""States that laws of one's own remember at the nodes of the contact: how they go on, and where they rest.
+"""States that laws of one's own remember at the nodes of the contact: their evolution and their rest.
 
 With the conditions of a phase of the motion, which lasts tau, the states y of a node follow dy/dt = r(y). A step of it
 is that of the exponential Rosenbrock and Euler method (M. Hochbruck, A. Ostermann, Acta Numerica 19, 2010), exact where
@@ -16,7 +16,7 @@ y_1 = y_0 + h f(y_1), by Newton's method with f' = Z. In the steady state F(y) =
 
 The strip's states are on its material. In a phase they are read at the contact's nodes as its worn depth is, and what
 they change by there is put back as wear is, by the shares of the strip's nodes that are under the punch; the rest of
-each goes on without pressure, speed and wear, at the initial temperature.
+each continues without pressure, speed and wear, at the initial temperature.
 """
 
 from __future__ import annotations
@@ -247,14 +247,14 @@ def _taken_away(z: Array) -> Array:
 
 @dataclass(frozen=True)
 class Evolution:
-    """What phases of the motion, or time steps, one after the other, do to the states.
+    """Change of the states by phases of the motion, or time steps, one after the other.
 
     Attributes:
         memory: The states.
         conditions: Of each phase; their own states do not count.
         durations: Of the phases (m,), s.
         pairs: The surfaces opposite each other in each phase.
-        worn: What both bodies lose at the contact's nodes in a second (n,), mm/s, in a phase at conditions.
+        worn: Wear rate of both bodies at the contact's nodes (n,), mm/s, in a phase at conditions.
         strip_depth: Worn off the strip (n_s,), mm.
         near: Where steps of many cycles look for their end; by default at their start.
     """
@@ -383,7 +383,7 @@ class Evolution:
         )
 
     def _comes_to_rest(self, going: Held, away: _Slopes) -> bool:
-        """Return whether a cycle takes away some of a disturbance wherever states still change."""
+        """Return whether a cycle reduces a disturbance wherever states still change."""
         pairs = ((going.contact, away.contact), (going.strip, away.strip))
         return all(not bool(((np.diagonal(part, axis1=1, axis2=2).T <= 0) & (rows != 0)).any()) for rows, part in pairs)
 
@@ -461,10 +461,10 @@ class _Rates:
 
     Attributes:
         states: By their names, Q of them.
-        given: What each rate asks for of variables that stay (n,), by name.
-        rows: What each rate asks for of the states, by name: their rows.
-        asked: What each rate asks for.
-        worn: What both bodies lose at states (n,), mm/s; None where no rate asks for it.
+        given: Variables of each rate that stay constant (n,), by name.
+        rows: States that each rate depends on, by name: their rows.
+        asked: Variables of each rate.
+        worn: Wear rate of both bodies at states (n,), mm/s; None where no rate asks for it.
     """
 
     states: Sequence[tuple[str, State]]

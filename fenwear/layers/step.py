@@ -1,4 +1,4 @@
-"""A step of half-cycles or cycles with what lies between: what its own pressures open, and how its state goes on."""
+"""A step of half-cycles or cycles with what lies between: the gap by its own pressures, and its change of state."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ NUDGE = 1e-6  # of the largest pressure, for differences
 
 @dataclass(frozen=True)
 class LayerEvolution:
-    """What phases of the motion, one after the other, wear and do to what lies between.
+    """Wear of phases of the motion, one after the other, and its effect on the layers.
 
     Attributes:
-        layers: What lies between.
+        layers: The layers.
         wear: Of these phases.
-        debris: What they do to it.
-        evolution: What they do to the states of laws; None without.
+        debris: Their effect on them.
+        evolution: Their effect on the states of laws; None without.
         ended: States of laws at their end, where they are known.
     """
 
@@ -57,7 +57,7 @@ class LayerEvolution:
             pressure: (m, n), MPa.
             before: Depths and state at the start of the step.
             cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
-            flowed: What is added to the plastic depth (n,), mm; by default nothing.
+            flowed: Addition to the plastic depth (n,), mm; by default nothing.
         """
         worn = self.wear.begun(before, cycles).worn(pressure)
         if not len(before.between) and not len(before.carried):
@@ -117,7 +117,7 @@ class LayerEvolution:
     def step(
         self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
     ) -> LayerStep | None:
-        """Return what the pressures of a step open in it; explicitly what gives way alone, None where nothing does.
+        """Return what the pressures of a step open in it; explicitly the compliance alone, None without one.
 
         Args:
             before, cycles: As of `worn`.
@@ -139,7 +139,7 @@ class LayerStep:
         passing: The phases.
         before: Depths and state at the start.
         cycles: Of the step; None for the phases once.
-        implicit: Whether wear opens the gaps of the step itself; else what gives way alone.
+        implicit: Whether wear opens the gaps of the step itself; else the compliance alone.
         capped: Whether the contact itself lets no pressure beyond the hardness.
     """
 
@@ -248,7 +248,7 @@ class LayerStep:
 
     @property
     def curved(self) -> bool:
-        """Whether something gives way by a law that is not linear."""
+        """Whether a layer has a closure that is not linear."""
         return self.passing.layers.gives_way(capped=self.capped)
 
     def layer(self, pressure: Array) -> Array | None:
@@ -259,7 +259,7 @@ class LayerStep:
         return found + self._coatings(pressure).slope(pressure) if self.passing.layers.softens else found
 
     def _depths(self, pressure: Array) -> tuple[Array, Array]:
-        """Return the depths of punch and strip by which coatings give way: those at the step's end."""
+        """Return the depths of punch and strip for the compliance of coatings: those at the step's end."""
         punch, strip = self.before.punch, self.before.strip
         if not self.implicit:
             return punch, strip
@@ -267,7 +267,7 @@ class LayerStep:
         return punch + self._length * lost.punch, strip + self._length * lost.strip
 
     def _coatings(self, pressure: Array) -> CoatedClosure:
-        """Return by what coatings give way in each phase (m, n)."""
+        """Return the compliant coatings in each phase (m, n)."""
         return self.passing.layers.coatings_closure(self.passing.wear.pairs, *self._depths(pressure))
 
     def _felt(self, pressure: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ FADES = 0.1  # of the thickness, over which the friction of a coating goes over 
 
 @dataclass(frozen=True)
 class Shares:
-    """What of A and B is worn at nodes (n,), w = coating A + base B, and the derivatives of w to A and B."""
+    """Worn parts of A and B at nodes (n,), w = coating A + base B, and the derivatives of w to A and B."""
 
     coating: Array
     base: Array
@@ -98,14 +98,15 @@ def coatings_of(pair: ContactPair, laws: tuple[WearLaw, WearLaw]) -> tuple[Array
 
 @dataclass(frozen=True)
 class SoftCoating:
-    """A coating that gives way beside its base, all of what is left of it alike, as if it were held sideways.
+    """A coating with a compliance beside its base, uniform over its remaining thickness, as if it were held sideways.
 
-    So it goes over to the base by itself: what gives way less and less is nothing where it is worn through. Its law is
+    So it goes over to the base by itself: its compliance falls to zero where it is worn through. Its law is
     in `fenwear.layers.closure`.
 
     Attributes:
         thickness: At the body's own contact nodes (n,), mm.
-        modulus: Small pressures over the share by which they compress it, MPa; infinite where it does not give way.
+        modulus: Small pressures over the share by which they compress it, MPa; infinite where it is as stiff as its
+            base.
     """
 
     thickness: Array
@@ -117,7 +118,7 @@ class SoftCoating:
 
 
 def soft_coatings(pair: ContactPair, laws: tuple[WearLaw, WearLaw]) -> tuple[SoftCoating, SoftCoating]:
-    """Return the coatings of punch and strip, which may give way beside their base.
+    """Return the coatings of punch and strip, which may have a compliance beside their base.
 
     Raises:
         CaseError: the thickness of one is negative somewhere.

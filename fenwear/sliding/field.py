@@ -3,7 +3,7 @@
 The counter-body moves as a rigid one, v = V + omega x (x - c), times the scalar law of the stroke. A
 translation is counted in mm, a rotation in rad: then speed, wear and heat vary over the contact.
 
-What nodes slide around an axis that passes through the contact of a solid.
+Sliding of nodes around an axis that passes through the contact of a solid.
 
 At the axis nothing slides, and a node there would never wear. It stands for its area, though. Where wear is even,
 k p^b v^a is the same all over it, so that its mean pressure is that of a node that slides

@@ -57,7 +57,7 @@ class Regions:
     Attributes:
         shares: Of the regions in the nodes (n,), by their names.
         mixed: Nodes that lie in several (k,).
-        near: What takes pressures (n,) to the means of the nearest nodes of each region (k, n), by their names.
+        near: Weights from pressures (n,) to the means of the nearest nodes of each region (k, n), by their names.
     """
 
     shares: Mapping[str, Array] = field(default_factory=dict)
@@ -181,7 +181,7 @@ class ContactConditions:
         temperatures: Of the punch's and the strip's surface (n,) each, K; the initial ones without heat.
         places: Of the nodes on the punch and on the strip's material (n, 3) each, mm.
         depths: Worn off punch and strip there (n,) each, mm.
-        slid: What each node has slid from the start (n,), mm.
+        slid: Distance that each node has slid from the start (n,), mm.
         regions: Of punch and strip in the nodes.
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
@@ -189,7 +189,7 @@ class ContactConditions:
         debris: Thickness of the third body (n,), mm.
         edge: Distance from the edge of the contact (n,), mm; None where nothing asks for it.
         friction_temperature: Which one friction depends on, see `FRICTION_TEMPERATURES`.
-        covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`.
+        covered: Remaining share of the friction of both bodies' coatings (n,), see `fenwear.sliding.coating`.
     """
 
     pressure: Array
@@ -269,17 +269,17 @@ class ContactConditions:
 
     @cached_property
     def _changed(self) -> tuple[ContactConditions, Mapping[str, Array], Mapping[str, Array]] | None:
-        """What it was made of, and the variables of punch and strip that changed."""
+        """Its origin, and the variables of punch and strip that changed."""
         return None
 
     @cached_property
     def _known(self) -> dict[str, dict[str, Array]]:
-        """What has been asked for by body."""
+        """Values computed so far, by body."""
         return {}
 
     @cached_property
     def derived(self) -> dict[str, Array]:
-        """What laws have made of it once, by name."""
+        """Results of laws, by name."""
         return {}
 
 

@@ -37,7 +37,7 @@ class Phase:
 
     Attributes:
         direction: Sliding direction d: 1 where the strip moves to +x, -1 to -x.
-        offset: How far the strip stands from its middle position towards +x, mm.
+        offset: Distance of the strip from its middle position towards +x, mm.
         duration: s.
         distance: Slid in it, mm.
         fraction: Of the cycle, at the middle of the phase.
@@ -325,7 +325,7 @@ def make_motion(description: Motions, *, strip_varies: bool = False, positions: 
     Args:
         description: Of the case.
         strip_varies: Whether the strip wears or is uneven, and passes under the punch: its positions matter by default.
-        positions: How many it takes then, where the case leaves them open.
+        positions: Their number then, where the case leaves them open.
 
     Raises:
         CaseError: it is faster than numbers are large.

@@ -1,4 +1,4 @@
-"""What of a pressure wears: q^b of equation (1), with q = min(X p, cap) - threshold >= 0.
+"""The part of a pressure that wears: q^b of equation (1), with q = min(X p, cap) - threshold >= 0.
 
 X is the share of the pressure that asperities carry. A number divides threshold and cap, and the coefficient has X^b.
 Of a share that depends on anything the coefficient has all that it changes.

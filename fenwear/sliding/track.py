@@ -1,8 +1,8 @@
 """The track of a counter-body: its border; and where it is closed, what is worn off it spreads along the whole of it.
 
-The track is made of rings: circles about the axis of a rotation, or lines along a translation, told apart by a
-coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. What a node wears
-off its own area w_i goes to the rings that this area crosses, by shares, and all along each of them:
+The track is made of rings: circles about the axis of a rotation, or lines along a translation, identified by a
+coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. The wear of a node on its
+area w_i goes to the rings that this area crosses, by shares, and all along each of them:
 
     depth of ring k = sum over i of (share of node i's area in ring k) w_i d_i / area of ring k.
 
@@ -42,8 +42,8 @@ class Border:
     """The border of what the punch sweeps of the strip, where its depth ends upright: sides and ends of a track.
 
     It runs through the areas of nodes: such an area is worn on the part of it that is swept, and as deep as beside it;
-    spread over the whole of it, the depth at the border would be the half, and what a punch feels there, too. What the
-    punch reads of the strip beyond is the depth inside: shape functions overshoot at a step.
+    spread over the whole of it, the depth at the border would be the half, and what a punch feels there, too. Beyond it
+    the punch reads the depth inside: shape functions overshoot at a step.
 
     Attributes:
         share: Of each strip node's area that is swept (n_strip,), 1 where nothing of it is.
@@ -130,7 +130,7 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
     Args:
         pair: The surfaces opposite each other.
         field: The motion of the strip for a unit of the stroke.
-        track: What closes the track: its length, mm, or 2 pi rad.
+        track: Closure of the track: its length, mm, or 2 pi rad.
     """
     length, found = track * field.rate(pair.strip.x, pair.strip.outward), csr_array(pair.wear_projection.shape)
     spread = _along_one if pair.punch.dim == 2 else _along_rings
@@ -240,7 +240,7 @@ def _is_flat(strip: ContactSurface, axis: Array) -> bool:
 
 @dataclass(frozen=True)
 class _Crossing:
-    """How the areas of a surface's pressure nodes lie across the track, in triangles.
+    """The areas of a surface's pressure nodes across the track, in triangles.
 
     Attributes:
         s: Of the triangles' corners (m, 3), ascending, mm.

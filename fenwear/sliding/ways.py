@@ -64,7 +64,7 @@ class SlidingTensor:
 
 @dataclass(frozen=True)
 class CycleShear:
-    """What coefficients may know of the whole cycle at the contact nodes.
+    """Variables of the whole cycle at the contact nodes, for coefficients.
 
     Attributes:
         ratio: Cross-shear ratios of the punch's and the strip's material there (n,) each.
@@ -77,7 +77,7 @@ class CycleShear:
 
 @dataclass(frozen=True, eq=False)
 class SlidingWays:
-    """What slides how far and where to in each phase of a cycle.
+    """Distances and directions of sliding in each phase of a cycle.
 
     Attributes:
         pairs: The surfaces in each phase.

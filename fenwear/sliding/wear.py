@@ -68,7 +68,7 @@ class WornDepths:
 
     @property
     def _kept(self) -> tuple[Array, Array, Array]:
-        """What is not worn; where nothing is, still as wide as the surface, which rows of a run have to be alike in."""
+        """Unworn parts; where nothing is, still as wide as the surface, which rows of a run have to be alike in."""
         return self.between, self.crept, self.carried
 
 
@@ -81,11 +81,11 @@ def _added(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True)
 class BodyWear:
-    """What a body loses in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears.
+    """Wear of a body in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears.
 
     Attributes:
         rate: At the interface nodes; zero where the body does not wear.
-        law: What of the pressure wears it.
+        law: Part of the pressure that wears it.
         pairs: The surfaces in each phase, where its nodes are not those of the contact.
         wears: Whether the body does.
     """
@@ -144,14 +144,14 @@ OF_BASE = Shares(*map(np.asarray, (0.0, 1.0, 0.0, 1.0)))
 
 @dataclass(frozen=True)
 class CoatedWear(BodyWear):
-    """What a coated body loses in each phase, of its coating as long as that lasts, and of the base, `rate` and `law`.
+    """Wear of a coated body in each phase, of its coating as long as that lasts, and of the base, `rate` and `law`.
 
     Attributes:
-        coating: What the coating would lose if it went on.
+        coating: Wear of the coating if it lasted.
         thickness: Of it at the body's own contact nodes, mm.
         left: Of it where a step begins (n_own,), mm.
         cycles: Length of the step, by which what is worn in a cycle is that of the whole step over it.
-        shares: What is worn of coating and base at the body's own nodes.
+        shares: Worn parts of coating and base at the body's own nodes.
         here: The same at the interface nodes.
     """
 
@@ -228,7 +228,7 @@ class PhasesWear:
 
     @property
     def bodies(self) -> tuple[BodyWear, ...]:
-        """Those that wear."""
+        """Bodies that wear."""
         return tuple(body for body in (self.punch, self.strip) if body.wears)
 
     @property
@@ -368,7 +368,7 @@ class StepWear:
 
     @property
     def curved(self) -> bool:
-        """Whether something gives way by a law that is not linear: nothing does."""
+        """Whether a coating has a compliance that is not linear: nothing does."""
         return False
 
     def layer(self, _pressure: Array) -> Array | None:
@@ -404,7 +404,7 @@ class Wear:
 
     @cached_property
     def _of_pressure(self) -> dict[str, PressureLaw]:
-        """What of a pressure wears each body, by its key."""
+        """Part of a pressure that wears each body, by its key."""
         laws = {"wear.punch": self.punch, "wear.strip": self.strip}
         share = self.friction.contact.uniform_share
         return {key: PressureLaw.of(law, share) for key, law in laws.items()}

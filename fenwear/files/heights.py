@@ -344,7 +344,9 @@ def _from_instrument(path: Path) -> Raw:
     unit = _unit(found.unit, "the map")
     if not found.is_uniform:
         return [np.asarray(found.positions()) * unit], np.asarray(found.heights()) * unit, []
-    z = np.ma.filled(np.ma.asarray(found.heights(), dtype=np.float64), np.nan)  # masked where there are holes
+    heights = found.heights()  # masked where there are holes
+    z = np.array(getattr(heights, "data", heights), dtype=np.float64)
+    z[np.broadcast_to(np.asarray(getattr(heights, "mask", False)), z.shape)] = np.nan
     axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, found.physical_sizes, strict=True)]
     return [axis * unit for axis in axes], z * unit, []
 

@@ -39,11 +39,11 @@ from fenwear.law_choice import resolve_law
 from fenwear.parallel import agreed, on_root
 from fenwear.plausibility import (
     HeatMonitor,
+    Seen,
     StateMonitor,
     law_warnings,
     passing_text,
     sliding_text,
-    system_warnings,
     unique_text,
     uniques,
 )
@@ -238,7 +238,7 @@ class _Run:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
-        self.warnings += [*law_warnings(system), *system_warnings(system)]
+        self.warnings += [*law_warnings(system), *Seen.of_system(system).warnings("system")]
         if self.case.leaves_positions and system.motion.positions > DEFAULT_POSITIONS:
             log(f"motion.positions: {system.motion.positions} are taken, about as near to each other as contact nodes")
         for warning in self.warnings:

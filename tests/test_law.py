@@ -10,7 +10,7 @@ import pytest
 from fenwear import CaseError, load_case
 from fenwear.assembly import assemble
 from fenwear.law_choice import check_decided, resolve_law
-from fenwear.plausibility import system_warnings
+from fenwear.plausibility import Seen
 from fenwear.run import run_case
 from fenwear.sweeps.variant import VariantRunner
 
@@ -54,7 +54,9 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     assert f"'{law}' is taken" in told[0]
     assert reason in told[0]
     if reason == "contact.transverse_friction":
-        assert "cannot be followed here: contact.transverse_friction" in system_warnings(found.system)[0]
+        assert (
+            "cannot be followed here: contact.transverse_friction" in Seen.of_system(found.system).warnings("system")[0]
+        )
 
 
 def test_the_estimate_decides_where_it_says() -> None:

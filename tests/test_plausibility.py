@@ -34,10 +34,6 @@ from fenwear.plausibility import (
     Seen,
     StateMonitor,
     elastic_way,
-    initial_warnings,
-    speed_warnings,
-    steady_warnings,
-    system_warnings,
 )
 from fenwear.plausibility.boundary import contact_chamfers, contact_limits, thickness
 from fenwear.plausibility.elastic import strain_and_rotation
@@ -204,10 +200,10 @@ def test_a_contact_grid_over_the_whole_surface(grid: str, assembled: Assembled) 
 def test_half_a_flat_is_clipped(assembled: Assembled, tmp_path: Path) -> None:
     """The same punch whose tag ends in the middle of its flat: told before anything is computed and by `steady`."""
     system = assembled(half_tagged(tmp_path), *FLAT)
-    (warning,) = initial_warnings(system)
+    (warning,) = Seen.of_start(system).warnings()
     assert "at x = 0 mm" in warning
     assert "Widen `punch_contact`" in warning
-    (warning,) = steady_warnings(system, steady(system))
+    (warning,) = Seen.of_steady(system, steady(system)).warnings()
     assert "at x = 0 mm" in warning
     assert "as wide as that surface, 30 mm" in warning
 
@@ -220,7 +216,7 @@ def test_steady_scar_of_a_cylinder(assembled: Assembled) -> None:
     system = assemble(make_case(tables))
     state = steady(system)
     assert state.contact_width.max() == pytest.approx(0.6, rel=1e-6)
-    (warning,) = steady_warnings(system, state)
+    (warning,) = Seen.of_steady(system, state).warnings()
     assert "as wide as that surface, 0.6 mm" in warning
 
 
@@ -264,12 +260,12 @@ def test_shakedown(name: str, factor: float, assembled: Assembled) -> None:
     for share, told in ((1.01, False), (0.99, True)):
         yields = f"materials.{material}.yield_stress={share * float(pressure) / factor * 3**0.5!r}"
         again = with_case(system, changed_case(system.case, yields))
-        texts = [text for text in initial_warnings(again) if "shakedown" in text]
+        texts = [text for text in Seen.of_start(again).warnings() if "shakedown" in text]
         assert bool(texts) == told
         if told:
             assert f"{factor:g} k by materials.{material}.yield_stress" in texts[0]
             capped = with_case(again, changed_case(again.case, f"contact.hardness='{10 * float(pressure)!r} MPa'"))
-            assert not [text for text in initial_warnings(capped) if "shakedown" in text]
+            assert not [text for text in Seen.of_start(capped).warnings() if "shakedown" in text]
 
 
 def test_molten(assembled: Assembled) -> None:
@@ -321,13 +317,13 @@ def test_elastic_way_against_stick(assembled: Assembled) -> None:
 
 def test_stroke_taken_up(assembled: Assembled) -> None:
     """The case itself slides as a whole: 3 %; a stroke that the bodies take up in part, or wholly, is told."""
-    assert system_warnings(pressed_by(assembled, 18.5, 25)) == []
-    assert system_warnings(pressed_by(assembled, 18.5, 10)) == []
-    (text,) = system_warnings(pressed_by(assembled, 18.5, 5))
+    assert Seen.of_system(pressed_by(assembled, 18.5, 25)).warnings("system") == []
+    assert Seen.of_system(pressed_by(assembled, 18.5, 10)).warnings("system") == []
+    (text,) = Seen.of_system(pressed_by(assembled, 18.5, 5)).warnings("system")
     assert 'contact.law = "coulomb"' in text
     assert "amplitude of 5 µm" in text
-    assert text in initial_warnings(pressed_by(assembled, 18.5, 5))
-    (text,) = system_warnings(pressed_by(assembled, 120, 3))
+    assert text in Seen.of_start(pressed_by(assembled, 18.5, 5)).warnings()
+    (text,) = Seen.of_system(pressed_by(assembled, 120, 3)).warnings("system")
     share = float(text.split(" % of the amplitude")[0].split()[-1])
     assert share > 100
 
@@ -335,12 +331,12 @@ def test_stroke_taken_up(assembled: Assembled) -> None:
 @pytest.mark.parametrize("name", ["example1", "rounded-punch"])
 def test_long_strokes_are_not_told(assembled: Assembled, name: str) -> None:
     """Strokes of millimetres."""
-    assert system_warnings(assembled(name, *(FLAT if name == "example1" else ()))) == []
+    assert Seen.of_system(assembled(name, *(FLAT if name == "example1" else ()))).warnings("system") == []
 
 
 def test_frictionless_stroke_is_not_told(assembled: Assembled) -> None:
     """Nothing follows where there is no friction."""
-    assert system_warnings(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")) == []
+    assert Seen.of_system(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")).warnings("system") == []
 
 
 CHAMFERED = """
@@ -471,7 +467,7 @@ def test_cases_and_templates_warn_of_nothing(name: str, tmp_path: Path) -> None:
         *position_warnings(system),
         *system.bodies.remarks,
         *plausibility_warnings(system.case),
-        *initial_warnings(system),
+        *Seen.of_start(system).warnings(),
     ] == []
 
 
@@ -505,13 +501,13 @@ def test_contact_on_a_few_nodes_is_told(assembled: Assembled, elements: int, few
     width = 2 * np.sqrt(4 * 18.5 * 6 / (np.pi * 2e5 / (2 * (1 - 0.09))))
     assert abs(zone.nodes[0] - width / (0.6 / (2 * elements))) < 2
     assert zone.free[0] == 2
-    told = [text for text in initial_warnings(system) if "across the contact" in text]
+    told = [text for text in Seen.of_start(system).warnings() if "across the contact" in text]
     assert bool(told) is few
     if few:
         wanted = int(told[0].rpartition(f"{key} = ")[2].strip("`"))
         assert 32 <= wanted <= 60  # with 60 there are 15 nodes
         finer = assembled("fretting", f"{key}={wanted}", "motion.positions=2")
-        assert not [text for text in initial_warnings(finer) if "across the contact" in text]
+        assert not [text for text in Seen.of_start(finer).warnings() if "across the contact" in text]
 
 
 def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: Path) -> None:
@@ -530,7 +526,9 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
     assert 0.6 / 60 < size < 0.6 / 32  # with 60 there are 15 nodes
     state = steady(assembled("example1", "geometry.degree=1", "geometry.parameters.elements_along_contact=4"))
     assert (state.phase_pressure > 0).all(axis=1).any()
-    assert not [text for text in steady_warnings(state.system, state) if "across" in text]  # five nodes, all of them
+    assert not [
+        text for text in Seen.of_steady(state.system, state).warnings() if "across" in text
+    ]  # five nodes, all of them
 
 
 CROWN = """
@@ -582,7 +580,7 @@ def test_slivers_below_a_contact_are_told(tmp_path: Path, field: int) -> None:
         "run": {"half_cycles": 2},
     }
     system = assemble(make_case(tables, tmp_path))
-    deep = [text for text in initial_warnings(system) if text.startswith("geometry: elements of the ")]
+    deep = [text for text in Seen.of_start(system).warnings() if text.startswith("geometry: elements of the ")]
     too_high = start(system).max() / 271.03
     if field:
         assert too_high == pytest.approx(1, abs=0.01)
@@ -611,7 +609,7 @@ def test_a_curve_that_is_meshed_as_a_polygon(assembled: Assembled, elements: int
             assert off < 1e-3 * pressure.max()
             assert told == ""
         else:
-            assert told in initial_warnings(straight)
+            assert told in Seen.of_start(straight).warnings()
             waves = float(re.findall(r"about ([\d.]+) MPa", told)[0])
             assert 0.4 * waves < off < 2 * waves
 
@@ -694,7 +692,7 @@ def test_strain_and_rotation_of_a_linear_displacement() -> None:
 def test_displacements_beyond_small_strain(assembled: Assembled, young: str, told: bool) -> None:
     """A block under 16.7 MPa stretches by 1.7 % or 17 %: `check` tells of the latter, with the size of the error."""
     both = [f"materials.{name}.young='{young}'" for name in ("composite", "steel")]
-    texts = [text for text in initial_warnings(assembled("example2", *FLAT, *both)) if "small strains" in text]
+    texts = [text for text in Seen.of_start(assembled("example2", *FLAT, *both)).warnings() if "small strains" in text]
     assert bool(texts) is told
     if told:
         assert 14 < float(re.findall(r"off by some (\d+) %", texts[0])[0]) < 22
@@ -705,11 +703,11 @@ def test_an_unstable_speed_is_foreseen(assembled: Assembled) -> None:
     critical = critical_speed(assembled("ring-on-ring-heat"), 1)
     for factor in (0.5, 2.0):
         fast = assembled("ring-on-ring-heat", f"motion.angular_speed={factor * critical!r}")
-        texts = speed_warnings(fast)
+        texts = Seen.of_system(fast).warnings("speed")
         assert bool(texts) is (factor > 1)
     assert f"{critical:.4g} rad/s" in texts[0]
     assert "is 2 times the critical speed" in texts[0]
-    assert not speed_warnings(assembled("example1-heat", *FLAT))  # to and fro
+    assert not Seen.of_system(assembled("example1-heat", *FLAT)).warnings("speed")  # to and fro
 
 
 def test_what_takes_longer_than_its_limit_ends() -> None:
@@ -808,7 +806,7 @@ def test_coarse_elements_beside_a_fine_contact_are_told(growth: float, told: boo
     }
     system = assemble(make_case(tables, meshes=meshes), MPI.COMM_SELF)
     too_high = start(system).max() / 271.03
-    texts = [text for text in initial_warnings(system) if "deep, too deep for the contact" in text]
+    texts = [text for text in Seen.of_start(system).warnings() if "deep, too deep for the contact" in text]
     assert bool(texts) is told
     if told:
         assert too_high > 1.15

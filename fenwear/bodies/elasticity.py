@@ -239,15 +239,8 @@ class ElasticBody:
         return int(self.dim**2 * self.body.mesh.comm.allreduce(pattern.num_nonzeros))
 
     def free_stiffness(self) -> PETSc.Mat:
-        """Return K without any supports, per thickness, MPa, of which K with them is made; collective."""
-        free = assembled(self._form)
-        if "stiffness" not in self.__dict__ and not self.is_factored:
-            matrix = free.copy()
-            start = self.dim * self.space.dofmap.index_map.local_range[0]
-            matrix.zeroRowsColumns((self.supported + start).astype(PETSc.IntType), diag=1.0)
-            matrix.setOption(PETSc.Mat.Option.SPD, True)
-            self.__dict__["stiffness"] = matrix
-        return free
+        """Return K without any supports, per thickness, MPa; collective."""
+        return assembled(self._form)
 
     @cached_property
     def stiffness(self) -> PETSc.Mat:

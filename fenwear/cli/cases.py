@@ -147,7 +147,7 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
     from fenwear.heat.periodic import cycle_memory
     from fenwear.optimum import motion_words
     from fenwear.parallel import memory_size
-    from fenwear.plausibility import fineness_text, initial_warnings
+    from fenwear.plausibility import Seen, fineness_text
     from fenwear.run import position_warnings
 
     loaded, number = system.case, stability_number(system)
@@ -157,7 +157,7 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
         *position_warnings(system),
         *system.bodies.remarks,
         *plausibility_warnings(loaded),
-        *initial_warnings(system),
+        *Seen.of_start(system).warnings(),
     ]
     warm, of_heat = _with_heat(system, heat_seconds)
     warnings += of_heat
@@ -188,7 +188,7 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
     from fenwear.errors import TimeUpError
-    from fenwear.plausibility import fineness_warnings, speed_warnings
+    from fenwear.plausibility import Seen
     from fenwear.signals import time_limit
 
     if system.heat is None:
@@ -199,7 +199,8 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
         with time_limit(seconds, system.comm):
             warm = with_reduced_heat(system, keep=True)
             jumps = system.case.run.integration == "jump"
-            warnings = [*heat_warnings(heat_gain(warm), jumps=jumps), *fineness_warnings(warm), *speed_warnings(warm)]
+            seen = Seen.of_system(warm)
+            warnings = [*heat_warnings(heat_gain(warm), jumps=jumps), *seen.warnings("heat", "speed")]
     except TimeUpError:
         text = (
             f"heat: not looked at, as it takes more than {seconds:g} s; `run` and `steady` begin as slowly. Use fewer "

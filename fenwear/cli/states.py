@@ -98,16 +98,16 @@ def _gain(system: Tribosystem, state: SteadyState) -> dict[str, Any]:
     """Return the thermoelastic feedback and the warnings of a state, and log the warnings."""
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
-    from fenwear.plausibility import fineness_warnings, steady_warnings
+    from fenwear.plausibility import Seen
 
     warm = with_reduced_heat(state.system)
     gain = heat_gain(warm, state.phase_pressure, None if state.heat is None else state.heat.end)
     warnings = [
         *system.bodies.remarks,
         *plausibility_warnings(system.case),
-        *steady_warnings(state.system, state),
+        *Seen.of_steady(state.system, state).warnings(),
         *heat_warnings(gain),
-        *fineness_warnings(system),
+        *Seen.of_system(system).warnings("heat"),
     ]
     for warning in warnings:
         log(f"warning: {warning}")
@@ -166,10 +166,10 @@ def _uncertain(state: SteadyState) -> dict[str, Any]:
 
 def _show_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
     """Show the shape to which partial slip wears."""
-    from fenwear.plausibility import final_warnings
+    from fenwear.plausibility import Seen
 
     found, numbers = final_of(system)
-    numbers["warnings"] = final_warnings(found)
+    numbers["warnings"] = Seen.of_final(found).warnings()
     for warning in numbers["warnings"]:
         log(f"warning: {warning}")
     answer(numbers, lambda: f"end of the wear of {name} in partial slip\n{final_text(numbers)}", as_json=as_json)

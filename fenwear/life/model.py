@@ -24,7 +24,7 @@ from fenwear.cycle.totals import Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
-from fenwear.plausibility import system_warnings
+from fenwear.plausibility import Seen
 from fenwear.results.summary import within
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.final import FinalShape, cycle_of_final
@@ -117,7 +117,7 @@ class Model:
 
     def stick_left_out(self) -> list[str]:
         """Return what is to be said of stick that the case leaves out, with an estimate of it."""
-        return system_warnings(self.system())
+        return Seen.of_system(self.system()).warnings("system")
 
     def _check_stays(self) -> None:
         """Reject laws that change throughout a run where a steady state is asked for.

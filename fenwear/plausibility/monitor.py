@@ -8,49 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import ContactSetup, Tribosystem
-from fenwear.cycle import Block, SteadyState, heat_gain, heat_warnings
+from fenwear.assembly import Tribosystem
+from fenwear.cycle import Block, heat_gain, heat_warnings
 from fenwear.heat.field import HeatState
 from fenwear.plausibility.rules import RULES, Made, Seen, fineness_of, remarks
 from fenwear.stick.program import passes
 
 if TYPE_CHECKING:
-    from fenwear.stick.final import FinalShape
     from fenwear.stick.records import TimeStepRecords
 
 STEPS, CHANGE, DIFFERENCE = "heat_steps", "heat_change_by_halving_steps", "heat_difference_from_whole_mesh"
 GAIN = "heat_gain"
 KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is said of each
-
-
-def initial_warnings(system: Tribosystem) -> list[str]:
-    """Return the warnings about the contact before any wear; collective."""
-    return list(remarks(Seen.of_start(system)).values())
-
-
-def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
-    """Return the warnings about a cyclic steady state; collective."""
-    return list(remarks(Seen.of_steady(system, state)).values())
-
-
-def final_warnings(found: FinalShape) -> list[str]:
-    """Return the warnings about the shape to which partial slip wears; collective."""
-    return list(remarks(Seen.of_final(found)).values())
-
-
-def system_warnings(system: Tribosystem) -> list[str]:
-    """Return the warnings about a system before it is solved: the unit of its mesh, and its stroke; collective."""
-    return list(remarks(Seen.of_system(system), "system").values())
-
-
-def fineness_warnings(system: ContactSetup) -> list[str]:
-    """Return the warnings about steps, bases and elements of the heat that are too coarse; collective."""
-    return list(remarks(Seen.of_system(system), "heat").values())
-
-
-def speed_warnings(system: Tribosystem) -> list[str]:
-    """Return the warning about a speed that is thermo-elastically unstable; takes some steady heats; collective."""
-    return list(remarks(Seen.of_system(system), "speed").values())
 
 
 def fineness_text(system: Tribosystem) -> str:

@@ -169,6 +169,10 @@ class Seen:
         """Where the contact is clipped; collective at the first call."""
         return self.made.limits
 
+    def warnings(self, *kinds: str) -> list[str]:
+        """Return the warnings about it, of its own kind or of others; collective."""
+        return list(remarks(self, *kinds).values())
+
 
 def _balances(made: Made, block: Block) -> dict[str, Array]:
     """Return the errors of the balances of each half-cycle (k,), relative, by name."""

@@ -15,7 +15,7 @@ from fenwear.contact.complementarity import complementarity_error
 from fenwear.contact.condensed import CondensedContact
 from fenwear.cycle.jump_step import FINE, LOOSEST
 from fenwear.interface import compliance
-from fenwear.plausibility import StateMonitor, steady_warnings
+from fenwear.plausibility import Seen, StateMonitor
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
 
@@ -43,7 +43,7 @@ def test_of_runs_and_steady_states(assembled: Callable[..., Tribosystem]) -> Non
     assert block.complementarity_error.max() < 1e-8
     state = steady(system)
     assert state.complementarity_error < 1e-8
-    assert not [text for text in steady_warnings(system, state) if "p gap = 0" in text]
+    assert not [text for text in Seen.of_steady(system, state).warnings() if "p gap = 0" in text]
 
 
 def test_jumps_solve_grids_to_a_share_of_their_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, mar
 from fenwear.case.program import cycle_of, read_program, stages_of
 from fenwear.cycle import Block, Span, at_step, evolve, follow_program, program
 from fenwear.errors import CaseError
-from fenwear.plausibility import system_warnings
+from fenwear.plausibility import Seen
 from tests.results.test_contacts import two_pads
 
 Edited = Callable[..., Case]
@@ -110,7 +110,7 @@ def test_distance_where_the_strip_turns() -> None:
         load_case("example1", ["program.radius=3", "program.steps=[{cycles=3}]", "run.half_cycles=6"])
     small = ("geometry.parameters.across=2", "geometry.degree=2", "run.half_cycles=6")
     case = load_case("ring-on-ring", [*turning, *small, "program.radius=31", "program.steps=[{cycles=6}]"])
-    (told,) = system_warnings(assemble(case))
+    (told,) = Seen.of_system(assemble(case)).warnings("system")
     assert told.startswith("program.radius: ")
     assert all(number in told for number in ("31 mm", "20 and 30 mm", "25.33 mm"))  # 2/3 (30³ - 20³) / (30² - 20²)
 

@@ -12,7 +12,7 @@ from fenwear.assembly import expansions, with_exchange, with_reduced_heat
 from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.heat.fitted import rigid_gaps
 from fenwear.heat.prepare import opened_gap
-from fenwear.plausibility import fineness_text, fineness_warnings
+from fenwear.plausibility import Seen, fineness_text
 from fenwear.stick.heat import free_expansion
 
 COARSE = ("geometry.degree=2", "geometry.parameters.strip_length=160", "geometry.parameters.strip_height=16")
@@ -98,7 +98,7 @@ def test_a_basis_that_cannot_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     assert fineness is not None
     assert fineness.difference is not None
     assert fineness.difference > 5e-3
-    (told,) = (text for text in fineness_warnings(system) if "whole mesh" in text)
+    (told,) = (text for text in Seen.of_system(system).warnings("heat") if "whole mesh" in text)
     assert told.startswith("heat.reduction_tolerance: ")
     assert "heat.reduction_difference = 0.002" in told
     assert f"those of the whole mesh to {fineness.difference:.2g}" in fineness_text(system)

@@ -10,7 +10,7 @@ import pytest
 from fenwear import ConvergenceError, assemble, load_case
 from fenwear.cli.cases import check_text
 from fenwear.cli.states import final_of, final_text
-from fenwear.plausibility import final_warnings
+from fenwear.plausibility import Seen
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "stick.steps=6")
 
@@ -31,10 +31,10 @@ def test_a_scar_that_reaches_the_end_is_told(grid: tuple[str, ...]) -> None:
     width = [] if grid else ["geometry.parameters.contact_width='0.19 mm'"]
     found, _ = final_of(assemble(load_case("fretting-partial-slip", [*coarse, *width, *grid])))
     assert found.depth[[0, -1]].all()
-    (warning,) = final_warnings(found)
+    (warning,) = Seen.of_final(found).warnings()
     needed = float(re.findall(r"a width of about ([0-9.]+) mm", warning)[0])
     assert 0.19 < needed < 0.3
-    assert final_warnings(final_of(assemble(load_case("fretting-partial-slip", coarse)))[0]) == []
+    assert Seen.of_final(final_of(assemble(load_case("fretting-partial-slip", coarse)))[0]).warnings() == []
 
 
 def test_the_end_carries_the_load_where_it_sticks() -> None:

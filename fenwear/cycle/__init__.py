@@ -1,7 +1,7 @@
 """The cycle controller: march half-cycle by half-cycle, jump over cycles, or solve for the end.
 
 `march` and `jump` yield blocks of half-cycles; `steady` returns the cyclic steady state. Their loop is `driver`, and
-which of them a case asks for is read in `evolve.integrate`. How a step goes the law of contact says: `gross_sliding`
+which of them a case asks for is read in `evolve.integrate`. The law of contact gives the step: `gross_sliding`
 here, whose wear is taken off in `phase` and over many cycles in `jump_step`; `fenwear.stick.coulomb` beside it.
 """
 

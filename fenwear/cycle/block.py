@@ -83,7 +83,7 @@ class Block:
     """k consecutive records of half-cycles, of n contact nodes.
 
     Attributes:
-        system: What they were computed on.
+        system: Their system.
         half_cycle: Number of each half-cycle (k,), from 1.
         direction: Its sliding direction d (k,).
         pressure: p in its middle position (k, n), MPa.
@@ -94,8 +94,8 @@ class Block:
         crept: State of what creeps at its end, as `fenwear.assembly.Creep` has it (k, size).
         carried: States of the strip's material that laws remember (k, rows, n_strip).
         rigid: Amplitudes of the rigid modes there (k, modes).
-        totals: What all half-cycles up to its end add up to, k of them.
-        adds: What it adds itself, k of them.
+        totals: Totals of all half-cycles up to its end, k of them.
+        adds: Its own additions, k of them.
         optimum_distance: Share of the load that is carried elsewhere than in the optimum: half the integral of the
             difference to the optimal pressure of the present contact zone, over the pressure's (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
@@ -103,11 +103,11 @@ class Block:
         equilibrium_error: Largest error of the force and moment balance relative to the contact force (k,).
         complementarity_error: Largest error of p >= 0, gap >= 0 and p gap = 0 at a node in any phase, over their scales
             (k,): see `fenwear.contact.complementarity`.
-        retries: What had to be solved in another way in it, a count (k,).
+        retries: Number of its solves in another way (k,).
         heat: Temperatures and heat balance; None without heat.
-        remedies: How it was solved then, and how often.
+        remedies: Other ways of solving, with their counts.
         load_factor: Of all loads in it (k,).
-        end: From where the run goes on.
+        end: State from which the run continues.
         steps: Time steps of each half-cycle, where the law of contact resolves it in time; else none.
         friction_ratio: tau of each in its middle position (n, d), k of them.
         sliding: Tensor of the sliding of a cycle that is a table in a solid, of the work, k of them; else none.
@@ -202,15 +202,15 @@ class Block:
 
 @dataclass(frozen=True)
 class PhaseRecord:
-    """What one phase of a half-cycle came to.
+    """Result of one phase of a half-cycle.
 
     Attributes:
         phase: Its number in the cycle.
         contact: Its contact.
         before: Pressure of the same phase one cycle ago (n,), MPa; NaN in the first cycle.
-        adds: What it adds to the totals.
+        adds: Its additions to the totals.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
-        equilibrium: What it is in; by default that of the phase.
+        equilibrium: Its half-cycle; by default that of the phase.
     """
 
     phase: int
@@ -396,7 +396,7 @@ class Recorder:
     def _optimum(self, direction: int, pressure: Array) -> Array:
         """Return the optimal pressure on the present contact zone, NaN where there is none.
 
-        So where a threshold or cap leaves none, nodes stick, or directions change. Solved anew only when the zone
+        So where a threshold or cap leaves none, nodes stick, or directions change. Solved again only when the zone
         changes.
         """
         if not self._slides_one_way:

@@ -73,12 +73,12 @@ def check_cycle_memory(system: Tribosystem) -> None:
 
 @dataclass(frozen=True)
 class DepthEvolution:
-    """How the worn depths of an implicit step follow from its pressures.
+    """The worn depths of an implicit step from its pressures.
 
     Attributes:
         before: Depths that it begins with.
         cycles: Its length.
-        wear: What a cycle wears at pressures (m, n), at the coefficients last taken.
+        wear: Wear of a cycle at pressures (m, n), at the last coefficients.
         half_cycles: Done since the start of the run, at its end.
     """
 
@@ -95,7 +95,7 @@ class DepthEvolution:
 
 @dataclass(frozen=True)
 class Solved:
-    """What `Coupled.solve` has found.
+    """Result of `Coupled.solve`.
 
     Attributes:
         contact: Of all phases.
@@ -171,7 +171,7 @@ class Coupled:
 
     Attributes:
         heat: Of whole cycles. Linear in mu p: where mu is not constant its own mu is 1.
-        mu: What the pressures are to be multiplied by for `heat` (m, n): what friction heats.
+        mu: Factor of the pressures for `heat` (m, n): what friction heats.
         held: States that laws remember, at the end of a step or at rest; None without, and before.
     """
 
@@ -204,10 +204,10 @@ class Coupled:
 
         Args:
             temperature: Before (dim,).
-            cycles: How many; infinitely many give the periodic temperature.
+            cycles: Their number; infinitely many give the periodic temperature.
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
-            passing: How depths follow from the pressures, where coefficients depend on depth or distance.
+            passing: Depths from the pressures, where coefficients depend on depth or distance.
             lagged: Whether contact of many nodes is solved at the heat of pressures that are known, again and again:
                 the factor without heat serves all of them, where one with heat is of all phases together.
 

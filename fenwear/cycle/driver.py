@@ -88,7 +88,7 @@ class Jumps(Step, Protocol):
 
 @dataclass(frozen=True)
 class RunLimits:
-    """How far to go, and where to stop on the way.
+    """End of the run, and stops on the way.
 
     Attributes:
         half_cycles: The last one at most.
@@ -132,7 +132,7 @@ def run_steps(system: Tribosystem, step: Step, state: RunState, course: RunLimit
 
 
 class _Stretch(NamedTuple):
-    """What was done: a block, the state at its end, whether all is, and the error that ended it."""
+    """Results: a block, the state at its end, whether all is, and the error that ended it."""
 
     block: Block | None
     state: RunState

@@ -64,9 +64,9 @@ def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **cou
     Args:
         system: The assembled problem.
         how: "explicit", "implicit" or "jump".
-        span: How far, and under which loads.
+        span: Length, and loads.
         tolerance: Of jumps.
-        course: What `march` and `jump` share: where it starts, and what ends it before.
+        course: Common part of `march` and `jump`: where it starts, and what ends it before.
     """
     if how == "jump":
         return _told_of_heat(system, jump(system, span.until, tolerance=tolerance, loading=span.loading, **course))

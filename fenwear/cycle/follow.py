@@ -1,14 +1,14 @@
-"""What changes slowly: meshes follow the worn shape, contact grids the contact, properties the temperature.
+"""Slow changes: meshes follow the worn shape, contact grids the contact, properties the temperature.
 
 Small wear is an offset of the gap. When it grows past a share of the elements' height at the contact,
-both meshes move by the depths worn so far, all operators are made anew, and temperatures keep their
+both meshes move by the depths worn so far, all operators are made again, and temperatures keep their
 place in space: theta(x + s) = theta + grad theta . s at a node that moves by s.
 
-Where properties of materials depend on the temperature, the bodies are made anew, on the same meshes, at the end of a
+Where properties of materials depend on the temperature, the bodies are made again, on the same meshes, at the end of a
 cycle after which one has changed by more than heat.property_tolerance: see `fenwear.assembly.variants`.
 
-When all that happens is found by thresholds. A run may be told instead when another one did, so that what comes of it
-is a smooth function of what the two differ by.
+When all that happens is found by thresholds. A run may follow at the half-cycles of another one, so that its results
+are a smooth function of their difference.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]],
 
 
 class Renewal(Enum):
-    """What is made anew."""
+    """Parts that are updated."""
 
     MESHES = "meshes"
     PROPERTIES = "properties"
@@ -66,11 +66,11 @@ def follow(
     Args:
         system: The assembled problem.
         integrate: Yields the blocks on one system, such as `march` with its arguments.
-        start: Where to go on from; by default the beginning.
-        adapt: What is to be made of the system of the case on moved meshes, such as another motion; collective.
-        given: After which half-cycles something is made anew, and nothing else is; by default where it is large.
+        start: State to continue from; by default the beginning.
+        adapt: Change of the system of the case on moved meshes, such as another motion; collective.
+        given: Half-cycles after which parts are updated, and at no other; by default where it is large.
         heights_of: Another system on the same meshes, whose elements' heights are known.
-        told: Called with every half-cycle after which something is made anew.
+        told: Called with every half-cycle after which parts are updated.
 
     Raises:
         ConvergenceError: as `integrate`.
@@ -94,7 +94,7 @@ def follow(
 def _renewed(
     system: Tribosystem, state: RunState, renewal: Renewal, adapt: Callable[[Tribosystem], Tribosystem]
 ) -> tuple[Tribosystem, RunState]:
-    """Return the system with what is made anew, and the state on it; collective."""
+    """Return the updated system, and the state on it; collective."""
     if renewal is Renewal.MESHES:
         warmed = None if state.temperature is None else state.temperature.temperatures()
         moved = adapt(renewed(system, state.worn, warmed))
@@ -127,7 +127,7 @@ class _Leaving:
         return self._renewal(state, partial(self.system.team.each, self, "is_warm")) is not None
 
     def renewal(self, state: RunState) -> Renewal | None:
-        """Return what is to be made anew; collective."""
+        """Return the parts to update; collective."""
         return self._renewal(state, self.is_warm)
 
     def _renewal(self, state: RunState, is_warm: Callable[[RunState], bool]) -> Renewal | None:
@@ -142,7 +142,7 @@ class _Leaving:
         return Renewal.GRID if grows else None
 
     def is_warm(self, state: RunState) -> bool:
-        """Return whether a whole cycle ends at temperatures for which properties are to be taken anew; collective."""
+        """Return whether a whole cycle ends at temperatures for which properties need an update; collective."""
         whole = state.half_cycle % self.system.motion.half_cycles == 0
         return whole and properties_outdated(self.system, state.temperature)
 

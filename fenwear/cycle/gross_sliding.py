@@ -65,7 +65,7 @@ class SmallerSteps:
     """Half-cycles that do not converge, tried again from where they began in smaller steps.
 
     Each phase is cut into parts of equal time at the same position of the strip. Each part has a contact of its own,
-    wears its share, and heats for its share of the time. What they need is made at the first one and kept.
+    wears its share, and heats for its share of the time. Their data are made at the first one and kept.
 
     Args:
         system: The assembled problem.
@@ -306,7 +306,7 @@ class GrossSliding:
         return placed if placed.law == self.name else replace(placed, law=self.name)
 
     def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could go on alone."""
+        """Return whether every rank could continue alone."""
         return system.exchange.reduced
 
     def elastic_length(self, system: Tribosystem) -> float:

@@ -1,9 +1,9 @@
 """Cycle jumps: N cycles in one implicit step, N chosen by an error estimate; the law of contact says how.
 
-What the jumps of a run come to together is more or less than the sum of their errors: a jump takes on what those before
-it have left, and wear evens it out. Beside a state y a run may have its `finer`, y - e, where e goes on as the next
-jump takes it, and that jump's own error is added (the global error by local extrapolation beside the solution, as of
-R. D. Skeel, BIT 26, 1986): how fast errors fade is found by the jumps themselves.
+The error of all jumps of a run differs from the sum of their errors: a jump takes on what those before
+it have left, and wear evens it out. Beside a state y a run may have its `finer`, y - e, where e continues as the next
+jump takes it, and that jump's own error is added (the global error by local extrapolation beside the solution, as of R.
+D. Skeel, BIT 26, 1986): how fast errors fade is found by the jumps themselves.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def jump(
         half_cycles: Where to end, a whole number of cycles.
         tolerance: Largest estimated error of one jump, see `fenwear.cycle.jump_method.Estimate`.
         periodic_within, block, leave, watch: As of `fenwear.cycle.driver.RunLimits`; the change per cycle counts.
-        start: Where to go on from, such as the end of a block; by default the beginning.
+        start: State to continue from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.
         loading: Factor of all loads, continuous: a stage takes that of its own time, so that the error estimate
             sees how it changes.

@@ -47,8 +47,8 @@ LOOSEST = 5e-3  # tolerance that contacts are solved to: of a rough run, too, th
 class _Rate:
     """What the cycle of a solved stage changes of temperature (dim,), depths and totals.
 
-    Its conductances (m, n) are those by which it is heated. What is worn through coatings depends on where a step
-    begins and how long it is: `wear` is that of its phases.
+    Its conductances (m, n) are those by which it is heated. Wear through coatings depends on the begin and the length
+    of a step: `wear` is that of its phases.
     """
 
     heated: Array
@@ -247,7 +247,7 @@ class Stepper(JumpLaw[_Moment]):
     def stage(self, before: _Moment, cycles: float, time: float, near: ContactState, digits: float) -> _Moment:
         """Return the moment `cycles` cycles later, by the cycle whose middle it is.
 
-        What flows is no rate: all of it is there after as many cycles.
+        Plastic flow is no rate: all of it is there after as many cycles.
         """
         self._solve_to(digits)
         self._press(time)

@@ -57,7 +57,7 @@ def monotonic(system: Tribosystem, *, properties_within: float | None = None) ->
 
     Raises:
         CaseError: the case has no heat, or a body loses heat nowhere; a property that is not positive.
-        ConvergenceError: there is no optimum, or properties and temperatures do not come together.
+        ConvergenceError: there is no optimum, or properties and temperatures do not converge.
     """
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))

@@ -27,7 +27,7 @@ def with_own_properties(
     temperatures: Callable[[T], HeatState | None],
     within: float | None = None,
 ) -> tuple[T, int]:
-    """Return the state whose bodies have the properties of its own temperatures, and how often they took them anew.
+    """Return the state whose bodies have the properties of its own temperatures, and the number of updates.
 
     Where the change does not fall from pass to pass, half of it is followed, then a quarter, and so on. Collective.
 

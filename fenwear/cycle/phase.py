@@ -2,8 +2,8 @@
 
 The contacts of a phase over the last cycles, and where the next one is looked for from.
 
-What touches goes on as a polynomial of the cycles, which is known at those before. Where surfaces give way by a law,
-pressures near the edges of the contact are far from that; how near they are is not, whether they touch or not (see
+Nodes in contact change as a polynomial of the cycles, which is known at the cycles before. Where surfaces close by a
+law, pressures near the edges of the contact are far from that; how near they are is not, whether they touch or not (see
 `fenwear.layers.closure`): so nodes come to touch where the polynomial has them.
 """
 
@@ -42,7 +42,7 @@ class Onwards:
 
     Args:
         nodes, modes: Numbers of nodes and of rigid modes.
-        law: By which surfaces give way; None where they do not, or in proportion to the pressure.
+        law: Closure of the surfaces; None where they do not, or in proportion to the pressure.
         hardness: Largest pressure, MPa.
     """
 
@@ -68,7 +68,7 @@ class Onwards:
             self._touching = touching
 
     def start(self, before: ContactState) -> ContactState:
-        """Return the contact that goes on as over the last cycles, from that of the last one."""
+        """Return the contact extrapolated from the last cycles."""
         count = self._count
         if count < 2 or before is not self._last:
             return before
@@ -86,7 +86,7 @@ class Onwards:
         return ContactState(further[None], before.gap, rigid, before.iterations)
 
     def _as_long_as_they_touch(self, further: Array) -> None:
-        """Put pressures in place that go on as far back as their nodes touch."""
+        """Put pressures in place, extrapolated as far back as their nodes touch."""
         values = self._values[: self._count]
         fresh = np.flatnonzero((values[-1] <= 0) & (values[0] > 0))
         touch = np.logical_and.accumulate(values[:, fresh] > 0).sum(axis=0)

@@ -51,7 +51,7 @@ def follow_program(
         system: The assembled problem, of the case as it stands without its program.
         integrate: Yields the blocks of a span on one system, such as `march` or `jump`.
         half_cycles: The last one at most.
-        start: Where to go on from; by default the beginning.
+        start: State to continue from; by default the beginning.
 
     Raises:
         CaseError: a load is given where supports and not the contact carry the loads.
@@ -101,7 +101,7 @@ def _with_larger_grid(
 
     Args:
         base: Of the case.
-        stage: That begins, or within which a run goes on: its grid grows as it would have, not to a wider one.
+        stage: Stage that begins, or within which a run continues: its grid grows as it would have, not to a wider one.
         state: Where a run is; None at its beginning, whose grid is around its first contact.
         load: Factor of all loads.
     """
@@ -144,7 +144,7 @@ class Recurring:
         self._made: dict[str, tuple[Case, Tribosystem]] = {}
 
     def forget(self) -> None:
-        """Make all systems anew from now on, on other meshes."""
+        """Make all further systems on other meshes."""
         self._made.clear()
 
     def at_stage(self, system: Tribosystem, stage: Stage) -> Tribosystem:

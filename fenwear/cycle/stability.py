@@ -63,14 +63,14 @@ def growth_rate(
 
     Args:
         system: The assembled problem.
-        state: What `steady` returns, or the pressure of each phase (phases, n), MPa, positive where nodes touch.
+        state: Result of `steady`, or the pressure of each phase (phases, n), MPa, positive where nodes touch.
         conductances: By which its temperatures have come about (phases, n); by default those of the state, or of the
             nodes that these pressures close by more than rounding.
         implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
 
     Raises:
         CaseError: a coefficient is negative or not finite there, or the pressures are of other phases or nodes.
-        ConvergenceError: friction and the temperatures that it depends on do not come together, or numbers overflow.
+        ConvergenceError: friction and the temperatures that it depends on do not converge, or numbers overflow.
     """
     rates = _rates(system, state, conductances, implicit=implicit)
     return float(rates[0]) if len(rates) else 0.0  # as where all that is worn stays, and fills what it opens
@@ -143,9 +143,9 @@ def _factors(
 def explicit_growth(system: Tribosystem) -> float | None:
     """Return the rate at which explicit steps of wear let disturbances of full contact grow, 1/s; collective.
 
-    What the friction heat gives back leaves less of the pressure that an opened gap takes away, half-cycle for
-    half-cycle, so that explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit
-    ones let disturbances grow, too, and where nothing can be told: without heat, or with laws that pass.
+    The feedback of the friction heat reduces the loss of pressure by an opened gap, half-cycle for half-cycle, so that
+    explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit ones let
+    disturbances grow, too, and where it is unknown: without heat, or with laws that pass.
     """
     if not system.exchange.conducts or system.passing_laws:
         return None
@@ -212,7 +212,7 @@ def repeating_temperatures(
     None where no law and no conductance depends on the state: then any temperatures do.
 
     Raises:
-        ConvergenceError: there are none, or friction and the temperatures that it depends on do not come together.
+        ConvergenceError: there are none, or friction and the temperatures that it depends on do not converge.
     """
     heat = cycle_heat(system)
     if not heat.dim or (system.constant_coefficients and not heat.exchange.by_pressure):
@@ -357,7 +357,7 @@ def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
 
 
 def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
-    """Return the largest eigenvalue of W P: the gap (n,) worn open by the pressure that a gap takes away."""
+    """Return the largest eigenvalue of W P: the gap (n,) worn open by the pressure lost to a gap."""
     n = worn.shape[0]
 
     def apply(gap: Array) -> Array:

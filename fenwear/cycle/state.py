@@ -25,10 +25,10 @@ class RunState:
         worn: Worn depths of both bodies.
         contacts: The last contact of each phase; unsolved where there was none yet.
         temperature: Of both bodies; None without heat.
-        totals: What all half-cycles so far add up to.
+        totals: Totals of all half-cycles so far.
         jump_length: Cycles that the next jump tries; below 1 a part of one, with stick alone.
         periodic_phases: Half-cycles in a row that repeated.
-        memory: What the law of contact must remember besides; a data class of arrays, numbers and such classes.
+        memory: Memory of the law of contact; a data class of arrays, numbers and such classes.
         finer: Where jumps of next to no length would have led, to the next order, see `fenwear.cycle.jump`; None where
             nobody asks.
     """

@@ -100,14 +100,14 @@ class SteadyState:
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         debris: Thickness of the third body (n,), mm: what a cycle feeds, times its life; None without.
         crept: Depth that has crept (n,), mm, at the end of a cycle.
-        states: What laws remember, at rest, at the start of a cycle, by their names (n,); those of the strip's
+        states: States of laws, at rest, at the start of a cycle, by their names (n,); those of the strip's
             material by `NAME_strip` (n_strip,).
         iterations: Newton iterations.
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
-        system: What it is the state of: with the properties of its own temperatures, where they depend on them.
-        passes: How often the properties were updated; 0 where they are constants.
+        system: Its system: with the properties of its own temperatures, where they depend on them.
+        passes: Number of updates of the properties; 0 where they are constants.
         conductances: By which its temperatures have come about (phases, n), N/(mm s K), NaN where none conducts; None
             without heat.
     """

@@ -24,10 +24,10 @@ class SteadyCycle:
     """The k half-cycles of a steady state, of n contact nodes.
 
     Attributes:
-        system: What it is the state of.
+        system: Its system.
         pressure: In the middle position of each half-cycle (k, n), MPa.
         phase_pressure: In every phase (m, n), MPa.
-        adds: What each half-cycle adds to the totals, k of them.
+        adds: Additions of each half-cycle to the totals, k of them.
         rate: Depths worn in the cycle.
         velocity: Rigid-body wear in the cycle of each mode, mm and rad.
         heat: Temperatures at the ends of the half-cycles; None without heat.

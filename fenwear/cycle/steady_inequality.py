@@ -146,7 +146,7 @@ class SteadyInequality:
 
     @property
     def _passing(self) -> LayerEvolution:
-        """What a cycle does to debris."""
+        """Change of debris over a cycle."""
         return self.system.passing(self.wear, conditions=self.conditions)
 
     def _by_debris(self, pressure: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a phase of a cycle makes of small changes of temperature, wear and what lies between."""
+"""The response of a phase to small changes of temperature, wear and layers."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ class _Laws:
 
     Attributes:
         mu: (n,).
-        rate: What each node slides for a unit of the stroke's law (n,): friction heat is mu p times that.
+        rate: Sliding of each node for a unit of the stroke's law (n,): friction heat is mu p times that.
         mu_p: To the pressure of the same node (n,), 1/MPa.
         mu_s: To the state of the heat, and to the thickness of debris at its start where there is any, of L nodes where
             it lies (n, dim).
@@ -274,13 +274,13 @@ def _lying(
 
 
 class _Creeping(NamedTuple):
-    """What creeps in a phase.
+    """Creep in a phase.
 
     Attributes:
         gap_by_state: Gap by its state at the start (n, k).
         gap_by_heat: By the state of the heat (n, dim).
         gap_by_pressure: By the pressures (n, n).
-        stays: What is left of its state (k,).
+        stays: Remaining share of its state (k,).
         by_state: Its state at the end by that of the heat (k, dim).
         by_pressure: By the pressures (k, n).
     """
@@ -300,7 +300,7 @@ def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p:
         creep: All that does.
         phase: Its number.
         ratios: tau (n, d), and that of a friction that is larger by 1.
-        traction_p, traction_s: What changes of pressure and of the state of the heat add to mu, times the pressure.
+        traction_p, traction_s: Change of mu by pressure and by the state of the heat, times the pressure.
     """
     own, more = creep.tangent(phase, ratios[0]), creep.tangent(phase, ratios[1])
     by_mu, seen_by_mu = more.by_pressure - own.by_pressure, more.seen_by_pressure - own.seen_by_pressure

@@ -29,7 +29,7 @@ CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implici
 
 @dataclass
 class _Response:
-    """What unit pressures of a half-cycle do by its end, for given conductances."""
+    """Effect of unit pressures of a half-cycle at its end, for given conductances."""
 
     conductance: Array
     state: Array
@@ -71,7 +71,7 @@ class ThermalContact:
             wearing: Wear of this half-cycle where its step is implicit.
 
         Raises:
-            ConvergenceError: contact and heat do not come together.
+            ConvergenceError: contact and heat do not converge.
         """
         if start is None:
             start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, wearing)

@@ -1,4 +1,4 @@
-"""What is added up over all half-cycles of a run, recorded or jumped over: wear, sliding, the work of friction.
+"""Totals over all half-cycles of a run, recorded or jumped over: wear, sliding, the work of friction.
 
 In a phase in which the strip moves by ds, mm or rad, its material moves by v_i ds at node i, and along the contact
 by r_i ds: v_i = 1 in a translation, and r_i = v_i where the surface is not inclined to the motion.
@@ -45,7 +45,7 @@ MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
 @dataclass(frozen=True)
 class Totals:
-    """What has been added up, of one state or of k of them.
+    """Totals, of one state or of k of them.
 
     Attributes:
         sums: By `SUMS` (9,) or (k, 9): mm, N mm, mJ, and mm³ and mg of each body; NaN for a mass without density.
@@ -80,7 +80,7 @@ def none_yet(system: ContactSetup) -> Totals:
 
 
 class PhaseMeter:
-    """What a phase adds at a pressure: all that is linear in it in one product.
+    """Additions of a phase at a pressure: all that is linear in it in one product.
 
     Args:
         system: The bodies.
@@ -151,7 +151,7 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
 
     Args:
         system: The bodies.
-        totals: What is added otherwise.
+        totals: Other additions.
         lost: Depths worn meanwhile.
     """
     return with_worn(system, totals, lost, [bool(coating.any()) for coating in system.coatings])

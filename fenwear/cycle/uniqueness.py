@@ -1,12 +1,11 @@
 """Whether the contact of a half-cycle with heat has one answer.
 
 The friction heat of a change dp of pressure opens the gap by Theta dp by the end of its half-cycle, and where nodes
-stay closed, with the loads balanced, an opened gap takes the pressure X away: what a change heats gives back G dp =
--X Theta dp of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is
-where R. A. Burton's waves neither grow nor decay, for heat that has had one half-cycle to flow. Beyond it a
-complementarity problem with the same nodes in contact is none with a P-matrix: it may have several answers, or
-none (J. R. Barber, J. Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap against it, by much
-less, and is left out.
+stay closed, with the loads balanced, an opened gap takes the pressure X away: the heat of a change feeds back G dp = -X
+Theta dp of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is where R. A.
+Burton's waves neither grow nor decay, for heat that has had one half-cycle to flow. Beyond it a complementarity problem
+with the same nodes in contact is none with a P-matrix: it may have several answers, or none (J. R. Barber, J.
+Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap against it, by much less, and is left out.
 
 Where friction depends on the pressure S and Theta are derivatives: of the traction mu p by d(mu p)/dp, and so of its
 heat. One answer is certain where the derivative is one with a P-matrix at every pressure (D. Gale and H. Nikaido, Math.
@@ -112,11 +111,11 @@ def opened_by_heat(
 
 
 def heat_warnings(gain: float | None, *, jumps: bool = False) -> list[str]:
-    """Return what is to be said of a contact whose friction heat gives back a share of the pressure.
+    """Return the warning of a contact whose friction heat feeds back a share of the pressure.
 
     Args:
         gain: The share.
-        jumps: Whether a run goes on by jumps.
+        jumps: Whether a run continues by jumps.
     """
     if gain is None or gain < 1:
         return []

@@ -1,7 +1,7 @@
 """Coulomb's law with stick, as a law of contact: its bodies, its steps over half-cycles and over many cycles.
 
 A half-cycle goes in time steps (`cycle`), on the shape at its start; its wear is taken off at its end. A jump over many
-cycles is that of `jump`. What a time step must remember of the one before goes with the state of a run, `Memory`.
+cycles is that of `jump`. The state of a run has a `Memory`: values that a time step needs of the step before.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ from fenwear.stick.state import NO_HEAT, PartialSlipState
 
 @dataclass(frozen=True)
 class Memory:
-    """What a run remembers besides depths and temperatures.
+    """Memory of a run besides depths and temperatures.
 
     Attributes:
         at: Where the time steps are; its depths and temperature are those of the run.
-        cycle: The last one, on the shape of the run, from which jumps go on; None where there is none.
+        cycle: The last one, on the shape of the run, from which jumps continue; None where there is none.
         warm: Temperatures at the end of that cycle, where there is one with heat; else none.
         stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
-        made_of: What tells apart the bodies, and what is done to them, that the cycle belongs to.
+        made_of: Identity of the bodies and loads that the cycle belongs to.
     """
 
     at: PartialSlipState
@@ -113,13 +113,13 @@ class Steps:
 
 @dataclass(frozen=True)
 class StickSetup:
-    """What the law has of a system.
+    """Parts of a system that belong to the law.
 
     Attributes:
         problem: The bodies, and what is done to them in a cycle.
         fineness: Of its time steps; None where they are taken as they are given.
-        made_of: What tells these bodies, and what is done to them, apart from those on other meshes, with other
-            properties or in another stage of a program.
+        made_of: Identity of these bodies and loads: it differs on other meshes, with other properties or in another
+            stage of a program.
         ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
         prepared: Whether heat is, and its time steps are fine enough, where they are to be.
     """
@@ -168,7 +168,7 @@ class Coulomb:
         return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
 
     def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could go on alone."""
+        """Return whether every rank could continue alone."""
         return system.exchange.reduced
 
     def elastic_length(self, system: Tribosystem) -> float:
@@ -203,7 +203,7 @@ class Coulomb:
         return replace(found, system=system)
 
     def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
-        """Return what a run remembers on another contact grid; collective. Jumps go on from a cycle made there."""
+        """Return what a run remembers on another contact grid; collective. Jumps continue from a cycle made there."""
         (nodes, _), stuck = node_maps(before, after), memory.stuck
         problems = before.law_state.problem, after.law_state.problem
         worn = carried(memory.at.worn, before, after)
@@ -245,7 +245,7 @@ def system_of(
         ends: Where time steps end, in place of those that are fine enough.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
         ConvergenceError: a time step of the first cycle did not converge.
     """
     problem = placed_by_slip(case, bodies, fresh=fresh, condensed=condensed)
@@ -283,7 +283,7 @@ def _told_apart(case: Case, bodies: Bodies) -> float:
 
 
 class _Run:
-    """What steps over half-cycles and over many cycles share."""
+    """Common part of steps over half-cycles and over many cycles."""
 
     def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
         setup: StickSetup = system.law_state
@@ -327,7 +327,7 @@ class _Run:
             number: Its own.
             steps: Its time steps.
             states: Depths and totals at its end.
-            adds: What it adds to the totals.
+            adds: Its additions to the totals.
             load: Factor of all loads.
         """
         records, stroke = steps.records, (number - 1) % self.strokes
@@ -510,11 +510,11 @@ def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[i
 
 
 class Meter:
-    """What time steps add to the totals: see `fenwear.cycle.totals`.
+    """Additions of time steps to the totals: see `fenwear.cycle.totals`.
 
     Args:
         system: The bodies.
-        problem: What is done to them.
+        problem: Their loads.
     """
 
     def __init__(self, system: Tribosystem, problem: PartialSlipProblem) -> None:

@@ -27,7 +27,7 @@ Displaced = tuple[Array, Array, Array]  # the punch (n, d), the strip at its ope
 
 @dataclass(frozen=True)
 class StickCreep:
-    """What creeps, of `PARTS` in this order; its state is one vector, of each its y (terms, ...) in turn.
+    """Parts that creep, of `PARTS` in this order; its state is one vector, of each its y (terms, ...) in turn.
 
     Attributes:
         laws: Of each part; without terms where it does not creep.
@@ -190,13 +190,13 @@ def opened_by_creep(position: Position, creep: StickCreep, state: Array) -> Arra
 
 
 class CreepNear:
-    """What creeps over many cycles like one, by what its mean pressure changes: the implicit part of a jump.
+    """Creep over many cycles like one, by the change of its mean pressure: the implicit part of a jump.
 
     Along the normals y goes by X = period / tau in a cycle to v, which follows the pressure. Along the tangents all of
-    v may be taken away where nodes stick: there y goes by X (1 + sum of c) to where it rests in such cycles.
+    v may be removed where nodes stick: there y goes by X (1 + sum of c) to where it rests in such cycles.
 
     Args:
-        creep: What creeps.
+        creep: Parts that creep.
         position: The bodies in the middle position of the strip.
         period: Of a cycle, s.
         begin, rate: The state of the cycle, and how much it changes it.

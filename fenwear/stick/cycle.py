@@ -2,7 +2,8 @@
 
 Where a run with stick is, on another contact grid: tractions, slips and states stay at their nodes.
 
-What surfaces are moved by is that of the tractions there, as the next time step has it: what sticks goes on to stick.
+Displacements of the surfaces are those of the tractions there, as the next time step has them: nodes that stick
+continue to stick.
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ class PartialSlipProblem:
         friction: mu (n,).
         heat: Of friction; None without.
         watch: Called before every time step: may raise InterruptedRunError.
-        expanded: What loads do with a thermal expansion that stays as it is, at an offset of the strip.
+        expanded: Gaps by loads with a constant thermal expansion, at an offset of the strip.
         laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
-        coatings: Of both bodies, whose `wear` is then that of the coating, by the ratio of coefficients where nothing
-            tells another one.
+        coatings: Of both bodies, whose `wear` is then that of the coating, by the ratio of coefficients unless another
+            one is given.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class PartialSlipProblem:
         return PartialSlipProblem(**{**{name: getattr(self, name) for name in names}, **changed})
 
     def led(self, function: Callable[[], T]) -> T:
-        """Call what goes on from condensed bodies, on rank 0 for all; collective.
+        """Call the function that continues from condensed bodies, on rank 0 for all; collective.
 
         Raises:
             Exception: what `function` raised, on every rank.
@@ -137,7 +138,7 @@ class PartialSlipProblem:
         return replace(found, crept=self.interface.creep.beginning())
 
     def shaped(self, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
-        """Return a state on another shape, whose bodies have crept as it says; what sticks stays where it stuck."""
+        """Return a state on another shape, whose bodies have crept as it says; sticking nodes stay in place."""
         creep, contact = self.interface.creep, at.contact
         if creep.creeps and contact.crept is not worn.crept:
             contact = creep.at(contact, worn.crept)

@@ -41,9 +41,9 @@ def stick_edges(x: Array, stick: Mask, slid: Array, closed: Mask) -> list[Edge]:
 
     Args:
         x: Of the contact nodes, ascending (n,), mm.
-        stick: Those that stick all through a cycle (n,).
-        slid: What each slips in the cycle, to and fro (n,), mm.
-        closed: Those that carry pressure at any time of it (n,).
+        stick: Nodes that stick all through a cycle (n,).
+        slid: Slip of each in the cycle, to and fro (n,), mm.
+        closed: Nodes that carry pressure at any time of it (n,).
     """
     step = np.diff(np.concatenate([[0], stick.astype(np.int8), [0]]))
     found = []

@@ -73,7 +73,7 @@ ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
 
 
 class ContactStatus(NamedTuple):
-    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m), mu p and p there (n,).
+    """Status of each node in a Newton step: closed (n,), slipping (n,), their trial (n, m), mu p and p there (n,).
 
     `flowing` are nodes whose pressure is the hardness (n,).
     """
@@ -87,7 +87,7 @@ class ContactStatus(NamedTuple):
 
 
 class SurfaceDisplacement(NamedTuple):
-    """What tractions alone move: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
+    """Displacements by tractions alone: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
 
     jump: Array
     on_punch: Array
@@ -95,7 +95,7 @@ class SurfaceDisplacement(NamedTuple):
 
 
 class StatusSolution(NamedTuple):
-    """What solves the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves.
+    """Solver of the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves.
 
     `jump` is what f moves the surfaces by against each other (d n,), where it is known.
     """
@@ -196,7 +196,7 @@ class Step:
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
     def forget(self) -> None:
-        """Begin anew, where solutions are looked for from the last one on; here they are not."""
+        """Restart, where solutions are sought from the last one; here they are not."""
 
     def solve(self, status: ContactStatus) -> StatusSolution:
         """Return the solution of a contact status.
@@ -245,9 +245,9 @@ class Step:
         return StatusSolution(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
 
     def _give_way(self, A: Array, b: Array, status: ContactStatus, closed: NDArray[np.int64]) -> None:
-        """Add what gives way beside the bodies to the rows c g = 0, linearised at the pressure of the status.
+        """Add the compliance beside the bodies to the rows c g = 0, linearised at the pressure of the status.
 
-        Without pressure it may give way as much as it likes: the rows are made of one size again.
+        Without pressure its compliance is unlimited: the rows are made of one size again.
         """
         if self.closure is None:
             return
@@ -330,7 +330,7 @@ class Step:
 
         Args:
             f: Tractions.
-            jump: What they move the surfaces by (d n,); None where it is not known.
+            jump: Displacements of the surfaces by them (d n,); None where it is not known.
         """
         del jump
         (force, back), interface = self.position.forces(f), self.interface

@@ -1,10 +1,10 @@
 """The shape to which partial slip wears in the end, directly.
 
-Wear goes on wherever there is slip and pressure. Half-planes of one material that stick in the middle of their contact
-under a fixed load and tangential force keep this zone; around it wear goes on until the pressure has vanished there.
-So in the end the stick zone alone carries the load, and beside it the surfaces are worn by what they would otherwise
-overlap at any time of the cycle (M. Ciavarella and D. A. Hills, J. Strain Anal. 34, 1999): one cycle with contact in
-the stick zone only,
+Wear continues wherever there is slip and pressure. Half-planes of one material that stick in the middle of their
+contact under a fixed load and tangential force keep this zone; around it wear continues until the pressure has vanished
+there. So in the end the stick zone alone carries the load, and beside it the surfaces are worn by what they would
+otherwise overlap at any time of the cycle (M. Ciavarella and D. A. Hills, J. Strain Anal. 34, 1999): one cycle with
+contact in the stick zone only,
 
     p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
 
@@ -20,9 +20,9 @@ below mu P fulfils this the contact slides as a whole before.
 A percent of the zone's width is ten of the depth, so that a zone of whole nodes would not do. In the plane its edges
 are located within their elements (`edge`). A zone of nodes has an edge, too, which is that of a flat punch by the
 surface beside it: the shape of the located zone lies between those of the two zones of nodes whose edges are on either
-side, in equilibrium as they are. What is left of the interval of each edge is told.
+side, in equilibrium as they are. The remaining interval of each edge is reported.
 
-What creeps has come to its end: the state of a cycle that leaves it as it is.
+Creep has come to its end: the state of a cycle that leaves it as it is.
 
 Where nothing slips under pressure friction makes no heat. So in the end both bodies are as warm as held temperatures
 and surroundings make them, and the shape is that of bodies of these temperatures.
@@ -96,8 +96,9 @@ class FinalShape:
 def stick_zone(problem: PartialSlipProblem) -> Mask:
     """Return the nodes that stick all through the second cycle without wear (n,); collective.
 
-    What slips in the first cycle only, until it has settled, does not wear on. Finite bodies rock, and give way along
-    the surface otherwise than across it; in the course of the wear that takes about a node at the edge.
+    Nodes that slip in the first cycle only, until it has settled, do not wear further. Finite bodies rock, and their
+    compliance along the surface differs from that across it; in the course of the wear that takes about a node at the
+    edge.
 
     Raises:
         ConvergenceError: a time step did not converge.
@@ -263,7 +264,7 @@ def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
 
 
 def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShape:
-    """Return the shape with a zone as large as the slip beside those nodes tells that stick in a cycle, on a grid.
+    """Return the shape whose zone has the size given by the slip beside the sticking nodes of a cycle, on a grid.
 
     From the edge of the zone on slip grows as distance^(3/2), so that the root of the area with less slip grows evenly
     with slip^(2/3), from that of the zone. A zone of squares carries as a round one whose radius is INSIDE of a side
@@ -297,7 +298,7 @@ def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShap
 
 
 def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape | None:
-    """Return the shape with a zone between two located ends; None where what is beside it does not tell them."""
+    """Return the shape with a zone between two located ends; None where the nodes beside it do not determine them."""
     x = problem.interface.middle.pair.x
 
     @lru_cache
@@ -349,7 +350,7 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
 def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int) -> float | None:
     """Return where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
 
-    None, too, where what lies between gives way by a law that is not linear.
+    None, too, where a layer has a closure that is not linear.
 
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
     edge c follow from the second and third node. The first one carries what the discrete edge makes of it.

@@ -54,7 +54,7 @@ class Groups:
 
 @dataclass(frozen=True)
 class GroupedStep:
-    """What the pressures of time steps open in a step of many cycles, as a compliance of the contacts they share."""
+    """Gap that the pressures of time steps open in a step of many cycles, as a compliance of their contacts."""
 
     step: LayerStep
     groups: Groups
@@ -81,7 +81,7 @@ class GroupedStep:
 
     @property
     def curved(self) -> bool:
-        """Whether something gives way by a law that is not linear."""
+        """Whether a layer has a closure that is not linear."""
         return self.step.curved
 
     def layer(self, pressure: Array) -> Array | None:
@@ -129,7 +129,7 @@ class Frozen:
 
         Args:
             before: Depths.
-            cycles: How many.
+            cycles: Number.
             near: Where the contact is looked for.
 
         Raises:

@@ -47,7 +47,7 @@ NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die 
 
 @dataclass(frozen=True)
 class Expansion:
-    """What a body's reduced temperature moves its contact by: u = by_coordinates s + at_lift, along all axes, mm.
+    """Displacement of the contact by a body's reduced temperature: u = by_coordinates s + at_lift, along all axes, mm.
 
     Attributes:
         by_coordinates: (q, d, dim).
@@ -64,7 +64,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class HeatedStep:
-    """What a time step leads to: temperatures (dim,), terms of its balance (8,), mJ, and both surfaces (2, n), K."""
+    """Result of a time step: temperatures (dim,), terms of its balance (8,), mJ, and both surfaces (2, n), K."""
 
     values: Array
     terms: Array
@@ -115,7 +115,7 @@ class StickHeat:
         return HeatedStep(after.values, terms, np.array(self.exchange.contact_temperatures(after, number)))
 
     def check_bounds(self, before: Array, after: Array, terms: Array) -> None:
-        """Hold what a half-cycle has stored against what can have entered: a step that slips little tells nothing.
+        """Hold what a half-cycle has stored against what can have entered: a step that slips little has no influence.
 
         Args:
             before, after: Temperatures (dim,).
@@ -163,7 +163,7 @@ class StickHeat:
 
 @dataclass(frozen=True)
 class CycleMap:
-    """What a cycle of constant heat makes of temperatures, s -> P s + b, with P (dim, dim) and b (dim,)."""
+    """Change of temperatures over a cycle of constant heat, s -> P s + b, with P (dim, dim) and b (dim,)."""
 
     through: Array
     source: Array
@@ -176,7 +176,7 @@ class CycleMap:
         """Return the temperatures that cycles lead to in the end (dim,): (I - P) s = b.
 
         Raises:
-            CaseError: they go on for ever, as neither body loses heat.
+            CaseError: they rise without end, as neither body loses heat.
         """
         if np.abs(scipy.linalg.eigvals(self.through)).max() > 1 - NEUTRAL:
             message = (
@@ -365,10 +365,10 @@ def coupled_step(
         loaded: The loads without expansion.
         before: The contact at the start.
         start: The step, with what is there before it.
-        flux: What friction makes at most, about, mW/mm².
+        flux: Largest friction heat, about, mW/mm².
 
     Raises:
-        ConvergenceError: they do not come together.
+        ConvergenceError: they do not converge.
     """
     n = len(before.pressure)
     units = np.repeat([1 / max(flux, 1e-300), 1 / max(float(before.pressure.max()), 1e-300)], n)

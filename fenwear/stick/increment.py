@@ -43,7 +43,7 @@ def advance(
     Args:
         interface: The bodies.
         before: The state at the start.
-        start, end: What is imposed at the start and at the end.
+        start, end: Imposed loads and motions at the start and at the end.
         friction: mu (n,).
         position: The place of the strip; by default its middle one.
         near: Pressure (n,) and trial (n, m) after a step that is nearly the same; None where none is known.

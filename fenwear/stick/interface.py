@@ -37,9 +37,9 @@ class OppositeBodies:
     """Two bodies that stay opposite each other under one load.
 
     Args:
-        punch, strip: How they answer along all axes at the contact's nodes.
+        punch, strip: Their response along all axes at the contact's nodes.
         rigid: The rigid modes, their load, and the pair of surfaces.
-        field: What the rig moves the strip by.
+        field: Displacement of the strip by the rig.
     """
 
     moves = False
@@ -86,7 +86,7 @@ class StickInterface(OppositeBodies):
 
     Args:
         bodies: Both, under the mean of their loads.
-        sliding: What the strip does, friction and wear.
+        sliding: Motion of the strip, friction and wear.
         case: The problem: it gives the loads of each time.
         moves: Whether the strip's surface passes under the punch, which slides along it; otherwise the surfaces stay
             opposite each other, as for slip that is small against the contact, and have a common frame.
@@ -147,7 +147,7 @@ class StickInterface(OppositeBodies):
 
         Args:
             nodes: Of the contact.
-            on_strip: What the strip is condensed onto.
+            on_strip: Unknowns that the strip is condensed onto.
         """
         d, both = self.dim, self.bodies
         positions = 1 + (steps_of(self.case) if self.moves else 0)

@@ -11,11 +11,11 @@ second step starts there; the cycle at its end begins the next jump. Its error h
 parts: of M a third of the difference to one step over the whole jump, and of R Simpson's rule against the line, each as
 the last stage damps it.
 
-What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
-lost if they went on, by the ratio of what base and coating would wear in the jump's first cycle: that grows evenly
-through their end (`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere.
-No depth decreases. A cycle whose error is too large goes in parts, of which each is such a jump: N is below 1.
-Loads that change are those of each cycle's own time.
+Layers change with the depths: y has its state, too. Of coated bodies y has the wear of their coatings if these lasted,
+by the ratio of the wear of base and coating in the jump's first cycle: that grows evenly through their end
+(`fenwear.sliding.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere. No depth decreases. A cycle whose
+error is too large goes in parts, of which each is such a jump: N is below 1. Loads that change are those of each
+cycle's own time.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
 is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
@@ -60,8 +60,8 @@ def jumped(
 
     Args:
         problem: The bodies and what is done to them.
-        now: The cycle to go on from.
-        cycles: How many in all.
+        now: The cycle to continue from.
+        cycles: Number in all.
         tolerance: Largest estimated error of one jump.
         load: Factor of all loads after so many cycles.
         fits: Whether the nodes suffice for the cycle after it: it is halved where they do not.
@@ -88,7 +88,7 @@ def jumped(
 def first_cycle(
     problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array = NO_HEAT
 ) -> FrettingCycle:
-    """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,).
+    """Return the cycle at a shape from which jumps continue, with its temperatures at its start (dim,).
 
     Raises:
         ConvergenceError: a time step did not converge.
@@ -169,7 +169,7 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
 class _Moment(Moment):
     """The end of a stage, and where it began and how many cycles it was long.
 
-    Of coated bodies its depths are what their coatings would have lost if they went on.
+    Of coated bodies its depths are the wear of their coatings if these lasted.
     """
 
     begin: WornDepths
@@ -177,7 +177,7 @@ class _Moment(Moment):
 
 
 class _Jump(JumpLaw[_Moment]):
-    """What the law gives a jump from a cycle; temperatures go on from those of the last whole cycle."""
+    """Data of the law for a jump from a cycle; temperatures continue from those of the last whole cycle."""
 
     def __init__(
         self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], whole: FrettingCycle
@@ -281,7 +281,7 @@ def _attempt(
     load: Callable[[float], float],
     begin_of_heat: FrettingCycle,
 ) -> tuple[FrettingCycle, Estimate]:
-    """Return the cycle after a jump, and its error; temperatures go on from those of the last whole cycle."""
+    """Return the cycle after a jump, and its error; temperatures continue from those of the last whole cycle."""
     law = _Jump(problem.worn_like(now.records, now.first_step), now, load, begin_of_heat)
     made = attempt(law, law.begin, cycles)
     estimate, missed = law.estimate(made)
@@ -294,7 +294,7 @@ def _attempt(
 def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
     """Return depths whose ejected debris is what was worn and does not lie there, to rounding.
 
-    Else it would not be where depths are kept from falling, or coatings end. What is ejected opens nothing: what is
+    Else it would not be where depths are kept from falling, or coatings end. Ejected debris opens nothing: what is
     missing of it is spread evenly.
     """
     layers, pair = problem.interface.layers, problem.interface.middle.pair
@@ -311,6 +311,6 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
 
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
-    """Return the end of a cycle under the load of so many later, as far as what its nodes have slipped tells."""
+    """Return the end of a cycle under the load of so many later, as far as the slip of its nodes determines it."""
     slid = now.end.slid + (cycles - 1) * now.records.slip_magnitude.sum(axis=0)
     return replace(now.end, load=load(now.number + cycles), slid=slid)

@@ -1,8 +1,8 @@
-"""What time steps of contact with stick wear off both bodies, and what they do to what lies between.
+"""Wear of both bodies in time steps of contact with stick, and its effect on the layers.
 
 The coatings of both bodies in partial slip: what of them and of their bases is worn, and how jumps count depths.
 
-What laws of friction and wear know of the nodes in time steps, and of the cycle before them.
+Variables of laws of friction and wear at the nodes in time steps, and of the cycle before them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fenwear.stick.state import PartialSlipState
 
 
 class StepSlips(NamedTuple):
-    """What laws ask of k time steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
+    """Variables of laws in k time steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
 
     pressure: Array
     slid: Array
@@ -41,7 +41,7 @@ class StepSlips(NamedTuple):
 
 @dataclass(frozen=True)
 class StepConditions:
-    """What is known of each node in the time steps of a cycle.
+    """Values at each node in the time steps of a cycle.
 
     Attributes:
         interface: The bodies.
@@ -147,7 +147,7 @@ class CoatedBodies:
 
         Args:
             before: Depths where it begins.
-            more, bases: What would be worn of coatings that go on, and of bases.
+            more, bases: Wear of coatings that last, and of bases.
         """
         return (
             shares(more.punch, bases.punch, left_of(self.punch.thickness, before.punch)),
@@ -162,14 +162,14 @@ class CoatedBodies:
         """Return rates of depths as those of `measured`, where these depths are worn.
 
         Args:
-            rate, bases: Of coatings that go on, and of bases.
+            rate, bases: Of coatings that last, and of bases.
             worn: Depths.
         """
         punch = self.punch.measured_rate(worn.punch, rate.punch, bases.punch)
         return replace(rate, punch=punch, strip=self.strip.measured_rate(worn.strip, rate.strip, bases.strip))
 
     def measured(self, worn: WornDepths) -> WornDepths:
-        """Return depths as what coatings would have lost if they went on: it grows evenly through their end."""
+        """Return depths as the wear of coatings that last: it grows evenly through their end."""
         return replace(worn, punch=self.punch.measure(worn.punch), strip=self.strip.measure(worn.strip))
 
     def depths(self, measured: WornDepths) -> WornDepths:
@@ -191,10 +191,10 @@ _Both = tuple[Array, Array]  # of punch and strip
 
 @dataclass(frozen=True)
 class StepLosses:
-    """What the time steps of a cycle wear, and what becomes of it.
+    """Wear of the time steps of a cycle, and its debris.
 
     Attributes:
-        conditions: What laws know in them.
+        conditions: Variables of laws in them.
         wear: By local slip; of coated bodies that of their coatings.
         coatings: Of both bodies.
     """
@@ -205,7 +205,7 @@ class StepLosses:
 
     @property
     def layers(self) -> Layers:
-        """What lies between the surfaces."""
+        """The layers between the surfaces."""
         return self.conditions.interface.layers
 
     def worn_in(
@@ -217,7 +217,7 @@ class StepLosses:
             records: Of steps one after the other.
             first: Number of the first of them in the cycle.
             before: Where they began, with the state of what lies between.
-            rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps: of a
+            rate: Whether it is that of a cycle that repeats without end, for jumps, not the change in these steps: of a
                 coated body then as if all of it were of the coating.
         """
         worn, bases = (self.worn_of(records, first, of_bases=of_bases) for of_bases in (False, True))
@@ -258,8 +258,8 @@ class StepLosses:
         """Return what both bodies lose at the contact's nodes (..., n).
 
         Args:
-            coatings, bases: What of punch and strip would be worn there of coatings that go on, and of bases.
-            parts: What is worn of both, at the nodes of punch and strip.
+            coatings, bases: Wear of punch and strip there, of coatings that last, and of bases.
+            parts: Wear of both, at the nodes of punch and strip.
         """
         onto = self.conditions.interface.middle.pair.wear_interpolation
         return parts[0].of(coatings[0], bases[0]) + parts[1].at(onto).of(coatings[1], bases[1])
@@ -299,7 +299,7 @@ class StepLosses:
 
         Args:
             records: Of the steps.
-            parts: What is worn of both, at the nodes of punch and strip.
+            parts: Wear of both, at the nodes of punch and strip.
             before: Where they begin.
         """
         of_punch, of_strip = parts

@@ -35,7 +35,7 @@ from fenwear.sliding.field import SlidingField
 
 @dataclass(frozen=True)
 class LoadEffect:
-    """What the loads do at one time of the cycle.
+    """Effect of the loads at one time of the cycle.
 
     Attributes:
         resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
@@ -70,7 +70,7 @@ class Position:
     """Both bodies opposite each other in one place of the strip.
 
     Attributes:
-        interface: How their surfaces move against each other along e_n and the tangents of each node.
+        interface: Relative motion of their surfaces along e_n and the tangents of each node.
         drive: V (d n,), for a unit of the motion; along the tangents alone where the strip goes far.
         far: Whether it goes so far: what it is moved by along e_n its place has in the gap.
     """
@@ -126,12 +126,12 @@ class Position:
 
     @cached_property
     def balance(self) -> Array:
-        """What each traction adds to the load of each rigid mode (r, d n)."""
+        """Part of each traction in the load of each rigid mode (r, d n)."""
         return self.modes.T * self.weights
 
     @cached_property
     def pull(self) -> Array:
-        """What each traction adds to the force along the motion, positive where the strip is pulled to +x (d n,)."""
+        """Part of each traction in the force along the motion, positive where the strip is pulled to +x (d n,)."""
         return self.drive * self.weights
 
     @cached_property
@@ -174,7 +174,7 @@ def position_of(
 
     Args:
         rigid: The rigid modes and the pair of surfaces.
-        punch, strip: How the bodies answer, along all axes.
+        punch, strip: Response of the bodies, along all axes.
         field: The motion of the strip.
         strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
         layer: Closure by unit pressures of what lies between (n,), mm/MPa; 0 of nothing.

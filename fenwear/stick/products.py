@@ -6,11 +6,11 @@ dt = mu n dp + u. With the projector Q on what is unknown, and f = N x of x = (d
 
     Q (C N x + H a - V delta) + D x = -residual,
 
-D of what slips is (|z| - r) / (r c): the derivative of the cone's projection (`cone`), solved for the slip across n; of
-what touches, the slope of what gives way beside the bodies. It is solved by GMRES to some digits, which Newton's method
-goes on from. The preconditioner is the inverse of C on an endless grid, restricted to the unknowns, between roots of
-1 + D / C_ii, with the balances of forces held exactly: about as many iterations at any number of nodes. The sign of
-the determinant is not known: whether there are other answers is not told.
+D of slipping nodes is (|z| - r) / (r c): the derivative of the cone's projection (`cone`), solved for the slip across
+n; of nodes in contact, the slope of the compliance beside the bodies. It is solved by GMRES to some digits, from which
+Newton's method continues. The preconditioner is the inverse of C on an endless grid, restricted to the unknowns,
+between roots of 1 + D / C_ii, with the balances of forces held exactly: about as many iterations at any number of
+nodes. The sign of the determinant is not known: other solutions are not sought.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class _Piece:
     Attributes:
         closed: Nodes that touch (k,).
         pressed: Nodes whose pressure is unknown (n,).
-        kept: What of tractions is unknown: nodes that stick (n,).
+        kept: Unknown parts of tractions: nodes that stick (n,).
         across: Unit vectors across the trial where nodes slip in two directions, else zero (m, n).
         slides: mu n where nodes slip, else zero (m, n).
         stiff: D over the length (d, n), of u along `across`.
@@ -237,7 +237,7 @@ class _Piece:
         return found
 
     def residual(self, x: Array, opened: Array) -> Array:
-        """Return Q of gap and slip, with D of what slips; what gives way is in the gap."""
+        """Return Q of gap and slip, with D of slipping nodes; the compliance of layers is in the gap."""
         return np.concatenate([(opened[0] * self.pressed)[None], self.unknown(opened)[1:] + self.stiff[1:] * x[1:]])
 
 
@@ -252,7 +252,7 @@ class _Solver:
     """The linear equations of a piece on a box around the nodes that touch (k), zero elsewhere.
 
     Args:
-        step: What they are of.
+        step: Their system.
         piece: The unknowns.
         moved, held: Unit rigid modes and their forces at the nodes that touch (r, d, k).
 
@@ -281,7 +281,7 @@ class _Solver:
                 raise ConvergenceError(LOOSE)
 
     def _share(self, over: Array) -> None:
-        """Share places out among the inverses with tangents that give way, by D / C_ii (d, size)."""
+        """Share places out among the inverses with compliant tangents, by D / C_ii (d, size)."""
         sizes = np.log(STIFF)
         places = np.append(2 * sizes[0] - sizes[1], sizes)
         at = np.interp(np.log(np.maximum(over[1:].max(axis=0), 1e-9)), places, np.arange(len(places)))

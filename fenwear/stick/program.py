@@ -1,8 +1,8 @@
-"""What the rig does over a cycle, cut into time steps: displacement or force, bulk stress, loads.
+"""Motion and loads of the rig over a cycle, cut into time steps: displacement or force, bulk stress, loads.
 
-A cycle as a table goes row by row: its loads and the place of the strip are those of each row at the end of a step. How
-far it is moved along the direction of the longest step is its displacement; what it is moved by beside that goes with
-the `way` of the step.
+A cycle as a table goes row by row: its loads and the place of the strip are those of each row at the end of a step. Its
+displacement is the motion along the direction of the longest step; the other components of the motion are in the `way`
+of the step.
 """
 
 from __future__ import annotations

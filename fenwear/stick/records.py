@@ -28,8 +28,8 @@ class TimeStepRecords:
         traction: On the punch along the tangents (k, n, m), MPa.
         slip: Of the punch against the strip in the step (k, n, m), mm.
         gap: (k, n), mm.
-        work: What rig and loads do in the step (k,), N or N mm.
-        stored: What both bodies take up, or lose in creep (k,).
+        work: Work of rig and loads in the step (k,), N or N mm.
+        stored: Energy that both bodies store, or lose in creep (k,).
         dissipated: Friction's work of each node over its area (k, n), N/mm.
         closing: Work of the pressure on gaps that close or open in the step (k,): of the step's size, it vanishes
             with it.
@@ -100,7 +100,7 @@ class TimeStepRecords:
     def slip_amplitude(self, weights: Array, half_cycles: int) -> float:
         """Return how far the surfaces slip to each side in steps of so many half-cycles, mm.
 
-        Its mean over the pressure: where nodes stick, the strip's surface goes with the punch's.
+        Its mean over the pressure: where nodes stick, the strip's surface moves with the punch's.
         """
         carried = np.maximum(self.pressure @ weights, 1e-300)
         return float(((self.pressure * self.slip_magnitude) @ weights / carried).sum()) / (2 * half_cycles)
@@ -129,12 +129,12 @@ class FrettingCycle:
         number: Of cycles done before it.
         worn: Depths at its shape.
         half_cycles: Records of its half-cycles.
-        rate: Depths that a cycle wears there, of coated bodies as if coatings went on.
+        rate: Depths that a cycle wears there, of coated bodies as if coatings lasted.
         bases: The same as if coatings were worn through.
         error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
-        end: State at its end. What comes next follows from it.
+        end: State at its end. The next step follows from it.
         length: Cycles of the next jump, as wished; below 1 a part of one.
         warm: Temperatures at the start of its records (dim,); empty without heat.
         finer: Depths to which jumps of next to no length would have led, to the next order; None where nobody asks.
@@ -172,7 +172,7 @@ def record(
         interface: The bodies.
         heat: Of friction; None without.
         at, after: The states at its start and end.
-        step: What was done in it.
+        step: Its loads and motions.
         wear: By its law.
     """
     state, position = after.contact, interface.position(step.offset)

@@ -57,7 +57,7 @@ def partial_slip_problem(
         condensed: Both, where they are condensed already.
 
     Raises:
-        CaseError: it is a case of gross sliding, or what only the geometry can tell is wrong.
+        CaseError: it is a case of gross sliding, or a property of the geometry is wrong.
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
@@ -177,13 +177,13 @@ def touches(problem: PartialSlipProblem) -> bool:
 
 
 def _asks_for_slip(problem: PartialSlipProblem, case: Case) -> bool:
-    """Return whether a strip passes by default, as far as its supports tell."""
+    """Return whether a strip passes by default, judged by its supports."""
     by_default = not isinstance(case.motion, Cycle) and getattr(case.motion, "positions", 2) is None
     return problem.interface.moves and by_default
 
 
 def _slips_far(problem: PartialSlipProblem) -> bool:
-    """Return whether what slips in the first cycle passes nodes, however far the supports go; collective."""
+    """Return whether the slip of the first cycle passes nodes, however far the supports move; collective."""
 
     def found() -> bool:
         pair, cycle = problem.interface.middle.pair, TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
@@ -200,7 +200,7 @@ Ends = NDArray[np.int64]  # of steps, as numbers of the finest ones
 
 @dataclass(frozen=True)
 class Fineness:
-    """How fine the time steps are.
+    """Fineness of the time steps.
 
     Attributes:
         steps: Of a half-cycle, on average.

@@ -1,4 +1,4 @@
-"""What is imposed on a time step of contact with stick, the state at its end, and where a run is."""
+"""Loads and motions of a time step of contact with stick, the state at its end, and the place of a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_SHIFT: Array = np.zeros((1, 1))  # of any node along any axis
 
 @dataclass(frozen=True)
 class Imposed:
-    """What is imposed at the end of a time step.
+    """Loads and motions at the end of a time step.
 
     Attributes:
         loaded: The loads.
@@ -29,9 +29,9 @@ class Imposed:
         force: Tangential force on the strip along the motion, N/mm or N; None where the displacement is.
         strain: Bulk strain eps_xx of the strip's surface.
         duration: Of the step, s: what creeps does so over it.
-        beside: What the strip's supports are moved by beside the displacement, at the contact nodes (n, d), mm; by
+        beside: Motion of the strip's supports beside the displacement, at the contact nodes (n, d), mm; by
             default nothing.
-        closure: By what all that lies between gives way where it is worn as here; None where nothing does.
+        closure: Closure of all layers at the present wear; None where nothing does.
     """
 
     loaded: LoadEffect
@@ -83,7 +83,7 @@ class StickState:
         crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
         elastic: Displacements by the forces of now of all that may creep, from which it creeps on; empty where nothing
             does.
-        beside: What the strip's supports are moved by beside the displacement (n, d), mm.
+        beside: Motion of the strip's supports beside the displacement (n, d), mm.
         flowed: Depth that the surfaces have flown in the step (n,), mm.
     """
 
@@ -142,10 +142,10 @@ class PartialSlipState:
         pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
             was not: zones come back from cycle to cycle, so that Newton starts there.
         load: Factor of all loads in the steps to come.
-        slid: What each node has slipped from the start (n,), mm.
+        slid: Slip of each node from the start (n,), mm.
         speed: Of the slip of each node in the last step (n,), mm/s.
         coupling: Iterations of contact and heat in the last step.
-        held: What laws remember after the last step, where that is not what `worn` has; the shape stays until the end
+        held: States of laws after the last step, where they differ from those of `worn`; the shape stays until the end
             of a half-cycle.
         slips: Of the nodes in each time step of the cycle (k, n, m), mm, as `trials`.
     """

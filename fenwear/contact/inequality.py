@@ -213,7 +213,8 @@ class Inequality:
 
     def _by_sets(self, start: Array) -> Array | None:
         """Return the solution by a step of Newton's on each of a sequence of sets; None where they come again."""
-        x, key, before, seen = start.copy(), self._free(start), np.inf, Counter[bytes]()
+        x, before, seen = np.clip(start, self._lower, self._upper), np.inf, Counter[bytes]()  # a start may lie beyond
+        key = self._free(x)
         free = _mask(key)
         try:
             for self.iterations in range(SETS):

@@ -13,7 +13,8 @@ from fenwear import Tribosystem, assemble, evolve, march, steady
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.contact.condensed import CondensedContact
-from fenwear.cycle.jump_step import FINE, LOOSEST
+from fenwear.cycle.jump_method import FINE
+from fenwear.cycle.jump_step import LOOSEST
 from fenwear.interface import compliance
 from fenwear.plausibility import Seen, StateMonitor
 

@@ -92,8 +92,8 @@ def test_upper_bounds() -> None:
         np.zeros(2), np.array([1.0, 1.0]), lambda x: x - target, lambda _: operator, "test_", "the test"
     )
     operator, target = Dense(np.eye(2)), np.array([2.0, 0.5])
-    for near in (False, True):
-        np.testing.assert_allclose(solver.solve(np.array([1.0, 0.4]), near=near), [1.0, 0.5], atol=1e-14)
+    for near, begin in product((False, True), (1.0, 1 + 1e-8)):  # what beyond the bound a start has is not kept
+        np.testing.assert_allclose(solver.solve(np.array([begin, 0.4]), near=near), [1.0, 0.5], rtol=0, atol=1e-14)
     target[0] = 0.7  # now the bound must let go
     np.testing.assert_allclose(solver.solve(np.array([1.0, 0.4]), near=True), [0.7, 0.5], atol=1e-14)
 

@@ -87,7 +87,7 @@ class ContactStatus(NamedTuple):
 
 
 class SurfaceDisplacement(NamedTuple):
-    """Displacements by tractions alone: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
+    """Displacements by tractions: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
 
     jump: Array
     on_punch: Array

@@ -31,7 +31,7 @@ from fenwear.stick.state import PartialSlipState
 
 
 class StepSlips(NamedTuple):
-    """Variables of laws in k time steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
+    """Variables of laws in k steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
 
     pressure: Array
     slid: Array

@@ -314,8 +314,6 @@ def _numbers(heating: Heating, both: Sequence[Conductor]) -> tuple[tuple[float, 
     """Return the largest Peclet number of each body, and the time in which heat spreads over a half-cycle's."""
     half = float(heating.extent.max()) / 2
     first, second = (heating.fastest * half / (2 * one.diffusivity) for one in both)
-    if np.isinf(heating.period):
-        return (first, second), (0.0, 0.0)
     one, two = (2 * half**2 / one.diffusivity / heating.period for one in both)
     return (first, second), (one, two)
 

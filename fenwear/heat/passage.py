@@ -8,7 +8,7 @@ the transpose.
 
 from __future__ import annotations
 
-from functools import cached_property, reduce
+from functools import cache, cached_property, partial, reduce
 from operator import add
 
 import numpy as np
@@ -37,7 +37,7 @@ class Passage:
 
     def __init__(self, middle: ContactPair, sliding: SlidingField, motion: Motion) -> None:
         self.middle, self._sliding, self.motion = middle, sliding, motion
-        self._found: dict[Placement, csr_array] = {}
+        self._at = cache(partial(transfer_at, middle))
         self._whole = list(dict.fromkeys(way for row in motion.ways(sliding, 1) for way in row))
         ends = list(dict.fromkeys(way.at(share) for way in self._whole for share in (0.0, 1.0)))
         for place in sorted(
@@ -88,8 +88,3 @@ class Passage:
         """Return how far the strip's nodes are apart at two places, mm."""
         trace = self.middle.strip.trace
         return float(np.linalg.norm(other.points(trace) - one.points(trace), axis=1).max())
-
-    def _at(self, place: Placement) -> csr_array:
-        if place not in self._found:
-            self._found[place] = transfer_at(self.middle, place)
-        return self._found[place]

@@ -338,7 +338,7 @@ class Friction:
         self, state: Mapping[str, Array], conditions: ContactConditions, share: Array | float, *, checked: bool = True
     ) -> Array:
         """Return mu at the nodes (n,) by the variables of laws, a share, and of conditions what coatings are left."""
-        found, lubrication = self._of_asperities(state, conditions, checked=checked), self.contact.lubrication
+        found, lubrication = self.of_asperities(state, conditions, checked=checked), self.contact.lubrication
         if lubrication is None:
             return found
         return np.asarray(lubrication.fluid_friction + share * (found - lubrication.fluid_friction))
@@ -351,17 +351,14 @@ class Friction:
         """
         return self._values(conditions.of("friction"), conditions, self.share(conditions))
 
-    def of_asperities(self, conditions: ContactConditions) -> Array:
-        """Return the friction coefficient of the touching asperities at the nodes (n,).
+    def of_asperities(
+        self, state: Mapping[str, Array], conditions: ContactConditions, *, checked: bool = True
+    ) -> Array:
+        """Return the friction coefficient of the touching asperities at the nodes (n,), as `_values`.
 
         Raises:
             CaseError: it is negative or not finite.
         """
-        return self._of_asperities(conditions.of("friction"), conditions)
-
-    def _of_asperities(
-        self, state: Mapping[str, Array], conditions: ContactConditions, *, checked: bool = True
-    ) -> Array:
         mu = self.contact.friction
         if isinstance(mu, Dependence):
             found = mu.values(state, conditions.shape, 1.0, "contact.friction", checked=checked)

@@ -497,7 +497,7 @@ def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditio
         return scale * given
     if law.archard is not None and law.hardness is not None:
         return law.archard / law.hardness
-    mu = friction.of_asperities(conditions)
+    mu = friction.of_asperities(conditions.of("friction"), conditions)
     if law.energy is not None:
         return law.energy * mu
     return (law.beta or 0.0) * mu**law.pressure_exponent

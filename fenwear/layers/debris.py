@@ -155,7 +155,11 @@ class Debris:
         """
         if not self.present:
             return NO_CYCLE
-        x = slid * np.array([self.lost(one) for one in conditions]) if self.varies else np.asarray(slid / self.life)
+        x: Array
+        if isinstance(self.life, Dependence) or self.edge_life < np.inf:
+            x = slid * np.array([self.lost(one) for one in conditions])
+        else:
+            x = slid / self.life
         if onto:
             x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept

@@ -277,7 +277,7 @@ class PhasesWear:
 
     def worn(self, pressure: Array) -> WornDepths:
         """Return what all phases wear off both bodies at pressures (m, n)."""
-        strip = np.zeros(len(self.pairs[0].strip.weights))
+        strip: Array = np.zeros(len(self.pairs[0].strip.weights))
         if self.strip.wears:
             strip = sum(self.strip.at(pressure).on_material(pressure), strip)
         punch = self.depth(pressure)
@@ -328,7 +328,7 @@ class PhasesWear:
     @cached_property
     def _left(self) -> Array:
         m, n = len(self.pairs), len(self.pairs[0].weights)
-        parts = [np.zeros((m, n, 0))]
+        parts: list[Array] = [np.zeros((m, n, 0))]
         if self.punch.wears:
             parts.append(np.broadcast_to(np.eye(n), (m, n, n)))
         if self.strip.wears:

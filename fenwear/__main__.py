@@ -1,7 +1,7 @@
 """Start of the program, on one rank or many: exit statuses and errors.
 
 0 success; 2 a wrong case or usage; 3 a solver that did not converge; 1 anything else.
-What follows `--` on the command line goes to PETSc.
+PETSc gets the arguments after `--`.
 """
 
 from __future__ import annotations

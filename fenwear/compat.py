@@ -1,4 +1,4 @@
-"""What differs between versions of the stack, found by feature, never by version number."""
+"""Differences between versions of the stack, found by feature, never by version number."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ check_numbers()
 def _share_cells() -> None:
     """Let elements share one cell of each kind, as cells never change.
 
-    UFL makes it anew, with every part of its parts, whenever an element is asked for it: a hexahedron's were a sixth of
-    what a small solid takes to assemble.
+    UFL makes it again, with every part of its parts, whenever an element is asked for it: a hexahedron's were a sixth
+    of what a small solid takes to assemble.
     """
     element = getattr(basix.ufl, "_ElementBase", None)
     made = getattr(getattr(element, "cell", None), "fget", None)
@@ -108,7 +108,7 @@ def geometry_degree(mesh: Mesh) -> int:
 
 
 def petsc_library() -> str | None:
-    """Return the path of PETSc's library; None where it is not found. Up to 0.9 dolfinx.utils tells it."""
+    """Return the path of PETSc's library; None where it is not found. Up to 0.9 dolfinx.utils has it."""
     import dolfinx.fem.petsc
 
     home = dolfinx.fem.petsc

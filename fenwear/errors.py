@@ -56,7 +56,7 @@ class HeatError(ConvergenceError):
 
 
 class OutputError(FenwearError):
-    """A file of the results cannot be written: names it, the reason and, in a run, how to go on."""
+    """A file of the results cannot be written: names it, the reason and, in a run, the way to resume."""
 
     def __init__(self, path: Path, reason: str, how_to_go_on: str = "") -> None:
         self.path, self.reason, self.how_to_go_on = path, reason, how_to_go_on
@@ -67,7 +67,7 @@ class OutputError(FenwearError):
 
 
 class RanksError(FenwearError):
-    """What ranks should do together went wrong: one leads where all are asked for, or its answer cannot reach them."""
+    """Ranks did not act together: one leads where all are asked for, or its answer cannot reach them."""
 
 
 class StackError(FenwearError, ImportError):
@@ -75,11 +75,11 @@ class StackError(FenwearError, ImportError):
 
 
 class InterruptedRunError(FenwearError):
-    """A signal ended a run; its checkpoint allows to go on."""
+    """A signal ended a run; its checkpoint can be resumed."""
 
 
 class TimeUpError(Exception):
-    """What was to be done within a time limit took longer."""
+    """A task took longer than its time limit."""
 
 
 class PartDoneError(FenwearError):

@@ -87,11 +87,11 @@ def resolve_law(
         case: The problem.
         log: Told which law is taken of "auto", and why.
         comm: The ranks.
-        heat: How that of a system is prepared: see `assembly.assemble`.
+        heat: Preparation of a system's heat: see `assembly.assemble`.
         fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
     """
     if case.contact.law == "auto" and case.stick != Stick():
         log("contact.law: 'coulomb' is taken, as the table stick is given")

@@ -124,7 +124,7 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
 
 @dataclass(frozen=True)
 class WearRates:
-    """How fast pressures wear both bodies together: W(p) = sum of K_i times the law of body i.
+    """Wear rate of both bodies together by pressures: W(p) = sum of K_i times the law of body i.
 
     Attributes:
         rates: K of each body that wears (n,), the mean of beta~ v^a, mm/s MPa^-b.
@@ -192,7 +192,7 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
 
     Args:
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
-        wear: How fast pressures wear; where all its coefficients are zero, the pressure is as if they were alike.
+        wear: Wear rate by pressures; where all its coefficients are zero, the pressure is as if they were alike.
         zone: Nodes that are in contact (n,) bool; by default all.
 
     Raises:
@@ -302,7 +302,7 @@ def optimum_on_track(
 
     Args:
         rigid, friction_ratio, zone: As of `optimum`.
-        punch: How fast pressures wear the punch.
+        punch: Wear rate of the punch by pressures.
         strip: The strip's law of the pressure.
         recession: The velocity at which the strip recedes opposite each node at pressures (n,), mm/s.
 

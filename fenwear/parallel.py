@@ -1,11 +1,11 @@
 """Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit; one leads all.
 
 Sums, products and logarithms end in other last bits on other processors. So rank 0 alone computes what works on numbers
-that every rank could have, and takes all decisions: `Team.lead`. What is spread over the ranks, all do together.
+that every rank could have, and takes all decisions: `Team.lead`. All ranks act together on distributed data.
 
 PETSc's objects on several ranks are freed by all of them together, so that petsc4py keeps those that
-Python drops until it is told to free them. What is large is destroyed where it was made, and the rest
-where `release` is called.
+Python drops until it is asked to free them. Large objects are destroyed where they were made, and the rest where
+`release` is called.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def release(comm: MPI.Comm) -> None:
 class Team:
     """Ranks that work for rank 0 while it leads: what it decides needs no other rank's agreement.
 
-    What one call leads may lead further: the outermost leads all. Ranks of one group are one team.
+    A led call may lead further: the outermost leads all. Ranks of one group are one team.
     """
 
     _teams: ClassVar[list[Team]] = []
@@ -251,7 +251,7 @@ class Team:
         self.comm.bcast(packed)
 
     def _told(self) -> Any:
-        """Return what rank 0 tells; who waits long leaves the core to others."""
+        """Return the value of rank 0; who waits long leaves the core to others."""
         come, begin = self.comm.Ibarrier(), time.perf_counter()
         while not come.Test():
             if time.perf_counter() > begin + BUSY:
@@ -321,10 +321,10 @@ def check_memory(comm: MPI.Comm, taken: float, key: str, what: str, advice: str,
 
     Args:
         comm: The ranks.
-        taken: What the step asks for, bytes.
+        taken: Memory of the step, bytes.
         key: Of the case, which decides over it.
         what: Asks for the memory.
-        advice: What to do where it is too much.
+        advice: Advice where it is too much.
         spread: Whether the ranks share what is taken; else rank 0 has it.
 
     Raises:

@@ -35,8 +35,8 @@ class Progress:
 
     Args:
         unit: Of what is counted, such as cycle.
-        total: How many there will be.
-        done: How many there were before.
+        total: Final number.
+        done: Number before.
         comm: The ranks.
         how: A bar where standard error is a terminal, lines, or none.
     """

@@ -98,7 +98,7 @@ def run_case(
     Args:
         case: The problem.
         name: Names the folder results/NAME where `output` is None: a new one, NAME-2 where there is NAME.
-        output: New folder of the results, or with `resume` the folder of the run to go on with.
+        output: New folder of the results, or with `resume` the folder of the run to resume.
         log: Called with each message; by default the first rank prints it.
         resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line for every block, or none.
@@ -534,7 +534,7 @@ def _standing_profile(system: Tribosystem) -> list[str]:
 
 
 def _uneven(system: Tribosystem) -> bool:
-    """Return whether the strip's profile changes along the sliding: a worn track that goes on as it is does not."""
+    """Return whether the strip's profile changes along the sliding: a worn track that is uniform does not."""
     strip, depth = system.pair.strip, system.pair.strip.below_mesh
     if system.case.strip.profile is None:
         return False

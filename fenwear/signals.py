@@ -94,7 +94,7 @@ class RunMonitor:
     Args:
         comm: The ranks.
         signals: That end the run.
-        told: Told that it goes on.
+        told: Gets the progress.
         save: Writes a checkpoint, where there is something to save; collective.
         every: Time between two checkpoints, s.
         block: Time after which a block of results ends, s.
@@ -129,7 +129,7 @@ class RunMonitor:
         return self._comm.size == 1 and not self._signals.received and time.monotonic() < self._looked + LOOK
 
     def look(self) -> bool:
-        """Save where it is due, tell that the run goes on, and return whether a signal has come; collective."""
+        """Save where it is due, report progress, and return whether a signal has come; collective."""
         self._looked = now = time.monotonic()
         root = self._comm.rank == 0
         wishes = [self._signals.received, root and now > self._due, root and now > self._begun + self._block]

@@ -1,4 +1,4 @@
-"""The stack below fenwear: loaded in an order that works, and what is missing is told by its name.
+"""The stack below fenwear: loaded in an order that works; an error names a missing part.
 
 In wheels from PyPI, dolfinx and PETSc find the library of MPI only where mpi4py has loaded it before.
 """
@@ -126,7 +126,7 @@ def ensure_folder(comm: MPI.Comm) -> str | None:
     Before dolfinx is imported, which takes the folder from the environment.
 
     Returns:
-        What is to be said of it; None where all is well.
+        Remark; None where all is well.
     """
     from fenwear.parallel import on_root
 

@@ -208,7 +208,7 @@ def _steps(
     Args:
         again: The run in another discretisation.
         before: Its numbers.
-        of_jumps: What jumps of the run itself leave in them.
+        of_jumps: Error of the run's own jumps in them.
         first: Its first half-cycles.
         last: The last ones of the run itself.
     """

@@ -215,7 +215,7 @@ class ContactSetup:
 
     @cached_property
     def ways(self) -> SlidingWays:
-        """What slides how far and where to in each phase of a cycle: tensors, cross-shear."""
+        """Distances and directions of sliding in each phase of a cycle: tensors, cross-shear."""
         mean, asked = self.rigid.mean_pressure, self.asks("cs") or self.asks("pm")
         return SlidingWays(self.pairs, self.pair, self.path, self.sliding_directions, self.strip_wears, mean, asked)
 

@@ -33,7 +33,7 @@ KEPT = 4  # couplings of the last steps
 
 
 class CreepTangent(NamedTuple):
-    """What changes of the state of what creeps, and of the pressures, do in a phase.
+    """Effect of changes of the creep state, and of the pressures, in a phase.
 
     Attributes:
         opened: Gap by a state (n, state).

@@ -2,7 +2,7 @@
 
 A law is registered here by its name in a case, `contact.law`, as the module that has it as `LAW`, or as an object by
 `register_contact_law`; nothing else in this package names one. They share the loop (`cycle.driver`), the state
-(`cycle.state`), blocks, runs and results. What differs beyond their steps they answer themselves: the questions are
+(`cycle.state`), blocks, runs and results. Each law answers its differences beyond the steps: the questions are
 those of `ContactLaw`.
 """
 

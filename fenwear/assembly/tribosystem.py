@@ -114,7 +114,8 @@ class Tribosystem(ContactSetup):
         return bool(self.contact_law.replicated(self))
 
     def led(self, function: Callable[[], T]) -> T:
-        """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.
+        """Call the function that continues from prepared bodies, on rank 0 for all where that can be, else on every
+        rank; collective.
 
         Raises:
             Exception: what `function` raised, on every rank.

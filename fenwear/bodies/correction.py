@@ -16,8 +16,8 @@ at the contact: with K for the mesh without supports,
 which is symmetric in i and j but for the second term, where the half-space's own field is taken by its nodal values.
 Its error falls with twice the order of the elements. On a curved surface the half-space leaves tractions near the
 contact, too, of the order of its width over the radius, as Hertz's theory leaves them out: facets below the grid bear
-none, and what goes on beside it nearly in its plane bears them more and more up to twice the grid. Loads f move the
-contact likewise, F_j . u(y_j) = f . (U_j + u_j).
+none, and surfaces beside it nearly in its plane bear them more and more up to twice the grid. Loads f move the contact
+likewise, F_j . u(y_j) = f . (U_j + u_j).
 
 Points are Chebyshev's of the first kind over the contact grid, and polynomials through them take the correction in
 between: L C L^T for forces on the grid. The decay of the polynomials' coefficients shows whether they may.
@@ -134,8 +134,8 @@ class Correction:
         response: Displacement at each point along each direction, from unit forces at each (m, a, m, d), mm.
         fields: Displacement of this rank's own degrees of freedom from unit forces at each point along each direction
             (owned, m, a), mm: what loads do on them they do to the contact.
-        uneven: How much of the response was not symmetric, at most, mm/N, in the plane mm/(N/mm).
-        guided: What the body answers to its guides; the moments about what they hold of the tractions that unit forces
+        uneven: Largest asymmetry of the response, mm/N, in the plane mm/(N/mm).
+        guided: Response of the body to its guides; the moments about what they hold of the tractions that unit forces
             at the points leave on the body (m, d, g), those of the forces themselves but for quadrature; and what their
             couples move at the points (m, d, g).
     """
@@ -240,7 +240,7 @@ def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
 
 
 def _borne(grid: RegularGrid, x: Any, normal: Any) -> Any:
-    """Return the share of the tractions that the boundary bears: all, but less where it goes on beside the grid."""
+    """Return the share of the tractions that the boundary bears: all, but less where it continues beside the grid."""
     beside = ufl.as_ufl(1.0)
     distance = ufl.as_ufl(0.0)
     for axis, middle, side in zip(grid.axes, grid.middle, grid.sides, strict=True):

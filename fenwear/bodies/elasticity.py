@@ -268,7 +268,7 @@ class ElasticBody:
 
     @property
     def guide_answer(self) -> GuideAnswer:
-        """What the body answers to its guides, solved for once; collective at first use."""
+        """Response of the body to its guides, solved for once; collective at first use."""
         if not self._answers:
             guides, comm = self.guides, self.body.mesh.comm
             right = guides.couples.copy()

@@ -122,7 +122,7 @@ class Kept:
     Attributes:
         comm: The ranks.
         path: Of the file; None where nothing is kept.
-        arrays: What is kept there; none unless every rank has its own.
+        arrays: The kept results; none unless every rank has its own.
     """
 
     comm: MPI.Comm

@@ -1,4 +1,4 @@
-"""Commands that tell about the program: its versions, cases and keys."""
+"""Commands about the program: its versions, cases and keys."""
 
 from __future__ import annotations
 

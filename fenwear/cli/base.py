@@ -1,4 +1,4 @@
-"""What all commands share: the application, its common options, reading a case, printing, and what was removed."""
+"""Common parts of all commands: the application, its common options, reading a case, printing, and what was removed."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 
 
 class _Spoken:
-    """What the case that a command has read calls its bodies: all that it prints for people has these names."""
+    """Names of the bodies in the case that a command has read: all that it prints for people has these names."""
 
     names = BY_ROLE
     record: ClassVar[list[str] | None] = None  # what is logged, where a command gives it as JSON
@@ -138,7 +138,7 @@ def clear(output: Path | None, *, resume: bool) -> None:
     """Remove the results in a folder; collective.
 
     Raises:
-        CaseError: no folder is named, it is to be gone on with, or it holds other files.
+        CaseError: no folder is named, it is to be resumed, or it holds other files.
     """
     from fenwear.results.history import clear_directory
 

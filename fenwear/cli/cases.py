@@ -183,7 +183,7 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
 
     Args:
         system: The problem.
-        seconds: How long it may take; the system is returned as it is where that is not enough.
+        seconds: Longest time; the system is returned as it is where that is not enough.
     """
     from fenwear.assembly import with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings
@@ -226,7 +226,7 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     """Return what a system with stick comes to in its first cycle, and the warnings; collective.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
         ConvergenceError: a time step did not converge.
     """
     from fenwear.plausibility import RULES, Seen, law_warnings, unique_text

@@ -179,7 +179,7 @@ def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
     """Return the final shape of partial slip, and its key numbers; collective.
 
     Raises:
-        CaseError: what only the geometry can tell is wrong.
+        CaseError: a property of the geometry is wrong.
         ConvergenceError: nothing sticks.
     """
     from fenwear.cycle.totals import approach

@@ -318,7 +318,7 @@ class CondensedContact:
 
     @cached_property
     def _linear(self) -> Operator:
-        """The derivative of the residual without what wears in the step."""
+        """The derivative of the residual without the wear of the step."""
         return GriddedPhases(self._grid) if self.gridded and self._coupling is None else self._as_phases()
 
     @cached_property

@@ -123,7 +123,7 @@ class _Leaving:
             self._heights_of.mesh_update_due(system.unworn())
 
     def __call__(self, state: RunState) -> bool:
-        """Return whether something is to be made anew; collective, or for rank 0 that leads."""
+        """Return whether parts need an update; collective, or for rank 0 that leads."""
         return self._renewal(state, partial(self.system.team.each, self, "is_warm")) is not None
 
     def renewal(self, state: RunState) -> Renewal | None:

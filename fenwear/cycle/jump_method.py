@@ -1,6 +1,6 @@
 """One cycle jump: its two stages, its error, and how long the next one is; laws of contact give the stages.
 
-The state y(n) after n cycles, the worn depths and what goes with them, follows dy/dn = M(y) + R(n): M is the wear of
+The state y(n) after n cycles, the worn depths and layers, follows dy/dn = M(y) + R(n): M is the wear of
 a contact inequality, R what cycles do beside it, linear in n and zero in gross sliding. One step of N cycles has the
 two stages of the second-order, L-stable and stiffly accurate method SDIRK2 (Alexander, SIAM J. Numer. Anal. 14, 1977),
 with R the implicit-explicit method ARS(2,2,2) (U. M. Ascher et al., Applied Numerical Mathematics 25, 1997). With
@@ -48,7 +48,7 @@ class Moment:
     """A moment of a jump; laws of contact add what else they follow.
 
     Attributes:
-        worn: Depths and what goes with them.
+        worn: Depths and layers.
         contact: Of all phases, as last solved; of none before the first.
         time: Of that contact, cycles since the begin of the jump.
     """
@@ -63,7 +63,7 @@ T = TypeVar("T")
 
 
 class JumpLaw(Protocol[M]):
-    """What a law of contact gives a jump."""
+    """Data of a law of contact for a jump."""
 
     def stage(self, before: M, cycles: float, time: float, near: ContactState, digits: float) -> M:
         """Return z = before + cycles (M(z) + R(time)), its contact looked for near one, to a share of the tolerance."""
@@ -136,7 +136,7 @@ def two_stages(law: JumpLaw[M], before: M, cycles: float, since: float, near: Tr
         before: Where it begins.
         cycles: Its length.
         since: Cycles from the begin of the jump to that of the step.
-        near: How contacts change, which takes those of the step, too.
+        near: Change of contacts, which takes those of the step, too.
         digits: Share of the tolerance that its last contact is solved to; of a first stage its wear is all that stays.
     """
     share = GAMMA * cycles
@@ -158,7 +158,7 @@ class Attempt(Generic[M]):
         whole: The end of the whole step.
         cycles: Its length.
         comes: Whether nodes come into contact, so that it ends by a last step.
-        near: How contacts change in it.
+        near: Change of contacts in it.
     """
 
     begin: M
@@ -178,8 +178,8 @@ class Attempt(Generic[M]):
     def finer(self, law: JumpLaw[M], fine: M) -> M:
         """Return where jumps of next to no length lead, from where they had led before.
 
-        From the begin y to y_h in halves and to y_w as a whole y_h is off by a third of y_w - y_h; what was off before,
-        y - f, goes on as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
+        From the begin y to y_h in halves and to y_w as a whole y_h is off by a third of y_w - y_h; the earlier error, y
+        - f, continues as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
         come into contact y_h has the error of its last step, of first order, too, which is taken from it.
         """
         moved = self.whole
@@ -231,7 +231,8 @@ class Estimate:
         depth: Of the worn depths over what the jump wears, both integrated over the surfaces; so the errors of
             all jumps add up to at most the largest of them times the depth. Or, where a coating ends in the jump, the
             largest at such a place over the largest that the jump wears: it may wear many times as much by itself.
-        pressure: How far the contact force lies from where it should, over the width in contact, in the worst phase.
+        pressure: Distance of the contact force from its place in equilibrium, over the width in contact, in the worst
+            phase.
         temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
         state: Of the states that laws remember, and of the thickness of debris, over the largest they are in the jump,
             both integrated.
@@ -326,13 +327,13 @@ class Lengths:
 
 @dataclass(frozen=True)
 class Sizes:
-    """How large depths and states of two surfaces are, and errors of them.
+    """Norms of depths and states of two surfaces, and of their errors.
 
     One measure serves all: the size of an error over that of what the jump adds, and over no less than a share of all
     that there is at its end. A state that lives and dies many times in a jump is measured by all of it.
 
     Attributes:
-        layers: What lies between.
+        layers: The layers.
         pair: The surfaces.
         crept: The gap (n,) that a state of what creeps opens, mm.
         rest: Share of all depths: near the end of wear errors are no longer measured by what a jump wears alone.
@@ -407,7 +408,7 @@ def force_difference(pair: ContactPair, first: Array, second: Array) -> float:
     """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
 
     The Wasserstein distance of the two distributions, and the difference of their forces. Not a norm of the pressures'
-    difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
+    difference: a node at the edge closes as soon as the shape changes by a node's compliance, and a norm would be
     that of this node alone.
     """
     x, weights = pair.punch.x, pair.weights

@@ -45,7 +45,7 @@ LOOSEST = 5e-3  # tolerance that contacts are solved to: of a rough run, too, th
 
 @dataclass(frozen=True)
 class _Rate:
-    """What the cycle of a solved stage changes of temperature (dim,), depths and totals.
+    """Changes of temperature (dim,), depths and totals over the cycle of a solved stage.
 
     Its conductances (m, n) are those by which it is heated. Wear through coatings depends on the begin and the length
     of a step: `wear` is that of its phases.

@@ -253,7 +253,7 @@ def _lying(
         conditions: In it.
         by_depths, by_lost: Derivatives of what both bodies lose and of what is lost over a unit of sliding, to the
             pressure, the temperatures and the thickness of debris at the nodes of the contact.
-        taken: What both bodies lose (n,), mm.
+        taken: Wear of both bodies (n,), mm.
         worn: With the debris at the start.
 
     Returns:

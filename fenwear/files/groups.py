@@ -163,7 +163,7 @@ class _Sides:
 
     @cached_property
     def boundary(self) -> Ints:
-        """Those of one element alone, by element and number (n, 2)."""
+        """Facets of one element alone, by element and number (n, 2)."""
         return self.mesh.boundary(self.elements)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""How friction heat is shared where two bodies touch, node by node and at every instant.
+"""The partition of friction heat between two bodies, node by node and at every instant.
 
     q_1 + q_2 = Q,    kappa Q - q_1 = h_c (theta_1 - theta_2),    theta_1 = theta_2 where h_c has no end,
 
@@ -10,7 +10,7 @@ them, in proportion to the mean power P_i that enters each. So
 at the nodes in contact; elsewhere nothing enters. GMRES solves it, with the inverse of the symbols of both bodies at
 rest before it, (K_1 and K_2) sqrt(k^2 + i n omega / kappa).
 
-What a finite body adds at its contact to the half-space that the kernels are of: smooth, one solution of a mesh.
+The addition of a finite body at its contact to the half-space of the kernels: smooth, one solution of a mesh.
 
 A half-space of the contact's conductivity K_1 under a unit of power that enters at points y_i with shares P_i has
 
@@ -55,7 +55,7 @@ RESTART, RESTARTS = 40, 5
 
 @dataclass(frozen=True)
 class Bulk:
-    """What a finite body adds at the contact to the half-space that it is.
+    """The addition of a finite body at the contact to the half-space.
 
     Attributes:
         base: Its temperature there without friction, over the surroundings, K.

@@ -203,7 +203,7 @@ PLANE = (1, 2)
 
 
 class Response(Protocol):
-    """What takes heat (t, m, n), mW/mm², at t instants of a grid to the temperatures there, K."""
+    """Map from heat (t, m, n), mW/mm², at t instants of a grid to the temperatures there, K."""
 
     def apply(self, heat: Array) -> Array:
         """Return the temperatures (t, m, n), K."""
@@ -283,7 +283,7 @@ class Periodic:
 
     @cached_property
     def _phases(self) -> Complex:
-        """What moves heat to its place on the body (t, ...): exp(i k . X), real at the shortest waves."""
+        """Map of heat to its place on the body (t, ...): exp(i k . X), real at the shortest waves."""
         if not np.ptp(self.shifts, axis=0).any():
             return np.ones((1, 1, 1), dtype=complex)
         parts: list[Complex] = []

@@ -139,7 +139,7 @@ class Window:
         return self.nodes.shape[0], self.nodes.shape[1]
 
     def extent(self, touching: Mask) -> Array:
-        """Return the sides of what touches at any of some instants (t, m, n), as (2,), mm."""
+        """Return the sides of the contact at any of some instants (t, m, n), as (2,), mm."""
         counts = [len(np.unique(places)) for places in np.nonzero(touching)[1:]]
         return np.asarray(np.array(self.sides) * counts)
 
@@ -193,7 +193,7 @@ class Heating:
 
     @property
     def extent(self) -> Array:
-        """Sides of what touches (2,), mm."""
+        """Sides of the contact (2,), mm."""
         return self.window.extent(self.touching)
 
 
@@ -312,7 +312,7 @@ def _check_memory(comm: MPI.Comm, cells: float) -> None:
 
 
 def _of_time_steps(case: Case, directory: Path) -> Heating:
-    """Return the heat of surfaces that stick or slip, of a cycle that goes on from the run's end; collective."""
+    """Return the heat of surfaces that stick or slip, of a cycle that continues from the run's end; collective."""
     if case.program is not None:
         raise CaseError(
             InputError("program", "expected none with contact.law = 'coulomb', where a cycle is done again")

@@ -155,17 +155,17 @@ class FlashTemperatures:
     """Temperatures of a contact over a cycle, at t instants of m by n nodes.
 
     Attributes:
-        heating: What heats.
+        heating: The source.
         heat: That goes into punch and strip (t, m, n), mW/mm².
         flash: Rise of the surfaces of both over their bulk (t, m, n), K.
-        bulk: What is added to it at the contact by each finite body, K over the surroundings; None where it is not
+        bulk: Addition of each finite body at the contact, K over the surroundings; None where it is not
             known.
-        way: How it was found: "steady", "harmonics" or "instants".
+        way: Its origin: "steady", "harmonics" or "instants".
         peclet: Largest v a / 2 kappa of both bodies, a half the contact's length.
         quick: a^2 / kappa over the time of a half-cycle, of both; 0 of one that is steady.
         feedback: G; None without `expansion`.
         across: Nodes across the contact along both axes.
-        warnings: What is to be known of them.
+        warnings: Remarks.
     """
 
     heating: Heating

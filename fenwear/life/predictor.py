@@ -21,7 +21,7 @@ class Predictor:
 
     Attributes:
         model: The model.
-        data: What was measured.
+        data: Measured values.
         conditions: For each condition, named by its overrides, the series that were measured under it.
     """
 

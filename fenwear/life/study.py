@@ -6,7 +6,7 @@ result depends on. A study therefore resumes at any run. Its parts may start at 
 share it, and a part that is killed loses one run. Part i of n has pieces i, i + n, ... of the runs, whatever is done
 already. Within a part its runs are shared out among ranks, local processes, or the workers of an executor.
 
-Local processes are joblib's loky: they start anew, as MPI and PETSc do not survive a fork.
+Local processes are joblib's loky: they are new processes, as MPI and PETSc do not survive a fork.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Run:
     """One run of a study.
 
     Attributes:
-        given: What it is computed from.
+        given: Its case.
         name: A checksum of all that its result depends on.
         title: For messages.
         sharing: What it shares with other runs, the dearest first: runs of one set-up stay together.
@@ -212,7 +212,7 @@ def in_pieces(runs: Sequence[Run], workers: int) -> list[list[Run]]:
 
 
 class StudyOptions(TypedDict, total=False):
-    """How a study computes its runs: options of `sweep`, `lifetime`, `sensitivity` and `calibrate`.
+    """The way in which a study computes its runs: options of `sweep`, `lifetime`, `sensitivity` and `calibrate`.
 
     Attributes:
         folder: New folder of the results, where each run is kept as soon as it is done.
@@ -315,7 +315,7 @@ class Study:
 
         Args:
             job: Computes a run.
-            runs: What is to be computed.
+            runs: The runs.
             store: Keeps outcomes.
             progress: Called with the numbers of runs done and of all of this part.
             by_all: Whether each part needs all runs: it begins with its own, and takes from the others what is done.

@@ -226,13 +226,13 @@ class DrawingError(Exception):
 
 @dataclass(frozen=True)
 class View:
-    """What all pictures of a run share, so that they can be compared.
+    """Common scales of all pictures of a run, so that they can be compared.
 
     Attributes:
         centre: Of the contact (3,), mm.
         along, normal: The strip's way there, and the normal into the punch (3,).
         length: Of the contact along the sliding, mm.
-        box: What is shown: least and largest place along both, mm.
+        box: The field: least and largest place along both, mm.
         factor: Magnification of displacement and wear.
         ranges: Least and largest value of each field's colours.
     """

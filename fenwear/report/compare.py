@@ -53,9 +53,9 @@ class Comparison:
         names: Of the runs, each different.
         histories: Of the runs.
         numbers: The numbers and the words of the summaries.
-        cases: Those keys of the cases that differ.
-        versions: Those versions of the stack that differ.
-        bodies: What the first run calls its bodies.
+        cases: Keys of the cases that differ.
+        versions: Versions of the stack that differ.
+        bodies: Names of the bodies in the first run.
     """
 
     names: list[str]

@@ -74,7 +74,7 @@ class Panel(NamedTuple):
 
     Attributes:
         label: Of the upward axis; `{}` stands for the unit of temperatures.
-        lines: What is drawn.
+        lines: Variables of the figure.
         factor: From the unit of the history.
         begins: At zero, anywhere, or on a logarithmic axis.
     """
@@ -89,9 +89,9 @@ class Course(NamedTuple):
     """A figure over the run.
 
     Attributes:
-        of: How the names of the variables begin without which there is no such figure.
+        of: Prefix of the variables that the figure needs.
         panels: Below each other; those without any value are left out.
-        axis: What it is drawn over; "" for what the user has chosen.
+        axis: Its horizontal axis; "" for what the user has chosen.
         logarithmic: Whether the axis of a long run is.
     """
 

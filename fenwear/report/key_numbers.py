@@ -144,9 +144,9 @@ class Number(NamedTuple):
         value: There.
         label: In words.
         unit: In which it is read.
-        text: What is read of it.
+        text: Its text.
         uncertainty: As text; "" where it is not known.
-        sources: What makes most of the uncertainty.
+        sources: Largest sources of the uncertainty.
     """
 
     path: str

@@ -47,7 +47,7 @@ LIES_BETWEEN = {
 
 
 class Field(NamedTuple):
-    """What a history has at the nodes of a contact: a variable, on which body's surface, and how it is shown.
+    """Fields of a history at the nodes of a contact: a variable, on which body's surface, and how it is shown.
 
     Attributes:
         variable: Its name.

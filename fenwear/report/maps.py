@@ -236,7 +236,7 @@ def flash_map(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
 
 
 def flash_course(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Draw the largest rise of both surfaces, and the mean of what touches, over the cycle."""
+    """Draw the largest rise of both surfaces, and the mean of the contact, over the cycle."""
     figure, axes = panels(1, 3.0, look=look)
     touching = found.pressure.values > 0
     count = np.maximum(touching.sum(axis=(1, 2)), 1)

@@ -182,7 +182,7 @@ class Picture:
     Attributes:
         source: The image itself, as a data URL.
         caption: Below it.
-        alt: What it shows, for those who do not see it.
+        alt: Description for readers who do not see it.
     """
 
     source: str

@@ -77,7 +77,7 @@ def touched(history: xarray.Dataset) -> Mask:
 
 
 def through_middle(history: xarray.Dataset) -> Track:
-    """Return the line along the contact; of a solid a cut through the middle of what touches."""
+    """Return the line along the contact; of a solid a cut through the middle of the contact."""
     if model_of(history) != "solid":
         x, label = along_contact(history)
         return Track("", label, lambda values, body: (x, values))

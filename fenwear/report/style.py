@@ -1,4 +1,4 @@
-"""How every figure looks: panels, colours and names that hold in print and for the colour-blind."""
+"""The look of every figure: panels, colours and names that hold in print and for the colour-blind."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sli
 
 @dataclass(frozen=True)
 class Style:
-    """What a user chooses of the figures.
+    """A user's choices for the figures.
 
     Attributes:
         width: Of a figure, inches.
@@ -72,12 +72,12 @@ class Style:
 
     @property
     def label(self) -> str:
-        """What stands below the axis."""
+        """Label of the axis."""
         return AXES[self.axis][0]
 
     @property
     def of_one(self) -> str:
-        """What a single value of it is called."""
+        """Name of a single value."""
         return AXES[self.axis][1]
 
     @property
@@ -189,7 +189,7 @@ def shades(values: Sequence[int]) -> list[tuple[Any, int]]:
 
 
 def run_style(number: int) -> dict[str, Any]:
-    """Return colour and dashes of one of several lines to be told apart."""
+    """Return colour and dashes of one of several lines that must differ."""
     return {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
 
 

@@ -126,7 +126,7 @@ class Surface:
 
     @property
     def _apart(self) -> float:
-        """How far parts are laid apart, mm."""
+        """Distance of parts, mm."""
         return BESIDE * float(np.ptp(self._flat[:, self._beside]))
 
     @cached_property
@@ -136,12 +136,12 @@ class Surface:
 
     @property
     def axis_labels(self) -> tuple[str, str]:
-        """What the map's axes are."""
+        """Names of the map's axes."""
         axes = ("along the sliding", "across it") if self.unrolled else [AXES[axis] for axis in self.seen]
         return f"{axes[0]} (mm)", f"{axes[1]} (mm)"
 
     def set_ticks(self, ax: Axes) -> None:
-        """Have the axes of a map tell where each of the parts is that are laid beside each other."""
+        """Label the axes of a map with the places of parts that are laid beside each other."""
         if not self.overlaps:
             return
         places, texts = list[float](), list[str]()
@@ -240,7 +240,7 @@ class Surface:
             values: At the nodes (n,).
             at: The point that the cut goes through: its places along and across the sliding, mm.
             along: Along the sliding, or across it.
-            nodes: Those of it that are cut (n,); by default all, of parts behind each other the first.
+            nodes: Facets that are cut (n,); by default all, of parts behind each other the first.
         """
         free, fixed = (0, 1) if along else (1, 0)
         # Where a track is closed, triangles between its two ends lie all over it.

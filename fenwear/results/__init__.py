@@ -1,1 +1,1 @@
-"""What a run leaves on disk, and how it goes on from there. Nothing here computes or draws."""
+"""The files of a run, and resuming from them. Nothing here computes or draws."""

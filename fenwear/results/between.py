@@ -1,4 +1,4 @@
-"""What is on the surfaces besides wear, in history.nc and summary.json: debris, plastic depth, coatings, creep.
+"""Layers on the surfaces besides wear, in history.nc and summary.json: debris, plastic depth, coatings, creep.
 
     worn volume of both bodies + volume at the start = stored + ejected
 
@@ -174,7 +174,7 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
     Args:
         block: The half-cycles after those before.
         before: Where they begin.
-        known: What of it was known before.
+        known: Its earlier numbers.
     """
     system, found = block.system, dict[str, float]()
     for row, (body, thickness) in enumerate(zip(BODIES, system.coatings, strict=True)):

@@ -54,7 +54,7 @@ class Checkpoint:
 
     Attributes:
         state: Of the run, without temperatures.
-        track: What is on its way back on a closed track; None where there is none.
+        track: Temperatures that return on a closed track; None where there is none.
         followed: The wear that the meshes follow; None where they are as made.
         grid: Corner, spacing and counts of the contact grid (3, d - 1); None of one that stays.
     """
@@ -323,7 +323,7 @@ def nodal_values(table: Array, space: fem.FunctionSpace) -> Array:
 def _places(space: fem.FunctionSpace) -> Array:
     """Return where this rank's own nodes are, and the middle of the cells around each (owned, 6); collective.
 
-    The middle tells the nodes on both sides of a slit apart, which have the same place.
+    The middle separates the nodes on both sides of a slit, which have the same place.
     """
     mesh, index_map = space.mesh, space.dofmap.index_map
     cells = mesh.topology.index_map(mesh.topology.dim).size_local

@@ -1,4 +1,4 @@
-"""Writing files so that no fault of the disk costs more than the file at hand, and every fault is told.
+"""Writing files so that no fault of the disk costs more than the file at hand, and every fault is reported.
 
 HDF5 and ADIOS2 do not survive a write that fails: what they have open then crashes the process.
 So room is claimed before they begin, and a file that is replaced stays whole until its successor is.

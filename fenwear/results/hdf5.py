@@ -1,8 +1,8 @@
 """Files in HDF5: netCDF-4 for histories, fields and maps, and time series of fields that ParaView and pyvista open.
 
 netCDF-4: dimensions are scales, and variables hang on to them.
-h5netcdf opens what it is asked about anew at every question, and asks all variables for the size of a dimension that
-grows: to lay out the forty of a small run took a third of it. What is written here is what h5netcdf writes: see
+h5netcdf opens a variable again at every question, and asks all variables for the size of a dimension that
+grows: to lay out the forty of a small run took a third of it. The files are those that h5netcdf writes: see
 "NetCDF-4 Format Specification" in Unidata's NetCDF User's Guide, appendix C.
 
 VTKHDF, of its version 2.0 (docs.vtk.org, "VTKHDF File Format"): an unstructured grid whose points, cells and values of

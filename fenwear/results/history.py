@@ -1,4 +1,4 @@
-"""What a run leaves: case.toml, history.nc, summary.json. Nothing here computes or draws."""
+"""Files of a run: case.toml, history.nc, summary.json. Nothing here computes or draws."""
 
 from __future__ import annotations
 

@@ -38,11 +38,11 @@ class Quantity:
         name: In histories, studies, sweeps and figures; with its unit behind it in summaries.
         dims: Dimensions of its values: the half-cycles, and nodes or time steps; none of one number of a cycle.
         unit: Of its values.
-        long_name: What it is.
+        long_name: Its description.
         compute: Values (k, ...) of k half-cycles, from a block of them or from a `SteadyCycle`.
         cycle: Which number is that of a cycle: the last half-cycle's, the largest, the mean, or the sum.
         steady: Whether a steady state has it, too.
-        nodal: Whether values at contact nodes tell it, so that each of several contacts has its own.
+        nodal: Whether values at contact nodes determine it, so that each of several contacts has a value.
         of: The table of summary.json that has it: sliding, punch, strip, or end for the top; "" for none.
     """
 
@@ -80,7 +80,7 @@ def reduced(values: Array, cycle: Literal["last", "largest", "mean", "sum"]) -> 
 
 @dataclass(frozen=True)
 class InTable:
-    """How a quantity is computed together with others, as a table by their names."""
+    """Computation of several quantities at once, as a table by their names."""
 
     table: Callable[[Any], Mapping[str, Any]]
     name: str

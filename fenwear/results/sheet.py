@@ -1,4 +1,4 @@
-"""What stands on a tribometer's sheet, of every half-cycle and of a whole run: volumes, rates, scars, forces, work.
+"""Numbers of a tribometer's sheet, of every half-cycle and of a whole run: volumes, rates, scars, forces, work.
 
 Depths belong to the shape, all else to what has been added up, see `fenwear.cycle.totals`:
 
@@ -217,7 +217,7 @@ def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
 
 
 def places(placed: ContactSetup, surface: ContactSurface, geometry: ScarGeometry) -> dict[str, Array]:
-    """Return what tells where on a surface a scar is deepest, by its name: coordinates of the nodes (n,), mm.
+    """Return the coordinates by which the deepest place of a scar is given, by name: coordinates of the nodes (n,), mm.
 
     Of what is worn all the way round in a solid that across the sliding alone, in the plane none.
     """

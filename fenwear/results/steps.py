@@ -1,8 +1,8 @@
 """The time steps of half-cycles in history.nc, of a law of contact that resolves them: loops, tractions, slip, stick.
 
 Half-cycles may have unlike numbers of steps: those with fewer end in NaN. A model of the plane has values along x, in
-a solid they are those along the sliding and across it. Of a cycle that is a table ways, pressures and cross-shear over
-it are told, and wear per million cycles.
+a solid they are those along the sliding and across it. Of a cycle that is a table there are ways, pressures and
+cross-shear over it, and wear per million cycles.
 
 Where surfaces slide as a whole the ways are those of the motion. Where nodes stick or slip by themselves they are their
 slips of the last cycle, time step by time step.
@@ -309,9 +309,9 @@ class TableCycle:
     """The last cycle of a block.
 
     Attributes:
-        ways: What each contact node slides in it (n,), mm.
+        ways: Sliding of each contact node in it (n,), mm.
         pressure: Of its phases or time steps (m, n), MPa.
-        worn: What it wears off both bodies.
+        worn: Its wear of both bodies.
         tensors: Of the sliding of the punch's and the strip's material, of the work.
     """
 

@@ -6,7 +6,7 @@ the yield stress in shear, by von Mises that in tension over sqrt(3) (K. L. John
 A. R. S. Ponter et al., J. Mech. Phys. Solids 33, 1985, 339). These are the limits without friction and hardening:
 friction lowers them, hardening raises them. Beyond them the surface flows in every cycle.
 
-A geometry names contacts by groups, punch_contact_NAME and strip_contact_NAME. What a contact carries is told on the
+A geometry names contacts by groups, punch_contact_NAME and strip_contact_NAME. The load of a contact is that on the
 punch's surface; what is worn off the punch or the strip on the surface of either that has the name. The volume metered
 of a body is shared among its contacts as the integrals of its depths are.
 """
@@ -201,8 +201,8 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
 
     Args:
         last: The last block.
-        extremes: What was largest over all half-cycles: errors, and the temperature in K; and numbers of the run.
-        run: How the run went: stop, times, warnings.
+        extremes: Largest values over all half-cycles: errors, and the temperature in K; and numbers of the run.
+        run: Course of the run: stop, times, warnings.
     """
     return {
         "title": system.case.title,

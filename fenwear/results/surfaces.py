@@ -15,7 +15,7 @@ largest is right to 3 %, with 5 to 25 %, with one by a factor. The nodes across 
 most are, along each coordinate, one more than the piece's extent over the mean distance of its neighbouring nodes.
 
 A largest pressure may be that of one node, as at an edge, or where wear left a step: the mean over the nodes beside it,
-which share a linear facet with it, tells.
+which share a linear facet with it, shows this.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def _mm(text: str) -> dict[str, Any]:
 
 
 def on_mesh(dimensions: tuple[str, ...], dim: int) -> dict[str, str]:
-    """Return the attributes that tell on which surface a variable lives; none for a series."""
+    """Return the attributes that name the surface of a variable; none for a series."""
     for end, body in (("", "punch"), ("_strip", "strip")):
         if f"node{end}" in dimensions:
             names = [*coordinate_names(end, dim), *([f"along{end}", f"across{end}"] if dim == 3 else [])]
@@ -263,7 +263,7 @@ def extents(
 def _until_unworn(depth: Array, coordinates: Array, edges: NDArray[np.int64], level: Array, crossed: Mask) -> Array:
     """Return at which part of edges that leave a scar for what is unworn its slope inside comes to the level (k, m).
 
-    Counted from the node inside; infinite where that tells nothing. The slope at a node is that of least squares to
+    Counted from the node inside; infinite where that gives no bound. The slope at a node is that of least squares to
     those of its neighbours that are worn.
     """
     found: Array = np.full(crossed.shape, np.inf)

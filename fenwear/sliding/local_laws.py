@@ -66,7 +66,7 @@ class LocalWear:
         return (self.punch, punch), (self.strip, strip)
 
     def both(self, pressure: Array, slid: Array, duration: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Return the depths worn off punch and strip (n,), mm, of coatings that go on; and those of the bases."""
+        """Return the depths worn off punch and strip (n,), mm, of coatings that last; and those of the bases."""
         punch, strip = (law.depth(pressure, slid, duration) for law in (self.punch, self.strip))
         if not self.bases:
             return (punch, strip), (punch, strip)
@@ -131,11 +131,11 @@ class LocalLaws:
             speed: Of slip (n,), mm/s.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths; by default none.
-            slid: What each node has slipped from the start (n,), mm; by default nothing.
+            slid: Slip of each node from the start (n,), mm; by default nothing.
             states: That laws remember, as those of punch and strip know them.
             debris: Thickness of the third body (n,), mm.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
-            cycle: What the last cycle tells of cross-shear and mean pressure; None before the first.
+            cycle: Cross-shear and mean pressure of the last cycle; None before the first.
         """
         none = np.zeros_like(pressure)
         initial = np.full_like(pressure, self.initial)

@@ -103,7 +103,7 @@ def run_sweep(
         name: Names the folder results/sweep-NAME where none is given.
         over: Texts KEY=VALUES.
         rows: A table of variants, instead of `over`.
-        of: What is computed of each variant.
+        of: Computation for each variant.
         log: Called with each message.
         zipped, how: As of `sweep`.
         quiet: Whether there is no progress.

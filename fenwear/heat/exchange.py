@@ -26,7 +26,6 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
@@ -442,8 +441,8 @@ class HeatExchange:
         changes: Array = np.zeros((len(values), n))
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
-            heat, inverse = self.friction[phase] * plan.speed * pressure, self._exchanged(kinds, conductance).matrix()
-            inverse = scipy.linalg.inv(inverse)[:, :n]
+            heat = self.friction[phase] * plan.speed * pressure
+            inverse = FluxFactor(self._exchanged(kinds, conductance)).solve(np.eye(2 * n, n))
             for counts in self._stages:
                 ends, fluxes, bare = self._stage(kinds, values, heat, conductance, sources=True)
                 first, second = self._surfaces(kinds, bare, fluxes)

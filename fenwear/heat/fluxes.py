@@ -96,10 +96,6 @@ class Exchanged:
         rows[k + every, n + nodes] += 1.0
         return rows
 
-    def matrix(self) -> Array:
-        """Return the matrix of the system for (q_1, q_2) (2 n, 2 n)."""
-        return self.rows(np.arange(len(self.conductance)))
-
     def right(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the right-hand side of the system, see `Fluxes.of`."""
         conducts, own, jump = self.row_factors()

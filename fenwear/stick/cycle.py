@@ -25,7 +25,7 @@ from fenwear.layers.memory import Held
 from fenwear.sliding.field import Screw
 from fenwear.sliding.local_laws import LocalLaws, LocalWear
 from fenwear.sliding.wear import WornDepths
-from fenwear.stick.heat import StepStart, StickHeat, coupled_step
+from fenwear.stick.heat import StickHeat, coupled_step
 from fenwear.stick.increment import advance
 from fenwear.stick.interface import OppositeBodies, untouched
 from fenwear.stick.losses import CoatedBodies, StepConditions, StepLosses, StepSlips
@@ -288,11 +288,10 @@ class PartialSlipProblem:
 
         def solved(loaded: LoadEffect, near: tuple[Array, Array] | None) -> StickState:
             end = replace(imposed, loaded=loaded)
-            return advance(self.interface, at.contact, at.imposed, end, friction, position, near or at.near)
+            return advance(self.interface, at.contact, at.imposed, end, friction, position, near)
 
         flux = float((friction * at.contact.pressure).max()) * self.reach / step.duration
-        start = StepStart(at.next_step, step.duration, step.offset, at.temperature, at.heating)
-        found = coupled_step(self.heat, solved, imposed.loaded, at.contact, start, flux)
+        found = coupled_step(self.heat, solved, imposed.loaded, at, step, flux)
         after = self._after(at, found.state, replace(imposed, loaded=found.loaded), step)
         return replace(
             after,

@@ -192,7 +192,7 @@ def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None)
     pressures = problem.beginning().contact.pressure[None].repeat(len(problem.program.steps), axis=0)
     before: Array = np.zeros((2, len(problem.weights)))
     for _ in range(MOST_TIMES):
-        conductance = np.array([heat.conductance(pressure) for pressure in pressures])
+        conductance = np.array([heat.exchange.conductance(pressure) for pressure in pressures])
         course = HeatHistory(list(range(len(pressures))), np.zeros_like(pressures), conductance)
         warm = heat.through(course).at_rest()
         found, now = _final_shape(problem.kept_at(heat, warm), stick), heat.surfaces(warm)

@@ -39,8 +39,8 @@ from fenwear.interface.placement import HERE, Placement
 from fenwear.layers import conductance_of
 from fenwear.stick.interface import StickInterface
 from fenwear.stick.position import LoadEffect
-from fenwear.stick.program import far_enough, timed_motion
-from fenwear.stick.state import StickState
+from fenwear.stick.program import TimeStep, far_enough, timed_motion
+from fenwear.stick.state import PartialSlipState, StickState
 
 NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out
 
@@ -98,10 +98,6 @@ class StickHeat:
         """Return the temperatures at the start (dim,)."""
         return self.exchange.initial().values
 
-    def conductance(self, pressure: Array) -> Array:
-        """Return what each node conducts (n,), N/(mm s K); NaN for nothing."""
-        return self.exchange.conductance(pressure)
-
     def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> HeatedStep:
         """Return what a time step leads to.
 
@@ -143,10 +139,6 @@ class StickHeat:
     def surfaces(self, temperature: Array) -> Array:
         """Return the contact temperatures of punch and strip (2, n), K."""
         return np.array(self.exchange.contact_temperatures(self.exchange.at(temperature)))
-
-    def surface_changes(self, changes: Array) -> Array:
-        """Return the changes of both contact temperatures (2, n) by changes of the temperatures (dim,), K."""
-        return np.array(self.exchange.contact_changes(changes))
 
     def through(self, course: HeatHistory) -> CycleMap:
         """Return what a cycle of this heat makes of the temperatures at its start."""
@@ -319,25 +311,6 @@ APART = "contact with stick and heat did not converge: expected more stick.steps
 
 
 @dataclass(frozen=True)
-class StepStart:
-    """A time step with heat, and what is there at its start.
-
-    Attributes:
-        number: In the cycle.
-        duration: s.
-        offset: Of the strip, mm or rad, or its place.
-        temperature: At its start (dim,).
-        heating: Heat of friction of the nodes in the step before (n,), mW/mm².
-    """
-
-    number: int
-    duration: float
-    offset: float | Placement
-    temperature: Array
-    heating: Array
-
-
-@dataclass(frozen=True)
 class CoupledStep:
     """The contact at the end, loads with the expansion, temperatures (dim,), heat and conductance of the nodes (n,)."""
 
@@ -353,8 +326,8 @@ def coupled_step(
     heat: StickHeat,
     solved: Callable[[LoadEffect, tuple[Array, Array] | None], StickState],
     loaded: LoadEffect,
-    before: StickState,
-    start: StepStart,
+    at: PartialSlipState,
+    step: TimeStep,
     flux: float,
 ) -> CoupledStep:
     """Return contact and heat of a time step that belong together.
@@ -363,37 +336,37 @@ def coupled_step(
         heat: Of both bodies.
         solved: Returns the contact under loads, from the pressure and the trial of one that is near.
         loaded: The loads without expansion.
-        before: The contact at the start.
-        start: The step, with what is there before it.
+        at: Where the run is at the start.
+        step: What is done in it.
         flux: Largest friction heat, about, mW/mm².
 
     Raises:
         ConvergenceError: they do not converge.
     """
+    before, near = at.contact, at.near
     n = len(before.pressure)
     units = np.repeat([1 / max(flux, 1e-300), 1 / max(float(before.pressure.max()), 1e-300)], n)
     last, conducting, settled, tries = before, before.closed, False, 0
-    near: tuple[Array, Array] | None = None
 
     def conductance(pressure: Array, closed: Mask) -> Array:
-        return heat.conductance(np.where(closed, np.maximum(pressure, 1e-300), 0.0))
+        return heat.exchange.conductance(np.where(closed, np.maximum(pressure, 1e-300), 0.0))
 
     def once(x: Array) -> tuple[Array, LoadEffect, bool]:
         nonlocal last, conducting, settled, tries, near
         # Pressures that iterations have mixed are not zero where nodes are open: the last contact tells who conducts.
         conducting = last.closed if tries < ENOUGH else conducting
         made, pressure = np.split(x / units, 2)
-        warm = heat.step(start.number, start.temperature, made, conductance(pressure, conducting)).values
-        expanded = heat.expanded(loaded, warm, start.offset)
+        warm = heat.step(at.next_step, at.temperature, made, conductance(pressure, conducting)).values
+        expanded = heat.expanded(loaded, warm, step.offset)
         last = solved(expanded, near)
         near, tries = (last.pressure, last.trial), tries + 1
         settled = tries >= ENOUGH or bool((last.closed == conducting).all())
-        return units * np.concatenate([last.heat / start.duration, last.pressure]), expanded, False
+        return units * np.concatenate([last.heat / step.duration, last.pressure]), expanded, False
 
     def close(change: Array, _: Array) -> bool:
         return settled and float(np.abs(change).max()) < CLOSE
 
-    expanded = fixed_point(once, units * np.concatenate([start.heating, before.pressure]), close, APART)
-    made, conducts = np.asarray(last.heat / start.duration), conductance(last.pressure, conducting)
-    warm = heat.step(start.number, start.temperature, made, conducts).values
+    expanded = fixed_point(once, units * np.concatenate([at.heating, before.pressure]), close, APART)
+    made, conducts = np.asarray(last.heat / step.duration), conductance(last.pressure, conducting)
+    warm = heat.step(at.next_step, at.temperature, made, conducts).values
     return CoupledStep(last, expanded, warm, made, conducts, tries)

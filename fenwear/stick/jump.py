@@ -132,7 +132,7 @@ def _cycle_after(
         again = over.after(before.warm, cycles)
         warmest = float(np.abs(heat.surfaces(again)).max())
         if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
-            wrong = heat.surface_changes(over.error(before.warm, again, rate, cycles))
+            wrong = heat.exchange.contact_changes(over.error(before.warm, again, rate, cycles))
             return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
         warm = again
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")

@@ -51,8 +51,8 @@ class Condensed:
         punch: Onto the contact nodes.
         strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
         strip_moves: Which of the two.
-        passed: What each kelvin of this rank's nodes moves the strip's surface along its normal at the trace nodes of
-            its passage (q, owned), mm/K, where it conducts and passes under the punch.
+        passed: Motion of the strip's surface along its normal by each kelvin of this rank's nodes, at the trace nodes
+            of its passage (q, owned), mm/K, where it conducts and passes under the punch.
     """
 
     punch: SurfaceOperator
@@ -114,8 +114,7 @@ class Tribosystem(ContactSetup):
         return bool(self.contact_law.replicated(self))
 
     def led(self, function: Callable[[], T]) -> T:
-        """Call the function that continues from prepared bodies, on rank 0 for all where that can be, else on every
-        rank; collective.
+        """Call a function of prepared bodies, on rank 0 for all where possible, else on every rank; collective.
 
         Raises:
             Exception: what `function` raised, on every rank.

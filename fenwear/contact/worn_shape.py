@@ -8,7 +8,7 @@ velocity lambda; the rows are, in the same order,
     E_k p_k                                          the balance of forces of phase k.
 
 The whole matrix has ((m + 1) n)^2 numbers. Where they are many it is never made: with factors of each phase's nodes
-in contact, which stay while these do, the pressures and rigid modes follow from the gaps and the shape. What is left,
+in contact, which stay while these do, the pressures and rigid modes follow from the gaps and the shape. The rest,
 
     (sum of M_k S_k^-1) omega + H lambda = ...,
 

@@ -87,7 +87,7 @@ class JumpLaw(Protocol[M]):
 
 
 class Trend:
-    """How contacts change over a jump, by what is solved of it so far: where the next ones are looked for.
+    """Change of contacts over a jump, by its stages solved so far: where the next ones are looked for.
 
     Lines through two of them, as those near borders that move come and go: parabolas begin farther away.
     """

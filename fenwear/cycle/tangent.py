@@ -257,8 +257,7 @@ def _lying(
         worn: With the debris at the start.
 
     Returns:
-        What is left of it (L, L), its derivatives at the end to the same (L, n), and what of it lies at the contact's
-        nodes (n, L).
+        Its remaining share (L, L), its derivatives at the end (L, n), and its part at the contact's nodes (n, L).
     """
     layers, pair, path = system.layers, system.pairs[phase], system.path[phase]
     reads, puts = np.eye(len(path)), np.eye(len(path))

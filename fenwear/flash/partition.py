@@ -16,7 +16,7 @@ A half-space of the contact's conductivity K_1 under a unit of power that enters
 
     U = sum of P_i / (2 pi K_1 |x - y_i|),
 
-and the body has U + w in the steady state that its means come to. What U does not know of leaves heat on the other
+and the body has U + w in the steady state that its means come to. Effects that U leaves out put heat on the other
 boundaries and in other materials K:
 
     a(w, v) = integral of K grad w . grad v, and of h w v over what convects,

@@ -63,8 +63,8 @@ def prepare_exchange(
         heat: Settings of the heat.
         bodies: Conduction in the punch and in the strip.
         pair: The contact.
-        expansions: What each kelvin of this rank's nodes moves each surface along the normal (n, owned), mm/K, and
-            a strip that passes under the punch at the nodes of the passage (q, owned).
+        expansions: Motion of each surface along the normal by each kelvin of this rank's nodes (n, owned), mm/K; of a
+            strip that passes under the punch at the nodes of the passage (q, owned).
         sliding: The velocity of the strip's material for a unit speed.
         motion: The sliding motion.
         friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), or in each phase (m, n).
@@ -72,7 +72,7 @@ def prepare_exchange(
         reduced: Whether the temperatures are projected onto a small basis.
         passage: Where the punch is on a strip that passes to and fro or through a cycle; None where it moves one way
             or not at all.
-        moved: What the bodies' temperatures move their surfaces by, for the certificates, where `expansions` are not to
+        moved: Motion of the surfaces by the bodies' temperatures, for the certificates, where `expansions` are not to
             open the contact.
         others: Speeds of all stages of a program one way, which share their bases.
         keep: Whether bases are kept on disk, and taken from there where they are.

@@ -168,7 +168,7 @@ class Layers:
         return self.with_held(found, self.begun)
 
     def held(self, worn: WornDepths) -> Held:
-        """Return what laws remember at these depths; what they do at the start where that is not told."""
+        """Return what laws remember at these depths; their state at the start where none is given."""
         first = len(self.rows) - len(self.begun.contact)
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)

@@ -58,7 +58,7 @@ class Run:
         given: Its case.
         name: A checksum of all that its result depends on.
         title: For messages.
-        sharing: What it shares with other runs, the dearest first: runs of one set-up stay together.
+        sharing: Parts that it shares with other runs, the dearest first: runs of one set-up stay together.
     """
 
     given: Any

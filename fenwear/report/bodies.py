@@ -221,7 +221,7 @@ def _sliding(ax: Axes, fields: xarray.Dataset, x: float, z: float, width: float)
 
 
 class DrawingError(Exception):
-    """Pictures of the bodies could not be drawn; tells why and what may help."""
+    """Pictures of the bodies could not be drawn; names the reason and the remedy."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ class Style:
 
     Attributes:
         width: Of a figure, inches.
-        axis: What a run is told by: "cycles", "distance" or "time".
+        axis: Values that identify a run: "cycles", "distance" or "time".
     """
 
     width: float = WIDTH

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -33,6 +32,10 @@ StepOption = Annotated[
         help="Step of a test program whose end is held constant, counted from 1; by default the last.",
     ),
 ]
+AccuracyOption = Annotated[
+    bool,
+    typer.Option("--accuracy", help="Estimate the numerical uncertainty of the largest pressures and temperature."),
+]
 
 SIZES = ("largest_pressure", "mean_pressure", "contact_width", "contact_area")
 CARRIED = ("normal_force", "friction_force", "friction_torque")
@@ -46,10 +49,7 @@ def steady_command(
     step: StepOption = None,
     fresh: FreshOption = False,
     as_json: JsonOption = False,
-    accuracy: Annotated[
-        bool,
-        typer.Option("--accuracy", help="Estimate the numerical uncertainty of the largest pressures and temperature."),
-    ] = False,
+    accuracy: AccuracyOption = False,
 ) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import with_case, with_reduced_heat
@@ -74,7 +74,6 @@ def steady_command(
     found = {**({"of": of_step} if of_step else {}), **_state_json(state), **_forces(state), **_gain(system, state)}
     if not as_json:  # the way to it may take longer
         show(_steady_text(case, state, found))
-        sys.stdout.flush()
     if accuracy:
         found |= _unless_failed("its uncertainty", lambda: _uncertain(state), {})
     way = time.perf_counter()

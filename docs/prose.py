@@ -1,4 +1,4 @@
-"""Checks the prose of pages and messages for `docker/fenwear lint`: long sentences, turns of phrase, proselint.
+"""Checks the prose of pages, messages and docstrings for `docker/fenwear lint`: length, turns of phrase, proselint.
 
 Messages are the strings of the package but for docstrings; in these a semicolon ends a sentence. Prints file:line with
 the finding and what to write instead, and exits with 1 where there is one. `--count` prints the number of sentences of
@@ -120,16 +120,26 @@ def of_sentence(line: int, sentence: str) -> Iterator[tuple[int, str]]:
     """Yield the findings in a sentence: its length, and turns of phrase."""
     if (length := words(sentence)) > SETTINGS["longest"]:
         yield line, f"{length} words; write at most {SETTINGS['longest']} in a sentence: {sentence[:60]}..."
+    yield from turns(line, sentence)
+
+
+def turns(line: int, sentence: str) -> Iterator[tuple[int, str]]:
+    """Yield the banned turns of phrase in a sentence."""
     for pattern, advice in SETTINGS["banned"].items():
         for match in re.finditer(pattern, sentence):
             yield line, f'"{match[0]}": {advice}'
 
 
-def findings_in_messages(source: str) -> Iterator[tuple[int, str]]:
-    """Yield the line and the description of each finding in the strings of a module."""
-    for line, text in messages(ast.parse(source)):
+def findings_in_code(source: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the description of each finding in the strings and docstrings of a module."""
+    tree = ast.parse(source)
+    for line, text in messages(tree):
         for sentence in BREAK.split(text):
             yield from of_sentence(line, sentence)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+            for sentence in re.split(r"\n\s*(?:\w+:)?\s*|(?<=[.:;])\s+", text):
+                yield from turns(node.body[0].lineno, sentence)
 
 
 def findings(text: str) -> Iterator[tuple[int, str]]:
@@ -161,9 +171,9 @@ def count() -> None:
 def check() -> int:
     """Print the findings on all pages and in all messages, and return the exit status."""
     CheckRegistry().register_many(all_checks)
-    modules = [path for pattern in SETTINGS["messages"] for path in ROOT.glob(pattern)]
+    modules = [path for pattern in SETTINGS["modules"] for path in ROOT.glob(pattern)]
     found = [(page, *finding) for page in pages() for finding in findings(read(page))]
-    found += [(path, *finding) for path in sorted(modules) for finding in findings_in_messages(path.read_text("utf-8"))]
+    found += [(path, *finding) for path in sorted(modules) for finding in findings_in_code(path.read_text("utf-8"))]
     for path, line, finding in found:
         print(f"{path.relative_to(ROOT)}:{line}: {finding}")
     return int(bool(found))

@@ -337,7 +337,7 @@ def coupled_step(
         solved: Returns the contact under loads, from the pressure and the trial of one that is near.
         loaded: The loads without expansion.
         at: Where the run is at the start.
-        step: What is done in it.
+        step: Its loads and motions.
         flux: Largest friction heat, about, mW/mm².
 
     Raises:

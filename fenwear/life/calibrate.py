@@ -209,31 +209,20 @@ def calibrate(
         CaseError: an unknown without influence, bounds that make no sense, or too few data.
         ConvergenceError: a run or the fit did not converge.
     """
-    return _calibrations(case, [data], unknowns, baseline, progress, how)[0]
+    return calibrate_each(case, [data], unknowns, baseline=baseline, progress=progress, **how)[0]
 
 
 def calibrate_each(
     case: Case,
-    data: Sequence[DataSet],
+    tests: Sequence[Sequence[DataSet]],
     unknowns: Sequence[str | Unknown],
     *,
     baseline: Sequence[str] = (),
     progress: Log = lambda message: None,
     **how: Unpack[StudyOptions],
 ) -> list[Calibration]:
-    """Return the calibration on each data set alone, as `calibrate`; collective."""
-    return _calibrations(case, [[one] for one in data], unknowns, baseline, progress, how)
-
-
-def _calibrations(
-    case: Case,
-    tests: Sequence[Sequence[DataSet]],
-    unknowns: Sequence[str | Unknown],
-    baseline: Sequence[str],
-    progress: Log,
-    how: StudyOptions,
-) -> list[Calibration]:
-    study = Study.of(how)
+    """Return the calibration on the data sets of each test, as `calibrate`; collective."""
+    study = Study(**how)
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
     problems = [LeastSquares(case, data, asked, baseline, progress, study) for data in tests]
     store = study.open(case, named(case_text(case), [one.key for one in problems], asked, list(baseline)))

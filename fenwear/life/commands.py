@@ -159,7 +159,7 @@ def run_sensitivity(
     """Compute sensitivities; write sensitivity.json and tornado.png; collective."""
     method: Method | None = "differences" if differences else None
     how, folder = in_results(how, f"sensitivity-{name}")
-    comm = Study.of(how).comm
+    comm = Study(**how).comm
     _tell_of_stick(case, log, comm)
     found = sensitivity(case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how)
     figures = {"tornado.png": lambda: tornado(found)} if spread > 0 else {}
@@ -188,13 +188,13 @@ def run_calibrate(
     """
     asked = [parse_unknown(case, text) for text in unknowns]
     how, folder = in_results(how, f"calibrate-{name}")
-    comm = Study.of(how).comm
+    comm = Study(**how).comm
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
     for one in data:
         log(one.listing)
     _tell_of_stick(case, log, comm)
     if each:
-        fits = calibrate_each(case, data, asked, baseline=baseline, progress=log, **how)
+        fits = calibrate_each(case, [[one] for one in data], asked, baseline=baseline, progress=log, **how)
         scatter = between(fits)
         table = {**between_as_json(fits), "scatter": list(scatter.text), "tests": [fit.as_json() for fit in fits]}
         pictures = [(f"residuals_{Path(one.name).stem}.png", fit) for one, fit in zip(data, fits, strict=True)]
@@ -245,7 +245,7 @@ def run_life(
     for text in scatters:
         scatter = scatter.and_also(parse_scatter(case, text))
     how, folder = in_results(how, f"life-{name}")
-    study = Study.of(how)
+    study = Study(**how)
     if not scatter.keys:
         options = {"--resume": study.resume, "--collect": study.collect, "--wanted": wanted}
         for option in (option for option, given in options.items() if given):

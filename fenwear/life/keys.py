@@ -117,21 +117,22 @@ def value_of(case: Case, path: str, text: str, option: str = "") -> float:
     return find_key(with_values(case, {path: number}), path).value
 
 
+def possible(case: Case, path: str, value: float) -> bool:
+    """Return whether a key of a case can have a value."""
+    try:
+        with_values(case, {path: value})
+    except CaseError:
+        return False
+    return True
+
+
 def nearest_possible(case: Case, path: str, inside: float, outside: float) -> float:
     """Return the possible value of a key that is nearest to `outside`, from `inside`, which is possible."""
-
-    def possible(value: float) -> bool:
-        try:
-            with_values(case, {path: value})
-        except CaseError:
-            return False
-        return True
-
-    if possible(outside):
+    if possible(case, path, outside):
         return outside
     for _ in range(BISECTIONS):
         middle = (inside + outside) / 2
-        inside, outside = (middle, outside) if possible(middle) else (inside, middle)
+        inside, outside = (middle, outside) if possible(case, path, middle) else (inside, middle)
     return inside
 
 
@@ -209,10 +210,6 @@ def scaled(case: Case, unknown: Unknown) -> ScaledUnknown:
         # The case's own value says nothing then.
         start = float(np.sqrt(ends[0] * ends[1])) if ends[0] > 0 else float(np.mean(ends))
     with_values(case, {unknown.key: start})
-    try:
-        with_values(case, {unknown.key: -abs(start or 1.0)})
-        never_negative = False
-    except CaseError:
-        never_negative = start > 0
+    never_negative = start > 0 and not possible(case, unknown.key, -abs(start))
     scale = abs(start) or next((abs(b) for b in (unknown.low, unknown.high) if np.isfinite(b) and b != 0), 1.0)
     return ScaledUnknown(unknown, key.unit, start, scale, never_negative)

@@ -104,12 +104,6 @@ BASELINES = ("offset", "tilt")
 Vector: TypeAlias = Sequence[float] | Array
 
 
-def data_key(data: Sequence[DataSet]) -> str:
-    """Return a checksum of measurements."""
-    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
-        return named(list(data))
-
-
 class LeastSquares:
     """The least-squares problem of data sets and unknowns, kept for fits to several sets of values.
 
@@ -142,7 +136,8 @@ class LeastSquares:
         self.baseline = tuple(baseline)
         self._check(unknowns)
         self.predict = Predictor(self.model, data)
-        self.key = data_key(data)
+        with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
+            self.key = named(self.data)
         self.evaluations = 0
         self._jumps = 0  # how often the jumps that runs follow have changed
         self._computed = False  # whether a trial on them has a prediction

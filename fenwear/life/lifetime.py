@@ -233,7 +233,7 @@ def lifetime(
         OutputError: the folder takes no file.
         PartDoneError: other parts of the sampling are not done.
     """
-    study = Study.of(how)
+    study = Study(**how)
     asked = _asked(case, [until] if isinstance(until, str | Quantity) else until)
     if samples < 2:
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))

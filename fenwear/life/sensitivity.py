@@ -19,7 +19,7 @@ roughness of the mesh: its standard error times Student's factor, and by what c_
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, Literal, Unpack
@@ -31,7 +31,7 @@ from scipy.stats import t as student
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
-from fenwear.life.keys import Key, find_key, with_values
+from fenwear.life.keys import Key, find_key, possible, with_values
 from fenwear.life.model import Model
 from fenwear.life.quantities import NO_PATH, Path, Quantity, evaluate, of_case, parse_quantity
 from fenwear.life.study import Progress, Run, Study, StudyOptions, Values, case_text, named
@@ -198,7 +198,7 @@ def sensitivity(
         ConvergenceError: a state did not converge.
         PartDoneError: other parts of the study are not done.
     """
-    study = Study.of(how)
+    study = Study(**how)
     if not 0 <= spread < 1:
         raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
     wanted = [of_case(parse_quantity(q, names=case.names) if isinstance(q, str) else q, case) for q in quantities]
@@ -311,14 +311,6 @@ def _step(key: Key, relative: float) -> float:
     return relative * (abs(key.value) or 1.0)
 
 
-def _possible(case: Case, values: Mapping[str, float]) -> bool:
-    try:
-        with_values(case, values)
-    except CaseError:
-        return False
-    return True
-
-
 def _refined(slope: Callable[[float], float], scale: float) -> tuple[float, float]:
     """Return the extrapolated derivative and its error from a slope(h) of second order, for the best of the steps."""
     best = (float("nan"), float("inf"))
@@ -340,7 +332,7 @@ def _sides(case: Case, key: Key) -> tuple[bool, bool]:
     Raises:
         CaseError: neither is.
     """
-    below, above = (_possible(case, {key.path: key.value + sign * _step(key, STEPS[0])}) for sign in (-1, 1))
+    below, above = (possible(case, key.path, key.value + sign * _step(key, STEPS[0])) for sign in (-1, 1))
     if not (below or above):
         raise CaseError(InputError(key.path, f"no value beside {key.value:g} is possible: it has no derivative"))
     return below, above

@@ -26,11 +26,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypedDict
+from typing import Any, Protocol, TypeAlias, TypedDict, Unpack
 
 import numpy as np
 from mpi4py import MPI
@@ -233,7 +233,6 @@ class StudyOptions(TypedDict, total=False):
     comm: MPI.Comm
 
 
-@dataclass(frozen=True)
 class Study:
     """Computes the runs of a study; the attributes are those of `StudyOptions`.
 
@@ -241,29 +240,12 @@ class Study:
         CaseError: they make no sense.
     """
 
-    folder: Path | None = None
-    resume: bool = False
-    part: tuple[int, int] | None = None
-    collect: bool = False
-    processes: int | None = 1
-    executor: Executor | None = None
-    comm: MPI.Comm = field(default_factory=lambda: MPI.COMM_WORLD)
-
-    @classmethod
-    def of(cls, how: StudyOptions) -> Study:
-        """Return the study of these options; with an executor, its workers take the place of ranks."""
-        folder, executor = how.get("folder"), how.get("executor")
-        return cls(
-            None if folder is None else Path(folder),
-            how.get("resume", False),
-            how.get("part"),
-            how.get("collect", False),
-            how.get("processes", 1),
-            executor,
-            how.get("comm", MPI.COMM_WORLD) if executor is None else MPI.COMM_SELF,
-        )
-
-    def __post_init__(self) -> None:
+    def __init__(self, **how: Unpack[StudyOptions]) -> None:
+        folder = how.get("folder")
+        self.folder = None if folder is None else Path(folder)
+        self.resume, self.collect, self.part = how.get("resume", False), how.get("collect", False), how.get("part")
+        self.processes, self.executor = how.get("processes", 1), how.get("executor")
+        self.comm = MPI.COMM_SELF if self.executor else how.get("comm", MPI.COMM_WORLD)  # its workers replace ranks
         number, count = self.part or (1, 1)
         if not 1 <= number <= count:
             raise CaseError(InputError("--part", f"expected I/N with I from 1 to N, got {number}/{count}"))
@@ -469,7 +451,7 @@ def in_results(how: StudyOptions, name: str) -> tuple[StudyOptions, Path]:
     Raises:
         CaseError: the options need a folder with a name.
     """
-    study = Study.of(how)
+    study = Study(**how)
     folder = study.folder or on_root(study.comm, lambda: free_directory(Path("results") / name))
     return {**how, "folder": folder}, folder
 

@@ -59,7 +59,8 @@ def meaning(name: str, of: Of, case: Case) -> Quantity:
         unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
         return _other(name, RECORD if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
     nodes = tuple("node" for d in found.dims[1:])
-    unit, text = registry.in_model(found, on_surface=case.model.kind != "plane")
+    own = found.unit, found.long_name
+    unit, text = own if case.model.kind == "plane" else registry.ON_SURFACES.get(name, own)
     each = name == "direction" or (found.dims and found.cycle != "last")
     return _other(name, (*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -55,29 +56,12 @@ def make_axis(case: Case, key: str, values: object) -> Axis:
     """
     if isinstance(values, str):
         return parse_axis(case, f"{key}={values}")
-    given = list(np.atleast_1d(values)) if isinstance(values, np.ndarray) else _listed(key, values)
-    found: list[Value] = []
-    for value in given:
-        plain = value.item() if isinstance(value, np.generic) else value
-        if isinstance(plain, list | tuple):
-            found.append(_toml_list(plain))
-        elif isinstance(plain, bool | int | float | str):
-            found.append(plain)
-        else:
-            raise CaseError(InputError(f"over {key}", "expected numbers or texts"))
-    return _axis(key, found)
-
-
-def _listed(key: str, values: object) -> list[Any]:
-    if isinstance(values, Sequence | range):
-        return list(values)
-    if isinstance(values, bool | int | float):
-        return [values]
-    raise CaseError(InputError(f"over {key}", "expected a list of values or a text such as '0.1:0.3:9'"))
-
-
-def _toml_list(values: Sequence[Any]) -> str:
-    return "[" + ", ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in values) + "]"
+    given = values.tolist() if isinstance(values, np.ndarray) else values
+    listed = given if isinstance(given, Sequence | range) else [given]
+    plain = [value.item() if isinstance(value, np.generic) else value for value in listed]
+    if not all(isinstance(value, bool | int | float | str | list | tuple) for value in plain):
+        raise CaseError(InputError(f"over {key}", "expected a list of numbers or texts, or a text such as '0.1:0.3:9'"))
+    return _axis(key, [json.dumps(value) if isinstance(value, list | tuple) else value for value in plain])
 
 
 def parse_axis(case: Case, text: str) -> Axis:

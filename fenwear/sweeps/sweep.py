@@ -52,7 +52,7 @@ def sweep(
         OutputError: the folder takes no file.
         PartDoneError: other parts of the sweep are not done.
     """
-    study = Study.of(how)
+    study = Study(**how)
     varied, plan = on_root(study.comm, lambda: _plan(case, over, of, zipped=zipped))
     runs = {variant.place: run_of(variant, plan.of) for variant in plan.variants if variant.possible}
     store = study.open(varied, named("sweep", of))
@@ -114,7 +114,7 @@ def run_sweep(
     if rows is not None and over:
         raise CaseError(InputError("--table", "given together with --over; expected one of them"))
     how, folder = in_results(how, f"sweep-{name}")
-    comm = Study.of(how).comm
+    comm = Study(**how).comm
     axes = on_root(comm, lambda: [parse_axis(case, text) for text in over] if rows is None else read_table(rows))
     hidden = quiet or comm.rank != 0 or not sys.stderr.isatty()
     with tqdm(unit=" variants", disable=hidden) as bar:

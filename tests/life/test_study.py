@@ -46,7 +46,7 @@ class Roots:
 part, parts, seconds = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
 if seconds:
     threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGKILL)).start()
-study = Study(Path("study"), part=(part, parts))
+study = Study(folder=Path("study"), part=(part, parts))
 store = study.open(load_case("example1"), "key")
 try:
     study.outcomes(Roots(), [Run(k, named(k)) for k in range(COUNT)], store)
@@ -88,7 +88,7 @@ def test_killed_at_ten_moments(forks: str, tmp_path: Path) -> None:
         turn.join()
     assert len(killed) == KILLS
     assert killed.count(128 + 9) >= KILLS // 2  # the others were done before
-    study = Study(tmp_path / "study", collect=True)
+    study = Study(folder=tmp_path / "study", collect=True)
     runs = [Run(k, named(k)) for k in range(COUNT)]
     found = study.outcomes(Nothing(), runs, study.open(load_case("example1"), "key"))
     for k, run in enumerate(runs):

@@ -127,15 +127,15 @@ ON_SURFACES = {
 NODES = {"x": "node", "x_strip": "node_strip"}
 
 
+def on_surface(one: Quantity) -> Quantity:
+    """Return a quantity of plane models as that of solids and rings."""
+    unit, text = ON_SURFACES.get(one.name, (one.unit, one.long_name))
+    return replace(one, dims=tuple(NODES.get(d, d) for d in one.dims), unit=unit, long_name=text)
+
+
 def on_surfaces(found: Iterable[Quantity]) -> list[Quantity]:
-    """Return quantities of plane models as those of solids and rings."""
-    rows = [
-        (one, *ON_SURFACES.get(one.name, (one.unit, one.long_name))) for one in found if one.name != "contact_width"
-    ]
-    return [
-        replace(one, dims=tuple(NODES.get(d, d) for d in one.dims), unit=unit, long_name=text)
-        for one, unit, text in rows
-    ]
+    """Return the quantities of plane models that solids and rings have, as theirs."""
+    return [on_surface(one) for one in found if one.name != "contact_width"]
 
 
 def _in_cycle(records: Block | SteadyCycle) -> float:

@@ -59,10 +59,10 @@ def meaning(name: str, of: Of, case: Case) -> Quantity:
         unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
         return _other(name, RECORD if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
     nodes = tuple("node" for d in found.dims[1:])
-    own = found.unit, found.long_name
-    unit, text = own if case.model.kind == "plane" else registry.ON_SURFACES.get(name, own)
+    if case.model.kind != "plane":
+        found = registry.on_surface(found)
     each = name == "direction" or (found.dims and found.cycle != "last")
-    return _other(name, (*(RECORD if each else ()), *nodes), "" if unit == "1" else unit, text)
+    return _other(name, (*(RECORD if each else ()), *nodes), "" if found.unit == "1" else found.unit, found.long_name)
 
 
 def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarray.Dataset:

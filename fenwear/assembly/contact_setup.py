@@ -31,11 +31,11 @@ from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, co
 from fenwear.optimum import Optimum, WearRates, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.sliding.field import SlidingField, node_rates
-from fenwear.sliding.friction import ContactConditions, Friction, any_split
-from fenwear.sliding.local_laws import LocalLaws
+from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.local_laws import LocalLaws, Wear
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.ways import CycleShear, SlidingWays
-from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
+from fenwear.sliding.wear import PhasesWear, WornDepths
 
 MIDDLE = -1  # in place of a phase: the middle position, at the mean speed
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
@@ -233,8 +233,7 @@ class ContactSetup:
             a, b = law.speed_exponent, law.pressure_exponent
             rates = self.sliding_ratio if a == b else self._rates(a / b)
             slid.append(self.motion.sliding(a)[:, None] * rates**a)
-        split = any_split(self.laws.regions, self.sliding.wear)
-        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings, split)
+        return Wear(self.laws, (slid[0], slid[1]), self.pairs)
 
     @property
     def strip_carries(self) -> bool:

@@ -8,8 +8,9 @@ start and of the speed in the step before; wear is that of the step itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import eye_array
@@ -22,7 +23,7 @@ from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions, Friction, Regions, any_split
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.ways import CycleShear
-from fenwear.sliding.wear import WornDepths, coefficient, stays
+from fenwear.sliding.wear import BodyWear, CoatedWear, PhasesWear, WornDepths, coefficient, stays
 
 States = tuple[Mapping[str, Array], Mapping[str, Array]]
 
@@ -40,7 +41,7 @@ class BodyRate:
         """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
         return self.rate * self.law.value(np.maximum(pressure, 0.0)) * self.slide(slid, duration)
 
-    def slide(self, slid: Array, duration: float) -> Array:
+    def slide(self, slid: Array, duration: float | Array) -> Array:
         """Return how far a node slides in a time, to the power a (n,), mm^a s^(1-a)."""
         a = self.speed_exponent
         return slid if a == 1 else slid**a * duration ** (1 - a)
@@ -189,3 +190,61 @@ class LocalLaws:
             ratio = np.divide(base, coating, out=np.ones_like(thickness), where=coating > 0)
             found.append(CoatedBody(thickness, ratio))
         return found[0], found[1]
+
+
+@dataclass(frozen=True)
+class Wear:
+    """The wear rule of a motion: both bodies' laws and the sliding of each phase.
+
+    Attributes:
+        laws: Of the nodes.
+        sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
+        pairs: The surfaces opposite each other in each phase.
+    """
+
+    laws: LocalLaws
+    sliding: tuple[Array, Array]
+    pairs: Sequence[ContactPair]
+
+    @cached_property
+    def constant(self) -> bool:
+        """Whether no coefficient depends on more than the place."""
+        return not self.laws.changes(of_wear=True)
+
+    def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
+        """Return the wear of all phases or of some of them.
+
+        Args:
+            conditions: Of each of these phases, for the coefficients that depend on them.
+            which: Numbers of the phases; by default all.
+
+        Raises:
+            CaseError: a coefficient is negative or not finite there.
+        """
+        chosen = list(range(len(self.pairs)) if which is None else which)
+        punch, strip = (slid[chosen] for slid in self.sliding)
+        wears = [self.laws.wear_at(one) for one in conditions]
+        return phases_wear(wears, (punch, strip), [self.pairs[k] for k in chosen], self.laws.coatings)
+
+
+def phases_wear(
+    wears: Sequence[LocalWear], slid: tuple[Array, Array], pairs: Sequence[ContactPair], coatings: tuple[Array, Array]
+) -> PhasesWear:
+    """Return the wear of phases or time steps by their laws at the nodes.
+
+    Args:
+        wears: Of each of them.
+        slid: Sliding in each to the power a, for the laws of both bodies (m, n), mm^a s^(1-a).
+        pairs: The surfaces in each.
+        coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
+    """
+    found, by_body = [], zip(*(wear.layers for wear in wears), strict=True)
+    for laws, own, thickness, surfaces in zip(by_body, slid, coatings, ((), pairs), strict=True):
+        coating, base = (
+            BodyWear(np.array([law.rate for law in one]) * own, one[0].law, surfaces, one[0].wears)
+            for one in zip(*laws, strict=True)
+        )
+        if thickness.any():
+            base = CoatedWear(base.rate, base.law, surfaces, coating=coating, thickness=thickness)
+        found.append(base)
+    return PhasesWear(found[0], found[1], pairs)

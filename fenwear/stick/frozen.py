@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
-from fenwear.interface import ContactPair
 from fenwear.layers.step import LayerEvolution, LayerStep
-from fenwear.sliding.local_laws import BodyRate, LocalWear
-from fenwear.sliding.wear import BodyWear, CoatedWear, PhasesWear, WornDepths
+from fenwear.sliding.local_laws import LocalWear, phases_wear
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import CreepNear, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.losses import StepSlips, slips_of
+from fenwear.stick.losses import slips_of
 from fenwear.stick.position import Position
 from fenwear.stick.records import FrettingCycle
 from fenwear.stick.state import PartialSlipState
@@ -204,21 +203,7 @@ def _passing(problem: PartialSlipProblem, cycle: FrettingCycle, begin: PartialSl
         if evolution is not None:
             conditions = evolution.through(layers.held(cycle.worn))[0]
         wears = [problem.laws.wear_at(one) for one in conditions]
-    bodies = []
-    pairs, coatings = problem.conditions.pairs(slips, begin), (problem.coatings.punch, problem.coatings.strip)
-    by_body = zip(*(wear.layers for wear in wears), strict=True)
-    for rates, coated, own in zip(by_body, coatings, ((), pairs), strict=True):
-        coating, base = (_by_steps(laws, slips, own) for laws in zip(*rates, strict=True))
-        if coated.thickness.any():
-            base = CoatedWear(base.rate, base.law, own, coating=coating, thickness=coated.thickness)
-        bodies.append(base)
-    debris = losses.debris_over(records, begin)
-    wear = PhasesWear(bodies[0], bodies[1], pairs)
-    return LayerEvolution(layers, wear, debris, evolution)
-
-
-def _by_steps(rates: Sequence[BodyRate], slips: StepSlips, pairs: Sequence[ContactPair]) -> BodyWear:
-    """Return what a body loses in each time step by its pressure."""
-    durations = map(float, slips.duration)
-    lost = [rate.rate * rate.slide(*own) for rate, *own in zip(rates, slips.slid, durations, strict=True)]
-    return BodyWear(np.array(lost), rates[0].law, pairs, rates[0].wears)
+    punch, strip = (law.slide(slips.slid, slips.duration[:, None]) for law in (wears[0].punch, wears[0].strip))
+    coatings = problem.coatings.punch.thickness, problem.coatings.strip.thickness
+    wear = phases_wear(wears, (punch, strip), problem.conditions.pairs(slips, begin), coatings)
+    return LayerEvolution(layers, wear, losses.debris_over(records, begin), evolution)

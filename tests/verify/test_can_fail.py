@@ -21,8 +21,8 @@ from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.interface import ContactPair, Interface, RigidEquilibrium
+from fenwear.sliding.local_laws import Wear
 from fenwear.sliding.motion import Motion
-from fenwear.sliding.wear import Wear
 from fenwear_verify import flash as flash_cases
 from fenwear_verify import registered, run_cases
 from fenwear_verify import wear as wear_cases

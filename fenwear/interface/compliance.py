@@ -214,10 +214,6 @@ class Interface:
     @property
     def by_even(self) -> Array:
         """Gap that an even unit pressure opens without friction (n,), mm/MPa."""
-        return self._made._by_even
-
-    @cached_property
-    def _by_even(self) -> Array:
         return self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
 
     def compliance(

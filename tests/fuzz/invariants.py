@@ -41,7 +41,8 @@ from pool import verdicts
 
 from fenwear import load_case, make_case, run_case
 from fenwear.case.templates import fill_in, find_template
-from fenwear.cycle.jump_step import FINE, LOOSEST
+from fenwear.cycle.jump_method import FINE
+from fenwear.cycle.jump_step import LOOSEST
 from fenwear.errors import FenwearError
 from fenwear.results.reading import load_history
 

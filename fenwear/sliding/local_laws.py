@@ -238,7 +238,8 @@ def phases_wear(
         pairs: The surfaces in each.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
     """
-    found, by_body = [], zip(*(wear.layers for wear in wears), strict=True)
+    found: list[BodyWear] = []
+    by_body = zip(*(wear.layers for wear in wears), strict=True)
     for laws, own, thickness, surfaces in zip(by_body, slid, coatings, ((), pairs), strict=True):
         coating, base = (
             BodyWear(np.array([law.rate for law in one]) * own, one[0].law, surfaces, one[0].wears)

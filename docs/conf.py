@@ -30,7 +30,7 @@ extensions = [
     "executed",
     "furo_files",
 ]
-exclude_patterns = ["_build", "extensions", "joss", "static"]
+exclude_patterns = ["_build", "extensions", "joss", "pictures", "static"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 nitpicky = True
 # Types in signatures: those of other libraries have no page here.

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import BlockHeat
-from fenwear.cycle.coupled import cycle_heat, end_temperatures, touching
 from fenwear.cycle.steady import SteadyState
 from fenwear.cycle.totals import Totals, phase_totals, stacked
 from fenwear.heat.exchange import CROSSING, TERMS
@@ -60,18 +59,6 @@ class SteadyCycle:
     def load(self) -> Array:
         """Normal force (k,), N; 0 where supports and not the contact carry the loads."""
         return np.full(len(self), self.system.normal_force)
-
-
-def steady_cycle(
-    system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
-) -> SteadyCycle:
-    """Return the half-cycles of pressures (m, n) that repeat, with heat of conductances (m, n), on one process."""
-    heat, positions, surfaces = cycle_heat(system), system.motion.positions, np.zeros(0)
-    if heat.dim:
-        conducting = heat.conductances(touching(phase_pressure)) if conductances is None else conductances
-        begin = heat.jump(heat.initial(), np.inf, conducting).state(phase_pressure)
-        surfaces, _ = end_temperatures(heat, begin, phase_pressure, conducting)
-    return _cycle(system, phase_pressure, velocity, heat_of(surfaces[positions - 1 :: positions]))
 
 
 def cycle_of_state(state: SteadyState) -> SteadyCycle:

@@ -19,7 +19,7 @@ from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case
 from fenwear.cycle import Block, Renewal, critical_speed, follow, jump, running_in, steady
 from fenwear.cycle.state import RunState, all_phases, beginning
-from fenwear.cycle.steady_cycle import SteadyCycle, steady_cycle
+from fenwear.cycle.steady_cycle import SteadyCycle, cycle_of_state
 from fenwear.cycle.totals import Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
@@ -260,9 +260,9 @@ class Model:
         self.evaluations += 1
         if system.sticks:
             end = cycle_of_final(cast(FinalShape, steady(system)))  # under Coulomb's law
-            return Snapshot(np.inf, end, end.rate, end.phase_pressure)
-        state = steady(system, properties_within=WITHIN if self.warming else None)
-        return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
+        else:
+            end = cycle_of_state(steady(system, properties_within=WITHIN if self.warming else None))
+        return Snapshot(np.inf, end, end.rate, end.phase_pressure)
 
     def run_in(
         self, values: Mapping[str, float], settings: Sequence[str] = (), course: Course = FREE
@@ -404,11 +404,3 @@ def snapshot_of(block: Block) -> Snapshot:
         states = [system.conditions(k, np.asarray(p), latest, end.worn, end.half_cycle) for k, p in enumerate(pressure)]
         rate = system.wear.phases(states).worn(pressure)
     return Snapshot(float(block.half_cycle[-1] // strokes), block, rate, pressure)
-
-
-def steady_snapshot(
-    system: Tribosystem, pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
-) -> Snapshot:
-    """Return the steady state of these pressures (m, n) of the phases, with heat of these conductances (m, n)."""
-    end = steady_cycle(system, pressure, velocity, conductances)
-    return Snapshot(np.inf, end, end.rate, pressure)

@@ -55,7 +55,8 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
         values = _cycle_largest(at_first[name])
         factor, unit = FACTORS.get(values.attrs["units"], (1.0, "")) if name in MICROMETRES else (1.0, "")
         unit = unit or values.attrs["units"]
-        ax.set_title(_capital(values.attrs["long_name"]), loc="left")
+        name_of = values.attrs["long_name"]
+        ax.set_title(name_of[:1].upper() + name_of[1:], loc="left")
         label = f"{values.attrs['long_name'].split(' of ')[0]} ({unit})" if unit else values.attrs["long_name"]
         if second and (at_first.sizes[second] > LINES or of_fretting):
             _map(figure, ax, factor * values, first, second, label if unit else "")
@@ -176,7 +177,3 @@ def _even_ratios(places: np.ndarray[Any, Any]) -> bool:
         return False
     ratios = places[1:] / places[:-1]
     return bool(np.ptp(ratios) < 1e-6 * ratios.max() and abs(ratios[0] - 1) > 1e-6)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -18,7 +18,6 @@ from fenwear.cycle import Block, coupled, growth_rate, stationary_growth
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.stability import repeating_temperatures
 from fenwear.cycle.state import RunState
-from fenwear.cycle.steady_cycle import steady_cycle
 from fenwear.cycle.tangent import phase_tangent
 from fenwear.cycle.totals import none_yet
 from fenwear.heat import exchange
@@ -381,8 +380,8 @@ def test_ranks_agree(assembled: Assemble, operator: str) -> None:
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-8 * np.abs(one).max())
 
 
-def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
-    """Nodes that are open but for rounding conduct in neither; nodes that the state has conducting do."""
+def test_growth_conducts_as_the_state(assembled: Assemble) -> None:
+    """Nodes that are open but for rounding do not conduct; nodes that the state has conducting do."""
     system = assembled("example1-heat", *COARSE, "heat.conductance='80 W/(m² K)'", "heat.partition=0.5")
     state = steady(system)
     assert state.heat is not None
@@ -394,14 +393,6 @@ def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
     rate = growth_rate(system, state.phase_pressure, state.conductances)
     assert growth_rate(system, state) == rate
     assert growth_rate(system, rounding) == pytest.approx(rate, rel=1e-9)
-    for pressure, conductances in ((state.phase_pressure, state.conductances), (rounding, None)):
-        heat = steady_cycle(system, pressure, state.velocity, conductances).heat
-        assert heat is not None
-        np.testing.assert_allclose(heat.temperature_punch, state.heat.punch, rtol=1e-9)
-        np.testing.assert_allclose(heat.temperature_strip, state.heat.strip, rtol=1e-9)
-    # A node without pressure that conducts changes both: what the state says is followed.
+    # A node without pressure that conducts changes it: what the state says is followed.
     other = np.where(opened, np.nanmax(state.conductances), state.conductances)
     assert growth_rate(system, state.phase_pressure, other) != pytest.approx(rate, rel=1e-6)
-    warmed = steady_cycle(system, state.phase_pressure, state.velocity, other).heat
-    assert warmed is not None
-    assert np.abs(warmed.temperature_punch - state.heat.punch).max() > 1e-6 * state.heat.punch.max()

@@ -77,7 +77,7 @@ def test_the_estimate_decides_where_it_says() -> None:
 def test_a_law_that_is_given_stays() -> None:
     """Without a word; a table stick that does not go with the case is an error."""
     case = load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'", "stick={}"])
-    assert resolve_law(case, pytest.fail).case is case
+    assert resolve_law(case, pytest.fail).system.case is case
     with pytest.raises(CaseError, match=r"contact\.transverse_friction: expected 0, .* with contact\.law = 'coulomb'"):
         load_case("fretting-partial-slip", [*SMALL, "stick.force='60 N'", "contact.transverse_friction=0.1"])
 

@@ -155,9 +155,10 @@ def test_what_is_not_there(folders: Callable[[str], Path], tmp_path: Path) -> No
 
 def test_what_is_no_history(tmp_path: Path) -> None:
     """Another NetCDF file, and a run that has just begun."""
+    begun = {name: ("half_cycle", np.zeros(0)) for name in ("half_cycle", "pressure", "wear")}
     for name, data, message in (
         ("other", xarray.Dataset({"y": ("t", [1.0])}), "it has other variables"),
-        ("begun", xarray.Dataset(coords={"half_cycle": ("half_cycle", np.zeros(0, int))}), "no half-cycle yet"),
+        ("begun", xarray.Dataset(begun), "no half-cycle yet"),
     ):
         (tmp_path / name).mkdir()
         data.to_netcdf(tmp_path / name / "history.nc", engine="h5netcdf")

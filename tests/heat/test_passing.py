@@ -52,5 +52,5 @@ def test_source_to_and_fro(strokes: float) -> None:
 def test_stroke_beyond_the_strip() -> None:
     """A stroke that leaves the strip's contact surface is refused, with the length that is missing."""
     settings = ["geometry.parameters.overlap=5", "motion.amplitude=8"]
-    with pytest.raises(CaseError, match=r"motion: the stroke runs off .*has to reach 3 mm farther"):
+    with pytest.raises(CaseError, match=r"motion: the stroke runs off .*strip_contact by 3 mm"):
         assemble(load_case("example2-heat", settings))

@@ -58,6 +58,8 @@ from fenwear.stick.setup import (
 )
 from fenwear.stick.state import NO_HEAT, PartialSlipState
 
+ROUNDING = 1e-9  # of a half-cycle: times that are the same
+
 
 @dataclass(frozen=True)
 class Memory:
@@ -349,9 +351,10 @@ class _Run:
         return HalfCycle(number, [phase], states[0], states[1], heat, load, steps)
 
     def middle(self, steps: Steps) -> int:
-        """Return the time step of a half-cycle that ends nearest to its middle."""
-        fractions = np.cumsum(steps.records.duration)
-        return int(np.abs(fractions - fractions[-1] / 2).argmin())
+        """Return the time step of a half-cycle that ends nearest to its middle, the earlier of two, whatever rounds."""
+        ends = np.cumsum(steps.records.duration)
+        away = np.abs(ends / ends[-1] - 0.5)
+        return int(np.argmax(away <= away.min() + ROUNDING))
 
 
 class HalfCycles(_Run):

@@ -6,8 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from combinations import SMALL as SMALLEST
+from combinations import STICK
 
-from fenwear import load_case
+from fenwear import assemble, load_case, march
 from fenwear.arrays import Array
 from fenwear.interface.placement import in_space
 from fenwear.stick.cycle import PartialSlipProblem
@@ -138,3 +140,20 @@ def test_a_table_of_loads_alone() -> None:
         slid = float(np.where(records.pressure > 0, records.slip_magnitude, 0.0).max())
         assert (slid > 1e-5) == slips, slid
         assert records.balance_error(problem.weights) < 1e-10
+
+
+def test_the_middle_of_an_odd_number_of_steps() -> None:
+    """Two steps end as near to it: rounding of the period does not choose which one a half-cycle is told by."""
+    given = (
+        *SMALLEST,
+        *STICK,
+        "contact.law='coulomb'",
+        "motion.profile='triangular'",
+        "stick.steps=5",
+        "run.half_cycles=2",
+    )
+    pressures = []
+    for period in (0.1, 28.79, 0.3, 0.7, 1.1, 1.3):
+        *_, block = march(assemble(load_case("fretting-partial-slip", [*given, f"motion.period='{period} s'"])), 2)
+        pressures.append(block.pressure)
+    np.testing.assert_allclose(pressures, np.tile(pressures[0], (6, 1, 1)), rtol=0, atol=1e-9 * pressures[0].max())

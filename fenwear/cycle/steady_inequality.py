@@ -54,7 +54,7 @@ class SteadyInequality:
         m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
         self.m, self.n, self.r = m, n, r
         self.wear, self.closure = system.phases_wear, system.layers.closure
-        self.conditions: Sequence[ContactConditions] | None = None
+        self.conditions: Sequence[ContactConditions] = ()  # of the mean pressure
         self.p_scale = interface.pressure_scale
         self.gap_scale = self.p_scale * interface.elastic_length
         above = max(law.pressure_threshold for law in system.sliding.wear)

@@ -220,7 +220,9 @@ def _laws(
     mu_p, *mu_t = _slopes(friction, around)
     by_depths = _slopes(depths, around)
     worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
-    picked, rate = _picked(heat, phase), heating_friction(system, np.ones(n), phase)
+    # The rows that pick the temperatures of both surfaces at the start of the phase (2, n, dim).
+    picked: Array = np.array(heat.exchange.contact_changes(np.eye(heat.dim), phase - 1))
+    rate = heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
     found = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
@@ -328,11 +330,6 @@ def _heated(
     changes: Array = by_power @ (pressure[:, None] * laws.mu_s)
     changes[:, : heat.dim] += by_state
     return changes, by_pressure
-
-
-def _picked(heat: CycleHeat, phase: int) -> Array:
-    """Return the rows that pick the temperatures of both surfaces at the start of a phase (2, n, dim)."""
-    return np.array(heat.exchange.contact_changes(np.eye(heat.dim), phase - 1))
 
 
 def _opened(wear: PhasesWear, slope: Array) -> Array:

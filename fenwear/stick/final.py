@@ -259,8 +259,7 @@ def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
     wider, rim = beside(surface, zone), beside(surface, ~zone)
     inner = zone & ~rim
     other = [_of_nodes(problem, one) if one.any() else found for one in (zone | wider, inner)]
-    deepest, volume = _ranges(problem, [one.depth for one in other])
-    return replace(found, deepest=deepest, volume=volume, within=float(problem.weights @ wider) / 2)
+    return _ranged(problem, found, [one.depth for one in other], float(problem.weights @ wider) / 2)
 
 
 def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShape:
@@ -293,8 +292,7 @@ def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShap
 
     found = _of_nodes(problem, zone(0.0))
     other = [_of_nodes(problem, zone(more)) for more in (LEFT, -LEFT)]
-    deepest, volume = _ranges(problem, [one.depth for one in other])
-    return replace(found, size=size, deepest=deepest, volume=volume, within=LEFT * ring)
+    return replace(_ranged(problem, found, [one.depth for one in other], LEFT * ring), size=size)
 
 
 def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape | None:
@@ -343,8 +341,7 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
     width, within = zone_width(edges)
     zone = np.asarray((x > edges[0].x) & (x < edges[1].x))
     found = _shape(problem, zone, blended(0.0), width)
-    deepest, volume = _ranges(problem, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)])
-    return replace(found, deepest=deepest, volume=volume, within=within)
+    return _ranged(problem, found, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)], within)
 
 
 def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int) -> float | None:
@@ -393,11 +390,11 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     return float(middle + side * edge)
 
 
-def _ranges(problem: PartialSlipProblem, depths: Sequence[Array]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the largest depths and the worn volumes of two shapes, the smaller first."""
-    deepest = sorted(float(depth.max()) for depth in depths)
-    volume = sorted(float(problem.weights @ depth) for depth in depths)
-    return (deepest[0], deepest[1]), (volume[0], volume[1])
+def _ranged(problem: PartialSlipProblem, found: FinalShape, depths: Sequence[Array], within: float) -> FinalShape:
+    """Return a shape with the largest depths and worn volumes of two others, the smaller first, and what is left."""
+    low, high = sorted(float(depth.max()) for depth in depths)
+    less, more = sorted(float(problem.weights @ depth) for depth in depths)
+    return replace(found, deepest=(low, high), volume=(less, more), within=within)
 
 
 def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:

@@ -122,7 +122,8 @@ def test_a_turning_strip_rubs_around_its_axis() -> None:
 def test_check_and_end_of_a_solid() -> None:
     """What `check` and `steady` say."""
     case = load_case("fretting-sphere", list(COARSE))
-    assert "first cycle: partial slip" in check_text(system := assemble(case))[0]
+    system = assemble(case)
+    assert "first cycle: partial slip" in check_text(system)[0]
     found, numbers = final_of(system)
     assert not found.pressure[~found.stick].any()
     assert numbers["worn_volume_mm3"] > 0

@@ -192,7 +192,7 @@ def pressure_at(surface: ContactSurface, text: str) -> Array:
             return np.asarray(profiled(surface, Profile.model_construct(**table)).profile)
         except CaseError as error:
             raise CaseError([InputError("--pressure", problem.message) for problem in error.problems]) from None
-    place = dict(zip("xyz" if surface.dim == 3 else "xz", surface.x.T, strict=True))
+    place = {name: surface.x[:, k] for k, name in enumerate("xyz" if surface.dim == 3 else "xz")}
     try:
         return np.asarray(parse_expression(text)(place) + np.zeros(len(surface.weights)))
     except (ValueError, KeyError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -75,7 +75,7 @@ def steady_command(
     if not as_json:  # the way to it may take longer
         show(_steady_text(case, state, found))
     if accuracy:
-        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), {})
+        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), NO_UNCERTAINTY)
     way = time.perf_counter()
     rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
     short, cycles = len(state.system.motion.phases) <= FOLLOWED, None
@@ -134,6 +134,9 @@ def _state_json(state: SteadyState) -> dict[str, Any]:
         "wear_per_cycle": state.wear_per_cycle.tolist(),
         **state.velocity,
     }
+
+
+NO_UNCERTAINTY: dict[str, Any] = {}
 
 
 def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
@@ -421,7 +424,7 @@ def _shape_text(case: str, wanted: list[tuple[float, float]], shape: InitialShap
     """Return how deep a shape to machine is, and its pressures under each load."""
     from fenwear.results.sheet import columns_text
 
-    rows = [
+    rows: list[tuple[str, Sequence[float | None]]] = [
         ("largest pressure in the first cycle (MPa)", [None if math.isnan(p) else p for p in shape.largest_pressure]),
         ("largest pressure once worn in (MPa)", [float(state.pressure.max()) for state in shape.states]),
         ("largest difference of both, of the pressure scale (%)", [100 * round(x, 6) for x in shape.left_to_run_in]),

@@ -386,11 +386,11 @@ class Sizes:
             parts: Errors of its depths, which add up.
             of_heat: That of temperatures.
         """
-        pairs = zip(made.whole.contact.pressure, made.end.contact.pressure, strict=True)
+        first, second = made.whole.contact.pressure, made.end.contact.pressure
         bent = self.area(made.bent) / max(self.area(made.whole.worn - made.begin.worn), 1e-300)
         return Estimate(
             max(bent, sum(self.of_depth(part, *worn) for part in parts)),
-            HALVES * max(force_difference(self.pair, one, other) for one, other in pairs),
+            HALVES * max(force_difference(self.pair, first[k], second[k]) for k in range(len(first))),
             of_heat,
             sum(self.of_states(part, *worn) for part in parts),
         )

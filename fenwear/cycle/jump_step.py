@@ -193,8 +193,7 @@ class Stepper(JumpLaw[_Moment]):
         shear = system.ways.shear(pressures)
         surfaces = exchange.contact_temperatures(exchange.at(state.temperature))
         conditions: Sequence[ContactConditions] = [
-            system.conditions(k, pressure, surfaces, state.worn, half_cycles, shear)
-            for k, pressure in enumerate(pressures)
+            system.conditions(k, pressures[k], surfaces, state.worn, half_cycles, shear) for k in range(len(pressures))
         ]
         evolution = system.evolution(conditions, state.worn)
         conditions = evolution.around(system.layers.held(state.worn))
@@ -266,7 +265,7 @@ class Stepper(JumpLaw[_Moment]):
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
-        worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed / cycles)
+        worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed * (1 / cycles))
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
         rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
         return self.after(before, _Moment(worn, contact, time, begin, before.totals, rate), cycles)

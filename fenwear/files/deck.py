@@ -54,7 +54,7 @@ SHELLS = re.compile(r"(?:S|STRI|DS|M3D|SFM3D|R3D|SC)(\d+)[A-Z]*\d?\w*")
 LINES = re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|MAX|RB2D|RB3D|DC1D|PIPE2|PIPE3)(\d)\w*")
 SHAPELESS = re.compile(r"(?:MASS|ROTARYI|SPRING|DASHPOT|CONN|GAP|DGAP|ITT|ITS|HEATCAP|DCOUP|DRAG|JOINTC|CAPACITY)\w*|D")
 FLAT_KINDS = {3: 2, 4: 3, 6: 9, 8: 16, 9: 10}
-GLOBAL = (np.eye(3), np.zeros(3))  # a turn, and a point: that of no turn
+GLOBAL: tuple[Array, Array] = (np.eye(3), np.zeros(3))  # a turn, and a point: that of no turn
 SOLID_KINDS = {4: 4, 5: 7, 6: 6, 8: 5, 10: 11, 15: -15, 20: 17, 27: 12}
 
 

@@ -207,7 +207,7 @@ class _Jump(JumpLaw[_Moment]):
         before: _Moment,
         cycles: float,
         time: float,
-        near: ContactState | None,
+        near: ContactState,
         digits: float,  # noqa: ARG002
     ) -> _Moment:
         """Return z = before + cycles (M(z) + R(time)); to all digits."""

@@ -72,9 +72,9 @@ def _start(arguments: list[str], petsc_options: list[str]) -> int:
         sys.stdout, sys.stderr = _Patient(sys.stdout), _Patient(sys.stderr)  # type: ignore[assignment]
     from fenwear.stack import ensure_folder
 
-    told = ensure_folder(comm)
-    if told is not None:
-        print(f"fenwear: {told}", file=sys.stderr)
+    problem = ensure_folder(comm)
+    if problem is not None:
+        print(f"fenwear: {problem}", file=sys.stderr)
     status = _call(arguments, comm)
     # What mpirun returns is rank 0's: a rank that ended before it with another status than 0 would have all others
     # killed, what rank 0 has written among what is lost.

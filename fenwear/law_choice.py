@@ -69,13 +69,15 @@ def choose_law(system: Tribosystem) -> LawChoice:
     if share is None:
         why = "the cycle is a table" if system.motion.steps else "the strip slides one way"
         return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {why}")
-    told = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
+    by_text = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
     if share <= TAKEN_UP:
-        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {told}", share)
+        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {by_text}", share)
     against = system.case.against_stick
     if against:
-        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken, though {told}: {against[0]}", share)
-    return LawChoice("coulomb", f"contact.law: 'coulomb' is taken: {told}", share)
+        return LawChoice(
+            "gross-sliding", f"contact.law: 'gross-sliding' is taken, though {by_text}: {against[0]}", share
+        )
+    return LawChoice("coulomb", f"contact.law: 'coulomb' is taken: {by_text}", share)
 
 
 def resolve_law(

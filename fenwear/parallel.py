@@ -175,9 +175,9 @@ class Team:
     def _follow(self) -> Any:
         """Do what rank 0 asks for until it is done; return its result."""
         while True:
-            order, *told = self._told()
+            order, *ended = self._received()
             if order is None:
-                result, failure = told
+                result, failure = ended
                 if failure is not None:
                     raise failure
                 return result
@@ -250,7 +250,7 @@ class Team:
         self.comm.Ibarrier().Wait()
         self.comm.bcast(packed)
 
-    def _told(self) -> Any:
+    def _received(self) -> Any:
         """Return the value of rank 0; who waits long leaves the core to others."""
         come, begin = self.comm.Ibarrier(), time.perf_counter()
         while not come.Test():

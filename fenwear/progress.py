@@ -19,12 +19,12 @@ Log = Callable[[str], None]
 
 def now_and_then(log: Log) -> Log:
     """Return what logs a line unless it has logged one in the last seconds."""
-    told = [-LINE_SECONDS]
+    reported = [-LINE_SECONDS]
 
     def tell(line: str) -> None:
         now = time.monotonic()
-        if now > told[0] + LINE_SECONDS:
-            told[0] = now
+        if now > reported[0] + LINE_SECONDS:
+            reported[0] = now
             log(line)
 
     return tell
@@ -46,7 +46,7 @@ class Progress:
         self.lines = how == "lines" and comm.rank == 0
         hidden = how != "bar" or comm.rank != 0 or not sys.stderr.isatty()
         self.bar = tqdm(total=total, initial=done, unit=f" {unit}s", disable=hidden)
-        self.begin = self.told = time.perf_counter()
+        self.begin = self.reported = time.perf_counter()
 
     def __enter__(self) -> Progress:
         return self
@@ -68,10 +68,10 @@ class Progress:
         """Tell, now and then, that a long step is being made."""
         self.bar.refresh()
         now = time.perf_counter()
-        if self.lines and now - self.told > LINE_SECONDS:
+        if self.lines and now - self.reported > LINE_SECONDS:
             self._line(f"{self.unit} {self.done:,} of {self.total:,}, in the step after it, {now - self.begin:,.0f} s")
 
     def _line(self, text: str) -> None:
-        self.told = time.perf_counter()
+        self.reported = time.perf_counter()
         sys.stderr.write(f"{text}\n")  # at once: see cli.base
         sys.stderr.flush()

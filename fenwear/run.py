@@ -75,7 +75,7 @@ if TYPE_CHECKING:
 BLOCK_SECONDS = 2.0  # after which a block ends
 
 
-def told(message: str) -> None:
+def print_once(message: str) -> None:
     """Print a message, once on all ranks."""
     if MPI.COMM_WORLD.rank == 0:
         print(message)
@@ -85,7 +85,7 @@ def run_case(
     case: Case,
     name: str = "run",
     output: Path | str | None = None,
-    log: Log = told,
+    log: Log = print_once,
     *,
     resume: bool = False,
     progress: How = "bar",
@@ -273,12 +273,12 @@ class _Run:
             InterruptedRunError: a signal has come; the checkpoint is written.
             OutputError: a file cannot be written.
         """
-        with Progress("half-cycle", self.case.run.half_cycles, self.state.half_cycle, self.comm, progress) as told:
+        with Progress("half-cycle", self.case.run.half_cycles, self.state.half_cycle, self.comm, progress) as course:
             every = self.case.output.checkpoint
-            self._lookout = RunMonitor(self.comm, signals, told, self._save, every=every, block=BLOCK_SECONDS)
+            self._lookout = RunMonitor(self.comm, signals, course, self._save, every=every, block=BLOCK_SECONDS)
             for block in self._blocks():
                 self._take(block)
-                told.reached(int(block.half_cycle[-1]), _in_short(block))
+                course.reached(int(block.half_cycle[-1]), _in_short(block))
                 self._lookout.begin_block()
                 if self._lookout.look():
                     self._save()
@@ -438,7 +438,7 @@ class _Run:
 
     def finish(self, last: Block, how: dict[str, Any]) -> dict[str, Any]:
         """Write the checkpoint first, then fields and summary of a run, and return the summary; collective."""
-        said = [self.system.names.told(text) for text in self._warnings_at_the_end(last)]
+        said = [self.system.names.with_names(text) for text in self._warnings_at_the_end(last)]
         self._save()
         how |= {"warnings": said, "retries": self.remedies}
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:

@@ -94,7 +94,7 @@ class RunMonitor:
     Args:
         comm: The ranks.
         signals: That end the run.
-        told: Gets the progress.
+        progress: Gets the progress.
         save: Writes a checkpoint, where there is something to save; collective.
         every: Time between two checkpoints, s.
         block: Time after which a block of results ends, s.
@@ -107,13 +107,13 @@ class RunMonitor:
         self,
         comm: MPI.Comm,
         signals: Signals,
-        told: Progress,
+        progress: Progress,
         save: Callable[[], None],
         *,
         every: float,
         block: float = np.inf,
     ) -> None:
-        self._comm, self._signals, self._told, self._save = comm, signals, told, save
+        self._comm, self._signals, self._progress, self._save = comm, signals, progress, save
         self._every, self._block = every, block
         self.block_over = False
         self._looked = self._begun = time.monotonic()
@@ -139,5 +139,5 @@ class RunMonitor:
         if save:
             self._save()
             self._due = time.monotonic() + self._every
-        self._told.working()
+        self._progress.working()
         return bool(interrupted)

@@ -155,8 +155,8 @@ class Bodies:
             names = ("x", "z") if body.dim == 2 else ("x", "y", "z")
             parts = [
                 f"{lost_force:.4g} of {force:.4g} N along {axis}"
-                for axis, force, lost_force, told in zip(names, body.given, body.swallowed, lost, strict=True)
-                if told
+                for axis, force, lost_force, is_lost in zip(names, body.given, body.swallowed, lost, strict=True)
+                if is_lost
             ]
             if parts:
                 texts.append(

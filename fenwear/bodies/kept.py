@@ -30,7 +30,7 @@ DEFAULT = 4.0
 Arrays = Mapping[str, Array]
 NONE: Arrays = MappingProxyType({})
 
-_told: list[str] = []
+_reported: list[str] = []
 
 
 def folder() -> Path:
@@ -141,8 +141,8 @@ class Kept:
                 os.link(file.name, part := self.path.with_suffix(f".{os.getpid()}"))
                 part.replace(self.path)
         except OSError as error:
-            if not _told:
-                _told.append(str(error))
+            if not _reported:
+                _reported.append(str(error))
                 text = f"set-ups are not kept in {folder()}: {error.strerror}; {LIMIT}=0 keeps none"
                 print(f"fenwear: {text}", file=sys.stderr)
         found = files()

@@ -222,10 +222,10 @@ class Load(Part):
         if model == "axisymmetric":
             wrong = self.present("through", "moment")
             return [f"{key}.{name}: expected none in rings: what acts on them is the same all around" for name in wrong]
-        told = {"plane": (1, "[about y]"), "solid": (3, "[about x, about y, about z]")}[model]
-        if self.moment is None or len(self.moment) == told[0]:
+        size = {"plane": (1, "[about y]"), "solid": (3, "[about x, about y, about z]")}[model]
+        if self.moment is None or len(self.moment) == size[0]:
             return []
-        return [f"{key}.moment: expected {told[0]} component(s) {told[1]} in a {model} model, got {len(self.moment)}"]
+        return [f"{key}.moment: expected {size[0]} component(s) {size[1]} in a {model} model, got {len(self.moment)}"]
 
     def times(self, factor: float) -> Load:
         """Return the load times a factor at every time."""

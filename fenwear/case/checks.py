@@ -325,8 +325,8 @@ def step_problems(case: Case, step: Any, at: str) -> Iterator[str]:
     if step.motion and not isinstance(motion, Cycle):
         yield f"{at}.motion: does not change with motion.kind = '{motion.kind}': expected 'cycle'"
     elif step.motion:
-        told = step.motion.model_problems(case.model.kind, case.model.axes)
-        yield from (f"{at}.{problem}" for problem in told)
+        of_motion = step.motion.model_problems(case.model.kind, case.model.axes)
+        yield from (f"{at}.{problem}" for problem in of_motion)
         if any(depends_on(value, "s") for value in case.coefficients.values()):
             yield f"{at}.motion: expected no coefficient that depends on s: cycles slide different ways"
     if step.present("ambient") and not case.heat:

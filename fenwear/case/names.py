@@ -91,17 +91,17 @@ class Names:
                 return f"{name}{group.removeprefix(role)}"
         return group
 
-    def told(self, text: str) -> str:
+    def with_names(self, text: str) -> str:
         """Return a text in which the bodies have their names in place of their roles; keys and paths are left."""
         return _TOLD.sub(self._name, text) if self.given else text
 
     def meant(self, attributes: Mapping[str, Any]) -> dict[str, Any]:
         """Return the attributes of a variable whose long name names the bodies."""
-        return {key: self.told(value) if key == "long_name" else value for key, value in attributes.items()}
+        return {key: self.with_names(value) if key == "long_name" else value for key, value in attributes.items()}
 
     def telling(self, log: Callable[[str], None]) -> Callable[[str], None]:
         """Return a log whose messages have the bodies' names."""
-        return (lambda message: log(self.told(message))) if self.given else log
+        return (lambda message: log(self.with_names(message))) if self.given else log
 
     @contextmanager
     def told_in_errors(self) -> Iterator[None]:
@@ -117,8 +117,8 @@ class Names:
         if not self.given:
             return
         if isinstance(error, CaseError):
-            error.problems = [InputError(self.told(p.key), self.told(p.message)) for p in error.problems]
-        error.args = tuple(self.told(value) if isinstance(value, str) else value for value in error.args)
+            error.problems = [InputError(self.with_names(p.key), self.with_names(p.message)) for p in error.problems]
+        error.args = tuple(self.with_names(value) if isinstance(value, str) else value for value in error.args)
 
     def _name(self, match: re.Match[str]) -> str:
         role = match["group"] or match["word"]

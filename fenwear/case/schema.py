@@ -106,7 +106,7 @@ class Case(Part):
     @model_validator(mode="after")
     def _tables_fit_together(self) -> Self:
         if problems := case_problems(self):
-            raise ValueError(self.names.told("\n".join(problems)))
+            raise ValueError(self.names.with_names("\n".join(problems)))
         return self
 
     def loads_of(self, body: str) -> tuple[Load | CourseLoad, ...]:

@@ -84,11 +84,11 @@ def find_template(name: str) -> Template:
         hint = did_you_mean(name, names, 0.5) or did_you_mean(name, [n for n in names if name and name in n], 0.0)
         raise CaseError(InputError("new", f"no template {name!r}. There are {', '.join(names)}{hint}"))
     head, _, text = (_folder() / f"{name}.toml").read_text("utf-8").partition(BETWEEN)
-    told = tomllib.loads(head)
+    table = tomllib.loads(head)
     found = {
-        key: Dimension(one["value"], one.get("unit", "mm"), one["about"]) for key, one in told["dimensions"].items()
+        key: Dimension(one["value"], one.get("unit", "mm"), one["about"]) for key, one in table["dimensions"].items()
     }
-    return Template(name, told["title"], found, text.lstrip("\n"))
+    return Template(name, table["title"], found, text.lstrip("\n"))
 
 
 def fill_in(template: Template, settings: Sequence[str] = ()) -> str:

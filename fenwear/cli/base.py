@@ -106,7 +106,7 @@ def recorded() -> Iterator[list[str]]:
 
 def with_names(text: str) -> str:
     """Return a text with the names of the bodies."""
-    return _Spoken.names.told(text)
+    return _Spoken.names.with_names(text)
 
 
 def log(message: str) -> None:

@@ -112,8 +112,8 @@ def flash_command(
                 save(figure, folder / f"{name}.png", DPI)
 
     on_root(MPI.COMM_WORLD, keep)
-    told = numbers(found) if as_json else names.told(text(found, str(directory)))
-    show_results(told, f"maps and pictures in {folder}")
+    result = numbers(found) if as_json else names.with_names(text(found, str(directory)))
+    show_results(result, f"maps and pictures in {folder}")
 
 
 @app.command("compare")

@@ -59,7 +59,7 @@ def follow(
     *,
     given: Mapping[int, Renewal] | None = None,
     heights_of: Tribosystem | None = None,
-    told: Callable[[int, Renewal], None] = lambda half_cycle, renewal: None,
+    on_renewal: Callable[[int, Renewal], None] = lambda half_cycle, renewal: None,
 ) -> Iterator[Block]:
     """Yield the blocks of a run whose bodies follow large wear and temperature; collective. Each knows its system.
 
@@ -70,7 +70,7 @@ def follow(
         adapt: Change of the system of the case on moved meshes, such as another motion; collective.
         given: Half-cycles after which parts are updated, and at no other; by default where it is large.
         heights_of: Another system on the same meshes, whose elements' heights are known.
-        told: Called with every half-cycle after which parts are updated.
+        on_renewal: Called with every half-cycle after which parts are updated.
 
     Raises:
         ConvergenceError: as `integrate`.
@@ -80,7 +80,7 @@ def follow(
     while True:
         renewal = None if state is None else leave.renewal(state)  # a run may also go on from just there
         if state is not None and renewal is not None:
-            told(state.half_cycle, renewal)
+            on_renewal(state.half_cycle, renewal)
             system, state = _renewed(system, state, renewal, adapt)
             given = None if given is None else {k: one for k, one in given.items() if k > state.half_cycle}
             leave = _Leaving(system, given)

@@ -397,7 +397,7 @@ def numbers(found: FlashTemperatures) -> dict[str, Any]:
         "contact_mm": heating.extent.tolist(),
         "nodes_across": list(found.across),
         "thermal_feedback": found.feedback,
-        "warnings": [heating.placed.names.told(one) for one in found.warnings],
+        "warnings": [heating.placed.names.with_names(one) for one in found.warnings],
     }
 
 
@@ -462,7 +462,7 @@ def dataset(found: FlashTemperatures) -> xarray.Dataset:
     variables["time"] = ("instant", heating.times, {"units": "s", "long_name": "time from the cycle's begin"})
     lines = {first: places[:, 0, 0], second: places[0, :, 1]}
     coordinates = {axis: (axis, x, {"units": "mm", "long_name": f"{axis} of the nodes"}) for axis, x in lines.items()}
-    told = {"half_cycle": heating.half_cycle, "way": found.way, "Conventions": "CF-1.11"}
+    attributes = {"half_cycle": heating.half_cycle, "way": found.way, "Conventions": "CF-1.11"}
     if found.bulk is not None:
-        told |= {f"by_finite_{body}_K": rise for body, rise in zip(BODIES, found.bulk, strict=True)}
-    return xarray.Dataset(variables, coordinates, told)
+        attributes |= {f"by_finite_{body}_K": rise for body, rise in zip(BODIES, found.bulk, strict=True)}
+    return xarray.Dataset(variables, coordinates, attributes)

@@ -139,15 +139,14 @@ class HeatState:
     Attributes:
         bases: Of the punch and of the strip; none of bodies that stay at their initial temperature.
         values: Coordinates on the punch's and then on the strip's basis.
-        told: Temperatures that return on a closed track, see `track`, where no basis has them; None for the initial
-            state.
+        returning: Temperatures that return on a closed track, see `track`, where no basis has them; None at the start.
         surfaces: Temperatures of both contact surfaces at the interface nodes (n,), K, at the end of a step: a basis
             may leave out what fades within one. None where the coordinates say all.
     """
 
     bases: tuple[Basis, ...]
     values: Array
-    told: Array | None = None
+    returning: Array | None = None
     surfaces: tuple[Array, Array] | None = None
 
     @classmethod
@@ -166,7 +165,7 @@ class HeatState:
     def track(self) -> Array | None:
         """Temperatures that return on the strip's closed track, see `TrackBasis.track`."""
         basis = self.bases[1]
-        return basis.track(self.values) if isinstance(basis, TrackBasis) else self.told
+        return basis.track(self.values) if isinstance(basis, TrackBasis) else self.returning
 
     def temperatures(self) -> tuple[Array, Array]:
         """Return the temperatures of this rank's own nodes of punch and strip (owned,), K."""

@@ -330,7 +330,7 @@ class _Reader:
         names = self.case.names
         body = names.role_of(self.directives.get("body", default))
         if body not in ("punch", "strip"):
-            raise self._fail("# body", names.told(f"expected punch or strip, got {body!r}"))
+            raise self._fail("# body", names.with_names(f"expected punch or strip, got {body!r}"))
         return body
 
     def _check_heads(self) -> None:

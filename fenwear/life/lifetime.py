@@ -259,8 +259,8 @@ def lifetime(
 
     whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
     found = summary(whole, lives.min(axis=1), wanted)
-    told = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one != asked[0]]
-    each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in told)
+    further = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one != asked[0]]
+    each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in further)
     return replace(found, each=each)
 
 

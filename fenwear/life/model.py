@@ -218,7 +218,7 @@ class Model:
             integrate,
             given=course.renewals if course.given else None,
             heights_of=base if base.case.geometry == case.geometry else system,
-            told=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),
+            on_renewal=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),
         )
         for block in blocks:
             snapshot = replace(snapshot_of(block), renewals=tuple(renewals))

@@ -351,7 +351,7 @@ def _place(
     }
     if wrong.get(body, True) or (match["body"] and name == APPROACH):
         message = "expected 'of punch', or 'of strip' or 'of both' behind what each body has"
-        raise CaseError(InputError(option, names.told(f"{message}, such as wear and worn_volume, got {words!r}")))
+        raise CaseError(InputError(option, names.with_names(f"{message}, such as wear and worn_volume, got {words!r}")))
     if match["contact"] and not registered(name, body).nodal:
         raise CaseError(InputError(option, f"{name} is of all contacts together: expected no contact, got {words!r}"))
     if not match["at"]:

@@ -80,7 +80,9 @@ class Comparison:
         differences = {"differences of the cases": self.cases, "differences of the versions": self.versions}
         for title, table in {"results": self.named(), **differences}.items():
             if table:
-                parts.append(_columns(title, self.names, {self.bodies.told(key): row for key, row in table.items()}))
+                parts.append(
+                    _columns(title, self.names, {self.bodies.with_names(key): row for key, row in table.items()})
+                )
         if not self.cases:
             parts.append("the cases are equal")
         return "\n\n".join(parts)

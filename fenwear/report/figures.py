@@ -164,7 +164,7 @@ def draw_figures(
             paths.append(folder / f"{name}.{ending}")
             save(figure, paths[-1], DPI)
     captions = folder / CAPTIONS
-    write_text(captions, names.told("".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn)))
+    write_text(captions, names.with_names("".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn)))
     return [*paths, captions]
 
 

@@ -215,9 +215,9 @@ _TEMPLATES.globals["time"] = time
 def render(template: str, names: Names = BY_ROLE, **values: object) -> Markup:
     """Return a template with its values; every text among them that is no Markup is escaped, and names the bodies."""
 
-    def told(value: object) -> object:
+    def with_names(value: object) -> object:
         plain = isinstance(value, str) and not isinstance(value, Markup) and not value.startswith("data:")
-        return names.told(str(value)) if plain else value
+        return names.with_names(str(value)) if plain else value
 
-    templates = _TEMPLATES.overlay(finalize=told) if names.given else _TEMPLATES
+    templates = _TEMPLATES.overlay(finalize=with_names) if names.given else _TEMPLATES
     return Markup(templates.get_template(template).render(values))

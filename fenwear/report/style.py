@@ -297,7 +297,7 @@ def name_bodies(figures: Iterable[Figure], names: Names) -> None:
     """Let all that is written in figures have the names of the bodies."""
     if names.given:
         for text in (text for figure in figures for text in figure.findobj(Text)):
-            text.set_text(names.told(text.get_text()))
+            text.set_text(names.with_names(text.get_text()))
 
 
 def save(figure: Figure, path: Path, dpi: int) -> None:

@@ -144,13 +144,13 @@ class Netcdf:
     def _finish(self) -> None:
         for name, size in self._sizes.items():
             if name in self._scales:
-                told: bytes = name.encode()
+                scale: bytes = name.encode()
             else:
                 self._scales[name] = self._file.create_dataset(
                     name, (size or 0,), dtype=">f4", maxshape=(None,) if size is None else None, track_order=True
                 )
-                told = NO_VARIABLE + b".%10d" % (size or 1)
-            self._scales[name].make_scale(told)
+                scale = NO_VARIABLE + b".%10d" % (size or 1)
+            self._scales[name].make_scale(scale)
             self._scales[name].attrs["_Netcdf4Dimid"] = self._ids[name]
         for data, dimensions in self._hanging:
             for axis, d in enumerate(dimensions):

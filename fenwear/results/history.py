@@ -54,8 +54,8 @@ def variables_of(system: Tribosystem) -> dict[str, Quantity]:
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
-    told, found = system.names.meant, {**_columns(system), **_of_program(system.case)}
-    return {name: one._replace(attributes=told(one.attributes)) for name, one in found.items()}
+    with_names, found = system.names.meant, {**_columns(system), **_of_program(system.case)}
+    return {name: one._replace(attributes=with_names(one.attributes)) for name, one in found.items()}
 
 
 def _of_program(case: Case) -> dict[str, Column]:

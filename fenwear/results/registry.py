@@ -169,7 +169,7 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
         found = on_surfaces(found)
     if case.turns:
         found = [replace(one, unit="rad s-1", long_name=ANGULAR) if one.name == "speed" else one for one in found]
-    return {one.name: replace(one, long_name=case.names.told(one.long_name)) for one in found}
+    return {one.name: replace(one, long_name=case.names.with_names(one.long_name)) for one in found}
 
 
 @cache

@@ -426,7 +426,7 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
             contact += _within(key, line, uncertain)
     first = next((k for k, (label, _, _) in enumerate(rows) if label.startswith("worn ")), len(rows))
     tables = [
-        (heads, [(names.told(Line(label, unit).heading), values) for label, unit, values in table])
+        (heads, [(names.with_names(Line(label, unit).heading), values) for label, unit, values in table])
         for heads, table in (([], rows[:first]), (bodies, rows[first:]), (ways, contact))
     ]
     wide = max((len(label) for _, table in tables for label, _ in table), default=0)
@@ -438,8 +438,8 @@ def columns_text(names: Sequence[str], rows: Sequence[tuple[str, Sequence[float 
     wide = max((wide, *(len(label) for label, _ in rows)))
     column = max((COLUMN, *map(len, names)))
     head = [("", names)] if names else []
-    told = [*head, *((label, [_number(value) for value in row]) for label, row in rows)] if rows else []
-    return "\n".join(f"{label:{wide}}" + "".join(f"  {cell:>{column}}" for cell in cells) for label, cells in told)
+    table = [*head, *((label, [_number(value) for value in row]) for label, row in rows)] if rows else []
+    return "\n".join(f"{label:{wide}}" + "".join(f"  {cell:>{column}}" for cell in cells) for label, cells in table)
 
 
 def _number(value: float | None) -> str:

@@ -185,7 +185,7 @@ def contact_text(summary: Mapping[str, Any]) -> str:
     ]
     names = Names(**summary.get("names", {}))
     rows = [
-        (names.told(line.heading), [sheet.shown(one.get(key), line) for one in columns])
+        (names.with_names(line.heading), [sheet.shown(one.get(key), line) for one in columns])
         for key, line in LINES.items()
         if any(key in one for one in columns)
     ]

@@ -157,8 +157,8 @@ def asperity_share(
         return np.asarray(np.interp(found / (lubrication.roughness or 1.0), *np.array(lubrication.share_over_lambda).T))
     if checked and np.maximum.reduce(found) > 1:
         at = int(found.argmax())
-        told = ", ".join(f"{one} = {np.broadcast_to(state[one], shape)[at]:g}" for one in ("p", "v", "T"))
-        raise CaseError(InputError(key, f"expected at most 1, got {found[at]:g} at {told}"))
+        state_text = ", ".join(f"{one} = {np.broadcast_to(state[one], shape)[at]:g}" for one in ("p", "v", "T"))
+        raise CaseError(InputError(key, f"expected at most 1, got {found[at]:g} at {state_text}"))
     return np.asarray(found)
 
 

@@ -80,7 +80,7 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
         what = meaning(name, plan.of, case)
         scale = degrees_of(case) if what.unit == KELVIN.unit else None
         unit = what.unit if scale is None else scale.unit
-        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.told(what.long_name)}
+        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.with_names(what.long_name)}
         if name == "direction":
             words = make_sliding(case).field.words(3 if case.model.kind == "solid" else 2)
             attributes |= {"flag_values": list(words), "flag_meanings": " ".join(words.values())}

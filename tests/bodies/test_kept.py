@@ -28,7 +28,7 @@ def setup(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
     folder = MPI.COMM_WORLD.bcast(tmp_path_factory.mktemp("cache"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     monkeypatch.setenv(kept.LIMIT, "1")
-    monkeypatch.setattr(kept, "_told", [])
+    monkeypatch.setattr(kept, "_reported", [])
     made: list[object] = []
     for kind, name in ((factor.Factor, "compute"), (substructure.Substructures, "compute")):
         compute = getattr(kind, name)

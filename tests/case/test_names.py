@@ -69,7 +69,7 @@ def test_names_change_no_number_and_all_that_is_told(tmp_path: Path) -> None:
         assert one[key] == two[key]
     assert "names" not in one
     assert two["names"] == {"punch": "pad", "strip": "disc"}
-    assert told == [PAD.told(text).replace("punch_on_strip.geo", "own.geo") for text in said]
+    assert told == [PAD.with_names(text).replace("punch_on_strip.geo", "own.geo") for text in said]
     with xarray.open_dataset(second / "history.nc") as history:
         assert history.wear.attrs["long_name"] == "worn depth of the pad at the end of the half-cycle"
         texts = [str(history[name].attrs.get("long_name")) for name in history.variables]
@@ -167,8 +167,8 @@ def test_groups_of_both_names(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_told(text: str, told: str | None) -> None:
-    assert PAD.told(text) == (told or "pad_contact spans, no 'disc_bottom' in punch_on_strip.geo")
-    assert Names().told(text) == text
+    assert PAD.with_names(text) == (told or "pad_contact spans, no 'disc_bottom' in punch_on_strip.geo")
+    assert Names().with_names(text) == text
 
 
 def test_quantities_by_name() -> None:

@@ -226,7 +226,10 @@ def _mixed_temperatures(case: Case, values: Mapping[str, object]) -> Iterator[st
             continue
         if degrees is not None and (key not in given or value < COLD):
             how = "" if key in given else " without a unit" if key in case.written.bare else " by default"
-            yield f"{key}: {value:g} K{how}, which is {value - 273.15:g} degC, beside {degrees} = {given[degrees]!r}"
+            yield (
+                f"{key}: {value:g} K{how}, which is {value - 273.15:g} degC, beside {degrees} = {given[degrees]!r}. "
+                f"Set {key} with a unit, such as {given[degrees]!r}"
+            )
         elif kelvins is not None and key in case.written.bare and value != 0:
             yield (
                 f"{key}: a number without a unit, read as {value:g} K, beside {kelvins} = {given[kelvins]!r}: "

@@ -281,7 +281,7 @@ def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
         "nominal pressure: load over the projected area (MPa)": found.get("nominal_pressure"),
         "pressure scale: integral of p² over integral of p (MPa)": pressure_scale(system, state.phase_pressure),
         "wear per cycle, mean (µm)": float(surface @ wear) / (float(surface.sum()) or 1.0),
-        "... largest (µm)": float(wear.max()),
+        "wear per cycle, largest (µm)": float(wear.max()),
         **{f"{name} ({_unit(name)} per cycle)": value for name, value in state.velocity.items()},
     }
     if state.heat is not None:

@@ -198,8 +198,8 @@ def _stationary_growth(
     drift = change / system.motion.period
     if drift > APART * abs(rate):
         return None, (
-            f"the run is not stationary yet. Pressures drift by {100 * drift:.2g} % per second, and disturbances "
-            f"{'grow' if rate > 0 else 'decay'} by {100 * abs(rate):.2g} % per second. {LONGER}"
+            f"pressures still drift by {100 * drift:.2g} % per second, more than a tenth of the {100 * abs(rate):.2g} % "
+            f"by which disturbances {'grow' if rate > 0 else 'decay'}. {LONGER}"
         )
     return rate, ""
 

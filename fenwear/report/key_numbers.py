@@ -180,7 +180,7 @@ def answers(summary: Mapping[str, Any]) -> list[Number]:
         line, digits, text = ALL_LINES[key], 5, ""
         if within and value:
             within = max(within, ROUNDED * abs(value))
-            digits = min(max(2 + math.floor(math.log10(abs(value) / within)), 1), 5)
+            digits = min(max(2 + math.floor(math.log10(abs(value) / within)), 2), 5)
             text = number_text(shown(float(f"{within:.1e}"), line))
         label, read = f"{words_of(key)}, {of}" if of else words_of(key), number_text(shown(value, line), digits)
         rows.append(Number(path, value, label, line.unit, read, text, ", ".join(most)))

@@ -162,7 +162,7 @@ def test_a_part_that_neither_touches_nor_is_held(tmp_path: Path) -> None:
     if MPI.COMM_WORLD.rank == 0:
         (tmp_path / "pads.geo").write_text(text.replace("= lower[];", "= lower[0];"))
     MPI.COMM_WORLD.barrier()
-    expected = r"punch\.supports: the punch is of 2 parts .*x = 0 to 2 mm; x = 4 to 6 mm.* part 2 neither touches nor"
+    expected = r"punch\.supports: the punch has 2 parts .*x = 0 to 2 mm; x = 4 to 6 mm.* part 2 neither touches nor"
     with pytest.raises(CaseError, match=expected):
         assemble(make_case(found))
 

@@ -100,7 +100,7 @@ AT_EDGE, INSIDE, OF_VOLUME = 1.0, 1.5, 2.0  # orders in the distance of nodes, s
 NOTICED = 0.1  # of the wear from which on meshes follow: before, what it would do is not asked for
 LATE = 0.5  # of a cycle: within it temperatures of jumps, which see whole cycles, may be any
 ROUNDING = 1e-12
-NOTHING_BELOW = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
+NOTHING_BELOW = "no elements of a lower degree than 1 exist to compare with. Set geometry.degree = 2"
 
 
 @dataclass(frozen=True)

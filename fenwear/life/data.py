@@ -276,7 +276,7 @@ class _Reader:
         # Without a standard deviation the scatter of the rows has to tell it.
         least = 1 if "sigma" in {*names, *self.directives} else LEAST_ROWS
         if len(lines) < least:
-            how = "" if least == 1 else ", or sigma, how sure they are"
+            how = "" if least == 1 else ", or `# sigma`, their standard deviation"
             raise self._fail("", f"expected at least {least} {'row' if least == 1 else 'rows'} of numbers{how}, "
                              f"got {len(lines)}")  # fmt: skip
         measured = [name for name in names if name not in OTHERS]

@@ -379,7 +379,7 @@ class LeastSquares:
 
         def residual(both: Array) -> Array:
             found = self.whitened(self.with_baselines(both) - self.observed)
-            self._tell(f"{self.evaluations:,} runs, residual {np.sqrt(np.mean(found**2)):.3g} sigma or units")
+            self._tell(f"{self.evaluations:,} runs, root mean square of the residuals {np.sqrt(np.mean(found**2)):.3g}")
             return found
 
         result = least_squares(

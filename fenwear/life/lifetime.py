@@ -30,6 +30,7 @@ SAMPLES = "samples.csv"
 LEVEL = 0.95  # of the intervals
 QUANTILES = (0.01, 0.05, 0.1, 0.5, 0.9, 0.95)
 MOST_FAILED = 0.05  # of the samples, beyond which what is left says nothing of all
+UNREACHED = f"not reached; the limit is {LIMIT:,} cycles by default"
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class Lives:
         """Return a line for each."""
         rows = zip(self.quantities, self.values, strict=True)
         return "\n".join(
-            f"{one.text}: {value:.6g} {one.unit or 'cycles'}" if np.isfinite(value) else f"{one.text}: never"
+            f"{one.text}: {value:.6g} {one.unit or 'cycles'}" if np.isfinite(value) else f"{one.text}: {UNREACHED}"
             for one, value in rows
         )
 
@@ -144,7 +145,7 @@ class Lifetime:
         if self.failures:
             lines.append(f"  {len(self.failures)} of them did not converge and are left out")
         if np.isinf(self.lives).any():
-            lines.append(f"  {np.isinf(self.lives).sum()} of them never get there")
+            lines.append(f"  {np.isinf(self.lives).sum()} of them: {UNREACHED}")
         heading = f"life ({unit})" if unit else "life"
         lines.append(f"  {'share that fails before':24} {heading:>13} {'95 % interval':>27}")
         lines += [f"  {one.level:24.0%} {one.value:13.5g} {_end(one.low)} {_end(one.high)}" for one in self.quantiles]

@@ -107,7 +107,7 @@ class Model:
             CaseError: the case has one.
         """
         if self.case.program is not None:
-            message = "not followed here; expected a case of constant loads and motion, or `run`"
+            message = "studies of lives take constant loads and motion. Remove the program, or use `run` with run.until"
             raise CaseError(InputError("program", message))
 
     @property

@@ -276,7 +276,7 @@ def test_cap_that_holds_nothing(assembled: Callable[..., Tribosystem]) -> None:
     np.testing.assert_allclose(capped.pressure, plain.pressure, atol=1e-9 * MEAN)
     with pytest.raises(ConvergenceError, match=r"wear.punch.pressure_cap = 12 MPa.*the mean pressure is beyond it"):
         steady(assembled("example2", *CAPPED, "wear.punch.pressure_cap=12"))
-    with pytest.raises(ConvergenceError, match=r"pressure_cap = 20 MPa.*they grow without end.*without the cap 25 MPa"):
+    with pytest.raises(ConvergenceError, match=r"pressure_cap = 20 MPa.* 16.67 MPa.* 25 MPa"):
         steady(assembled("monotonic-lz20", *CAPPED, "wear.punch.pressure_cap=20"))
 
 

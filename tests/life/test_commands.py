@@ -105,7 +105,7 @@ def test_wrong_usage_is_refused(call: Call, arguments: list[str], expected: str)
 def test_programs_are_not_followed() -> None:
     """A life, a sensitivity and a calibration are of constant loads: a program is refused by its key."""
     case = changed_case(load_case("example1"), "program={steps=[{cycles=3}]}", "run.half_cycles=6")
-    with pytest.raises(CaseError, match="program: not followed here"):
+    with pytest.raises(CaseError, match=r"^program: "):
         Model(case)
 
 

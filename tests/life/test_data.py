@@ -72,7 +72,10 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
         ),
         ("after (m), volume (mm^3)\n1, 1\n2, x\n3, 3\n", "row 3, column 'volume': expected a finite number, got 'x'"),
         ("after (m), volume (mm^3)\n1, 1\n2\n3, 3\n", "row 3: expected 2 columns, got 1"),
-        ("after (m), volume (mm^3)\n1, 1\n2, 2\n", "at least 3 rows of numbers, or sigma, how sure they are, got 2"),
+        (
+            "after (m), volume (mm^3)\n1, 1\n2, 2\n",
+            "at least 3 rows of numbers, or `# sigma`, their standard deviation, got 2",
+        ),
         ("# sigma = 1 mm^3\nafter (m), volume (mm^3)\n", "at least 1 row of numbers, got 0"),
         ("after (m), volume (mm^3)\n1, 1\n3, 2\n2, 3\n", "row 4, column 'after': expected amounts that rise"),
         ("after (m), volume (mm^3)\n0, 1\n1, 2\n2, 3\n", "row 2, column 'after': expected more than zero"),

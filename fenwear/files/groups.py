@@ -406,8 +406,9 @@ class _Choice:
                 text = f"no set of {ENTITIES[dim]} elements is named {body}_...: set geometry.groups.{body}_body"
                 self.wrong(self.mesh.name, f'{text} = "SET". It has {has}.')
             contacts = [one for one in groups if one.name.startswith(f"{body}_contact")]
-            if len(contacts) > 1 and f"{body}_contact" in (one.name for one in contacts):
-                text = f"has {body}_contact and {listed(one.name for one in contacts)}; expected one or the others"
+            named = [one.name for one in contacts if one.name != f"{body}_contact"]
+            if 0 < len(named) < len(contacts):
+                text = f"has {body}_contact and {listed(named)}. Keep {body}_contact alone, or the others"
                 self.wrong(self.mesh.name, text)
             for one in contacts:
                 if whole and one.dim != dim - 1:

@@ -176,7 +176,7 @@ def test_heat_out_of_bounds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     system = pad_on_strip(500.0)
     field = system.exchange.sides[1].field
     list(march(system, 10, implicit=True))
-    field._propagators = [4 * p for p in field._propagators]
+    field._decays = [4 * p for p in field._decays]
     system.exchange._forget()
     with pytest.raises(HeatError, match=r"half-cycle \d+: the heat has failed, not the contact"):
         list(march(system, 200, implicit=True))

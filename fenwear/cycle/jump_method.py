@@ -387,9 +387,9 @@ class Sizes:
             of_heat: That of temperatures.
         """
         first, second = made.whole.contact.pressure, made.end.contact.pressure
-        bent = self.area(made.bent) / max(self.area(made.whole.worn - made.begin.worn), 1e-300)
+        bent = _relative(self.area, self.rest, made.bent, made.begin.worn, made.whole.worn)
         return Estimate(
-            max(bent, sum(self.of_depth(part, *worn) for part in parts)),
+            max(float(bent), sum(self.of_depth(part, *worn) for part in parts)),
             HALVES * max(force_difference(self.pair, first[k], second[k]) for k in range(len(first))),
             of_heat,
             sum(self.of_states(part, *worn) for part in parts),

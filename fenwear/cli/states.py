@@ -75,7 +75,7 @@ def steady_command(
     if not as_json:  # the way to it may take longer
         show(_steady_text(case, state, found))
     if accuracy:
-        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), NO_UNCERTAINTY)
+        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), dict[str, Any]())
     way = time.perf_counter()
     rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
     short, cycles = len(state.system.motion.phases) <= FOLLOWED, None
@@ -134,9 +134,6 @@ def _state_json(state: SteadyState) -> dict[str, Any]:
         "wear_per_cycle": state.wear_per_cycle.tolist(),
         **state.velocity,
     }
-
-
-NO_UNCERTAINTY: dict[str, Any] = {}
 
 
 def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:

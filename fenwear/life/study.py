@@ -28,7 +28,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypedDict, Unpack
 
@@ -310,10 +310,10 @@ class Study:
         """
         number, parts = self.part or (1, 1)
         known = self.comm.bcast(store.load(runs, failed=self.collect))
-        pieces = in_pieces(runs, parts * self.comm.size * (UNKNOWN_WORKERS if self.executor else self._processes))
-        own = pieces[number - 1 :: parts]
-        if by_all:
-            own += [piece for k, piece in enumerate(pieces) if k % parts != number - 1]
+        workers = self.comm.size * (UNKNOWN_WORKERS if self.executor else self._processes)
+        dealt = in_pieces(runs, parts)  # alike for all parts, whatever workers each of them has
+        shares = [list(chain(*dealt[(number - 1 + k) % parts :: parts])) for k in range(parts)]
+        own = [piece for share in (shares if by_all else shares[:1]) for piece in in_pieces(share, workers)]
         left = [kept for piece in own if (kept := [run for run in piece if run.name not in known])]
         total = sum(map(len, own))
         before = total - sum(map(len, left))

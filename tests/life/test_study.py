@@ -65,6 +65,27 @@ class Nothing:
         raise AssertionError(given)
 
 
+class Squares:
+    """Computes squares."""
+
+    def compute(self, given: int) -> dict[str, Any]:
+        """Return a square."""
+        return {"square": np.array(given**2)}
+
+
+def test_parts_on_machines_of_other_cores(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Every run belongs to one part, however many cores each part finds."""
+    runs, case = [Run(k, named(k)) for k in range(COUNT)], load_case("example1")
+    for part, cores in ((1, 1), (2, 3), (3, 16)):
+        monkeypatch.setattr("os.sched_getaffinity", lambda _, cores=cores: set(range(cores)))
+        study = Study(folder=tmp_path / "study", part=(part, 3), processes=None)
+        if part < 3:
+            with pytest.raises(PartDoneError):
+                study.outcomes(Squares(), runs, study.open(case, "key"))
+    found = study.outcomes(Squares(), runs, study.open(case, "key"))
+    assert [int(found[run.name].values["square"]) for run in runs] == [k**2 for k in range(COUNT)]
+
+
 def test_killed_at_ten_moments(forks: str, tmp_path: Path) -> None:
     """Four parts start at once in an empty folder and are killed at random moments; what they leave is collected."""
     (tmp_path / "part.py").write_text(PART.replace("COUNT", str(COUNT)))

@@ -313,7 +313,7 @@ class _Run:
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
             at, _ = self.problem.half_cycle(at)
         worn = self.problem.interface.layers.flown_as(state.worn, at.worn)
-        return replace(self.problem.shaped(at, worn), temperature=warm)
+        return replace(self.problem.shaped(at, worn), temperature=warm, slid=memory.at.slid)
 
     def half_cycle(
         self,

@@ -105,7 +105,10 @@ class Frozen:
         self._duration = records.duration / records.duration.sum()
         self.positions, self.groups, self.contact = _grouped(problem, cycle)
         pressure = self.contact.pressure
-        begin = replace(cycle.end, worn=cycle.worn, held=None, next_step=cycle.first_step, temperature=cycle.warm)
+        slid = cycle.end.slid - records.slip_magnitude.sum(axis=0) / 2
+        begin = replace(
+            cycle.end, worn=cycle.worn, held=None, next_step=cycle.first_step, temperature=cycle.warm, slid=slid
+        )
         self._passing = _passing(problem, cycle, begin)
         phases, offsets = [], []
         closed = LayerStep(self._passing, cycle.worn, None, implicit=False).opening(self.groups.pressure(pressure))

@@ -2,7 +2,7 @@
 
 A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
 bodies, so that dy/dn = F(y) over the number n of cycles. Where the strip passes it takes many cycles to forget: there
-the contact runs in at y until a cycle ends as it begins, over no more cycles than the jump has, and without heat.
+the contact runs in at y over as many cycles as the jump has, or until one ends as it begins.
 With M(y) the wear of a cycle whose nodes slip as in the last one (`frozen`), and R = F - M what cycles do beside it, a
 jump is that of `fenwear.cycle.jump_method`, as in gross sliding, where nothing is beside M.
 
@@ -75,6 +75,10 @@ def jumped(
         return cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
 
     def made(tried: float) -> tuple[FrettingCycle, Estimate]:
+        nonlocal now
+        if tried < 1 and now is begin and problem.interface.moves:  # parts of a cycle begin with what has run in by it
+            again = _cycle_after(problem, begin, begin.end, begin.worn, begin.number, 1)
+            now = replace(again, worn=begin.worn, finer=begin.finer)
         return _attempt(problem, now, tried, load, begin)
 
     while True:
@@ -93,69 +97,91 @@ def first_cycle(
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    at, heat = _led_to(problem, at, worn), problem.heat
+    led, heat = _led_to(problem, at, worn, 1), problem.heat
     if heat is not None:
-        at = replace(at, temperature=warm if len(warm) else heat.initial())
-    return _recorded(problem, at, worn, number)
+        led = replace(led, temperature=warm if len(warm) else heat.initial())
+    return _recorded(problem, led, at.slid, worn, number)
 
 
-def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
-    """Return the state after a cycle at a shape, or half a one where nothing else changes within a cycle."""
-    program, own = problem.program, problem.interface
+def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, cycles: int) -> PartialSlipState:
+    """Return the state at a shape from which the last of so many cycles there begins.
+
+    Slip and distance are those of a cycle whose middle is `at`. Where the strip passes, the contact runs in from cycle
+    to cycle until they close. Elsewhere it forgets within one, or half a one where nothing else changes in a cycle.
+    """
+    program, own, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
     at = problem.shaped(at, own.layers.flown_as(worn, at.worn))
+    if own.moves:
+        for _ in range(min(cycles - 1, MOST_RUN_IN)):
+            before = at
+            at, _ = problem.cycle(at)
+            half = (at.slid - before.slid) / 2
+            last = at.contact.traction
+            if np.abs(last - before.contact.traction).sum() <= CLOSED * np.abs(last).sum():
+                break
+        return replace(at, slid=slid - half)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
     constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
-    half = program.half_cycles == 2 and constant and problem.heat is None
-    for _ in range(1 if half else program.half_cycles):
+    if program.half_cycles == 2 and constant and problem.heat is None:
         at, _ = problem.half_cycle(at)
-    return at
+        return replace(at, slid=2 * slid - at.slid)
+    at, _ = problem.cycle(at)
+    return replace(at, slid=slid - (at.slid - slid) / 2)
 
 
 def _cycle_after(
-    problem: PartialSlipProblem, before: FrettingCycle, at: PartialSlipState, worn: WornDepths, number: float
+    problem: PartialSlipProblem,
+    before: FrettingCycle,
+    at: PartialSlipState,
+    worn: WornDepths,
+    number: float,
+    cycles: int,
 ) -> FrettingCycle:
     """Return the cycle at a shape, with the temperatures that the cycles since one before lead to.
+
+    Args:
+        problem: The bodies and what is done to them.
+        before: The last whole cycle.
+        at: Where the time steps are, so many cycles earlier.
+        worn: Depths.
+        number: Its own.
+        cycles: Run there, of which it is the last.
 
     Raises:
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
-    at, heat = _led_to(problem, at, worn), problem.heat
+    led, heat, slid = _led_to(problem, at, worn, cycles), problem.heat, at.slid
     if heat is None:
-        return _recorded(problem, at, worn, number, min(int(number - before.number), MOST_RUN_IN))
-    cycles, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
-    if cycles <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
-        return _recorded(problem, replace(at, temperature=before.warm + cycles * rate), worn, number)
-    warm = heat.through(_course(before, steps)).after(before.warm, cycles)
+        return _recorded(problem, led, slid, worn, number)
+    since, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
+    if since <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
+        return _recorded(problem, replace(led, temperature=before.warm + since * rate), slid, worn, number)
+    warm = heat.through(_course(before, steps)).after(before.warm, since)
     for _ in range(MOST_HEATINGS):
-        found = _recorded(problem, replace(at, temperature=warm), worn, number)
+        found = _recorded(problem, replace(led, temperature=warm), slid, worn, number)
         over = heat.through(_course(found, steps))
-        again = over.after(before.warm, cycles)
+        again = over.after(before.warm, since)
         warmest = float(np.abs(heat.surfaces(again)).max())
         if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
-            wrong = heat.exchange.contact_changes(over.error(before.warm, again, rate, cycles))
+            wrong = heat.exchange.contact_changes(over.error(before.warm, again, rate, since))
             return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
         warm = again
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
 
 def _recorded(
-    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, most: int = 0
+    problem: PartialSlipProblem, at: PartialSlipState, slid: Array, worn: WornDepths, number: float
 ) -> FrettingCycle:
-    """Return the cycle at a shape from a state: where the strip passes, of at most so many more the one that closes."""
+    """Return the cycle at a shape from a state; its nodes have slid so far (n,), mm, in its middle."""
     layers, creep = problem.interface.layers, problem.interface.creep
     begin = problem.shaped(at, layers.flown_as(worn, at.worn))
     first, warm = begin.next_step, begin.temperature
     at, parts = problem.cycle(begin)
-    for _ in range(most if problem.interface.moves else 0):
-        last = at.contact.traction
-        if np.abs(last - begin.contact.traction).sum() <= CLOSED * np.abs(last).sum():
-            break
-        begin = problem.shaped(replace(at, slid=begin.slid), layers.flown_as(worn, at.worn))
-        at, parts = problem.cycle(begin)
     rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
     bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
-    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, at, warm=warm)
+    end = replace(at, slid=slid)
+    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, end, warm=warm)
 
 
 def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
@@ -228,13 +254,13 @@ class _Jump(JumpLaw[_Moment]):
 
     def halfway(self, half: _Moment, cycles: float) -> _Moment:
         """Return the state halfway with R as it is found there, in place of that at the begin all the way."""
-        self._middle = self._cycle(half, cycles / 2, self._now.end)
+        self._middle = self._cycle(half, cycles / 2)
         self._bend = (self._beside(self._middle, half) - self._first).times(2 / cycles)
         return self.settled(replace(half, worn=half.worn + self._bend.times(cycles**2 / 8)))
 
     def ended(self, end: _Moment, cycles: float) -> None:
         """Take the cycle at the end of a jump."""
-        self.then = self._cycle(end, cycles, self._middle.end)
+        self.then = self._cycle(end, cycles)
 
     def estimate(self, made: Attempt[_Moment]) -> tuple[Estimate, WornDepths]:
         """Return the error of a jump, and what R leaves of it, by Simpson's rule."""
@@ -266,12 +292,19 @@ class _Jump(JumpLaw[_Moment]):
             raise ConvergenceError(TOO_LARGE)
         return found - self._coatings.with_slopes(self._frozen.rate(at.contact, cycle.worn), cycle.worn)
 
-    def _cycle(self, end: _Moment, done: float, after: PartialSlipState) -> FrettingCycle:
-        """Return the cycle so many later, at the end of a step, from where a cycle before has ended."""
-        now, start = self._now, _slid_on(self._now, done, self._load)
+    def _cycle(self, end: _Moment, done: float) -> FrettingCycle:
+        """Return the cycle so many later, at the end of a step.
+
+        It continues from the last one of the jump; but where not a whole cycle lies between them, from the last whole
+        one, as all its parts do.
+        """
+        now, start, whole, last = self._now, _slid_on(self._now, done, self._load), self._whole, self._middle
         worn = _balanced(self.problem, now.worn, self.depths(end.worn))
-        at = replace(after, slid=start.slid, load=start.load)
-        return _cycle_after(self.problem, self._whole, at, worn, now.number + done)
+        number = now.number + done
+        cycles = max(1, int(number - whole.number)) - max(int(last.number - whole.number), int(last is not whole))
+        after = last if cycles else whole
+        at = replace(after.end, slid=start.slid, load=start.load)
+        return _cycle_after(self.problem, whole, at, worn, number, max(cycles, 1))
 
 
 def _attempt(
@@ -312,5 +345,5 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
 
 def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
     """Return the end of a cycle under the load of so many later, as far as the slip of its nodes determines it."""
-    slid = now.end.slid + (cycles - 1) * now.records.slip_magnitude.sum(axis=0)
+    slid = now.end.slid + cycles * now.records.slip_magnitude.sum(axis=0)
     return replace(now.end, load=load(now.number + cycles), slid=slid)

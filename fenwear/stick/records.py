@@ -134,7 +134,7 @@ class FrettingCycle:
         error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
-        end: State at its end. The next step follows from it.
+        end: State at its end, with the slip from the start to its middle. The next step follows from it.
         length: Cycles of the next jump, as wished; below 1 a part of one.
         warm: Temperatures at the start of its records (dim,); empty without heat.
         finer: Depths to which jumps of next to no length would have led, to the next order; None where nobody asks.

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from combinations import FEATURES, STICK
 
 from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.cycle import evolve
@@ -98,6 +99,15 @@ def test_jumps_tend_to_the_march() -> None:
     assert max(differences) < 5e-3  # a march of cycles this long is off by 1e-3 itself
     assert others[0] < 0.1
     assert others[1] < min(0.02, others[0])
+
+
+@pytest.mark.parametrize(("feature", "bound"), [("wear by depth and distance", 7e-4), ("both bodies worn", 7e-4)])
+def test_short_jumps_end_where_the_march_does(feature: str, bound: float) -> None:
+    """A law knows the distance in the middle of a cycle; a passing strip runs in over as many cycles as a jump has."""
+    base, settings = FEATURES[feature]
+    system = assemble(load_case(base, [*settings, "contact.law='coulomb'", *STICK]))
+    marched, jumped_to = (depths(list(go)) for go in (march(system, 80), jump(system, 80, tolerance=1e-3)))
+    assert np.abs(jumped_to - marched).max() < bound * marched.max()
 
 
 def test_a_cycle_that_wears_too_much_goes_in_parts() -> None:

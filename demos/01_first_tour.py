@@ -34,10 +34,10 @@ import numpy as np
 import xarray
 
 from fenwear import load_case
-from fenwear.report.course import course_figure
 from fenwear.report.lines import fields_of, lines_figure
-from fenwear.results.reading import read_history
-from fenwear.run import run_case
+from fenwear.report.run_figures import course_figure
+from fenwear.results.stored_history import read_history
+from fenwear.studies.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements, fewer half-cycles
 settings = []

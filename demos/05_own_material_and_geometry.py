@@ -28,10 +28,10 @@ import xarray
 from matplotlib.collections import PolyCollection
 
 from fenwear import CaseError, assemble, make_case, steady
-from fenwear.compat import geometry_dofmap
-from fenwear.cycle import growth_rate
-from fenwear.results.reading import read_history
-from fenwear.run import run_case
+from fenwear.common.compat import geometry_dofmap
+from fenwear.results.stored_history import read_history
+from fenwear.steps import growth_rate
+from fenwear.studies.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 temporary = tempfile.TemporaryDirectory()

@@ -28,7 +28,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fenwear import load_case
-from fenwear.life import (
+from fenwear.studies import (
     LeastSquares,
     Model,
     Unknown,
@@ -42,7 +42,7 @@ from fenwear.life import (
     read_data,
     sensitivity,
 )
-from fenwear.life.commands import life_figure, tornado
+from fenwear.studies.study_reports import life_figure, tornado
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements and samples
 ELEMENTS, SAMPLES = (12, 6) if COARSE else (60, 100)

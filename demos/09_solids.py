@@ -28,7 +28,7 @@ from IPython import display as screen
 from fenwear import assemble, load_case, steady
 from fenwear.report.lines import fields_of, lines_figure
 from fenwear.report.maps import map_figure
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 LINEAR = ["geometry.degree=1", "geometry.order=1"] if COARSE else []

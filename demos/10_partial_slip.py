@@ -24,8 +24,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fenwear import assemble, jump, load_case, march, steady, vary
-from fenwear.stick.final import final_shape
-from fenwear.stick.records import TimeStepRecords
+from fenwear.steps.stick_final import final_shape
+from fenwear.steps.stick_records import TimeStepRecords
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 ELEMENTS = 30 if COARSE else 40

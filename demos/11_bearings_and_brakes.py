@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 from fenwear import load_case
 from fenwear.report.lines import fields_of
 from fenwear.report.maps import map_figure, tracks_figure
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 folder = tempfile.TemporaryDirectory()

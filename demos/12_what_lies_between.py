@@ -26,7 +26,7 @@ import numpy as np
 import xarray
 
 from fenwear import assemble, load_case, march
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 folder = tempfile.TemporaryDirectory()

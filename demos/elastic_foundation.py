@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 import fenwear
-from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.response import Request
+from fenwear.common.arrays import Array
 
 HEIGHT, MODULUS = 0.5, 200.0  # of the layer, mm and MPa
 

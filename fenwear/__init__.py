@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fenwear.stack import importing, load_mpi_first
+from fenwear.common.stack import importing, load_mpi_first
 
 __version__ = "0.2.0"
 
@@ -54,31 +54,31 @@ _HOMES = {
     "make_case": "case",
     "register_law": "case",
     "State": "case",
-    "own_mesh": "bodies.mesh",
-    "OwnLaw": "bodies.material",
-    "register_operator": "bodies.operators",
-    "register_contact_law": "assembly",
-    "CaseError": "errors",
-    "ConvergenceError": "errors",
-    "FenwearError": "errors",
-    "Tribosystem": "assembly",
-    "assemble": "assembly",
-    "vary": "assembly",
-    "Block": "cycle",
-    "SteadyState": "cycle",
-    "critical_speed": "cycle",
-    "cycles_to_reach": "cycle",
-    "evolve": "cycle",
-    "growth_rate": "cycle",
-    "jump": "cycle",
-    "march": "cycle",
-    "steady": "cycle",
-    "run_case": "run",
+    "own_mesh": "bodies.distributed_mesh",
+    "OwnLaw": "bodies.elastic_material",
+    "register_operator": "bodies.surface_operators",
+    "register_contact_law": "system",
+    "CaseError": "common.errors",
+    "ConvergenceError": "common.errors",
+    "FenwearError": "common.errors",
+    "Tribosystem": "system",
+    "assemble": "system",
+    "vary": "system",
+    "Block": "steps",
+    "SteadyState": "steps",
+    "critical_speed": "steps",
+    "cycles_to_reach": "steps",
+    "evolve": "steps",
+    "growth_rate": "steps",
+    "jump": "steps",
+    "march": "steps",
+    "steady": "steps",
+    "run_case": "studies.run",
     "export": "results.export",
-    "read_history": "results.reading",
-    "to_dataset": "results.reading",
-    "flash_temperatures": "flash.temperatures",
-    "sweep": "sweeps",
+    "read_history": "results.stored_history",
+    "to_dataset": "results.stored_history",
+    "flash_temperatures": "results.flash_temperatures",
+    "sweep": "studies",
 }
 
 

@@ -11,8 +11,15 @@ import sys
 import traceback
 from typing import TYPE_CHECKING, Any, TextIO
 
-from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, PartDoneError, StackError
-from fenwear.stack import check_numbers, importing
+from fenwear.common.errors import (
+    CaseError,
+    ConvergenceError,
+    InterruptedRunError,
+    OutputError,
+    PartDoneError,
+    StackError,
+)
+from fenwear.common.stack import check_numbers, importing
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -70,7 +77,7 @@ def _start(arguments: list[str], petsc_options: list[str]) -> int:
         sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
     else:
         sys.stdout, sys.stderr = _Patient(sys.stdout), _Patient(sys.stderr)  # type: ignore[assignment]
-    from fenwear.stack import ensure_folder
+    from fenwear.common.stack import ensure_folder
 
     problem = ensure_folder(comm)
     if problem is not None:
@@ -89,8 +96,8 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
     from fenwear.cli import UsageError, app, typer, with_names
-    from fenwear.cli.base import check_removed
-    from fenwear.signals import ignore_from_now_on
+    from fenwear.cli.application import check_removed
+    from fenwear.common.signals import ignore_from_now_on
 
     try:
         check_removed(arguments)

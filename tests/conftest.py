@@ -29,7 +29,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case
-from fenwear.assembly.variants import set_up_by, with_case
+from fenwear.system.variants import set_up_by, with_case
 
 # The same examples on every machine and every rank; --hypothesis-profile=search looks for others.
 settings.register_profile(
@@ -51,7 +51,7 @@ SET_UPS = (
     "interface",
     "verify",
     "test_determinism.py",
-    "test_parallel.py",
+    "common/test_parallel.py",
     "test_solid.py",
 )
 
@@ -104,7 +104,7 @@ def tmp_path(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def unmatched(tmp_path_factory: pytest.TempPathFactory) -> Tribosystem:
     """Return Example 1 on meshes whose contact nodes do not match: the strip has two elements more on each half."""
-    from fenwear.bodies.ready import meshes_folder
+    from fenwear.bodies.ready_geometries import meshes_folder
 
     text = (meshes_folder() / "punch_on_strip.geo").read_text("utf-8")
     old = "Transfinite Curve{a, b} = half_count + 1 Using Progression contact_ratio;"

@@ -56,7 +56,7 @@ def _load() -> None:
     import xarray  # noqa: F401
 
     import fenwear.cli
-    import fenwear.run  # noqa: F401
+    import fenwear.studies.run  # noqa: F401
 
 
 def _reap() -> None:

@@ -40,7 +40,7 @@ def run(case: str, folder: Path, *settings: str, ranks: int = 1, more: tuple[str
 
 def imports(_: Path) -> None:
     """Whatever is imported first after fenwear, or of it."""
-    for first in ("dolfinx", "petsc4py.PETSc", "fenwear.heat.field", "fenwear.stick"):
+    for first in ("dolfinx", "petsc4py.PETSc", "fenwear.heat.temperature", "fenwear.steps"):
         call([sys.executable, "-c", f"import fenwear, {first}"])
     import fenwear
 
@@ -101,7 +101,7 @@ def stick(folder: Path) -> None:
     """Fretting: pressure and traction carry the load; traction is below friction, its work balances."""
     import numpy as np
 
-    from fenwear.results.reading import load_history
+    from fenwear.results.stored_history import load_history
 
     run("fretting-partial-slip", folder / "stick", *STICK)
     history = load_history(folder / "stick")

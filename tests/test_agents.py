@@ -13,7 +13,7 @@ import pytest
 from fenwear import CaseError, load_case
 from fenwear.case.keys import json_schema
 from fenwear.cli import agents
-from fenwear.errors import StackError
+from fenwear.common.errors import StackError
 
 pytestmark = pytest.mark.process
 

@@ -62,7 +62,7 @@ def test_wear_relieves_it() -> None:
 
 def test_with_stick() -> None:
     """The same approach where the surfaces stick: the force is that of the bars."""
-    from fenwear.stick.setup import partial_slip_problem
+    from fenwear.steps.stick_setup import partial_slip_problem
 
     found = blocks(contact={"friction": 0.3, "law": "coulomb"}, run={"half_cycles": 2, "integration": "explicit"})
     found["motion"]["amplitude"] = 1e-4

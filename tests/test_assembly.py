@@ -15,13 +15,13 @@ from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, evolve, load_case, make_case, march, sweep, to_dataset, vary
-from fenwear.assembly import build_bodies, elastic, make_sliding, place, with_exchange, with_reduced_heat
+from fenwear.bodies.distributed_mesh import own_mesh
+from fenwear.bodies.elastic_material import OwnLaw, lame, strain, stress
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import OwnLaw, lame, strain, stress
-from fenwear.bodies.mesh import own_mesh
 from fenwear.case import Body, Heat, Support
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.material import ConductionLaw
+from fenwear.heat.fourier_law import ConductionLaw
+from fenwear.system import build_bodies, elastic, make_sliding, place, with_exchange, with_reduced_heat
 
 DEMO = Path(__file__).parents[1] / "demos" / "own_materials.py"
 GROUPS: dict[str, Callable[[Any], Any]] = {

@@ -17,9 +17,9 @@ import pytest
 import fenwear as package
 from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
-from fenwear.cli.states import steady_command
-from fenwear.cycle import RunningIn
-from fenwear.errors import HeatError
+from fenwear.cli.state_commands import steady_command
+from fenwear.common.errors import HeatError
+from fenwear.steps import RunningIn
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -78,8 +78,8 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
         clock[0] += 196.0
         return RunningIn(7, 1)
 
-    monkeypatch.setattr("fenwear.cli.states.time", SimpleNamespace(perf_counter=lambda: clock[0]))
-    monkeypatch.setattr("fenwear.cycle.running_in", slow)
+    monkeypatch.setattr("fenwear.cli.state_commands.time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr("fenwear.steps.running_in", slow)
     steady_command("example2", list(options()[1::2]))
     assert "33.333" in printed[0]
     rest = capsys.readouterr().out
@@ -96,7 +96,7 @@ def test_steady_that_is_found_is_reported_whatever_follows(
     def failing(*_arguments: object) -> RunningIn:
         raise HeatError("too hot by far")
 
-    monkeypatch.setattr("fenwear.cycle.running_in", failing)
+    monkeypatch.setattr("fenwear.steps.running_in", failing)
     steady_command("example2", list(options()[1::2]), as_json=True)
     out, err = capsys.readouterr()
     assert max(json.loads(out)["pressure_plus"]) == pytest.approx(100 / 3, rel=1e-3)

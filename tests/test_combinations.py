@@ -16,8 +16,11 @@ import fenwear
 from fenwear import Case, CaseError, ConvergenceError, State, assemble, jump, load_case, march, register_law, steady
 from fenwear.case import Dependence
 from fenwear.case.dependence import forget_laws
-from fenwear.cycle import Block, evolve
-from fenwear.life import (
+from fenwear.results import layer_results
+from fenwear.results.quantity import computed
+from fenwear.results.stored_history import load_history
+from fenwear.steps import Block, evolve
+from fenwear.studies import (
     DataSet,
     Model,
     Series,
@@ -28,10 +31,7 @@ from fenwear.life import (
     parse_scatter,
     sensitivity,
 )
-from fenwear.results import between
-from fenwear.results.quantity import computed
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 KEY, EXPONENT = "wear.punch.coefficient", "wear.punch.pressure_exponent"
 COATING = "wear.punch.coating.coefficient"
@@ -67,7 +67,7 @@ def check(block: Block) -> None:
         followed = 1e-3 if system.bodies.followed is not None else 1e-9
         assert float(block.totals.of("volume_punch")[-1]) == pytest.approx(volume, rel=followed)
     if system.layers.debris.present:
-        assert computed(block, between.OF_DEBRIS)["debris_balance_error"].max() < 1e-12
+        assert computed(block, layer_results.OF_DEBRIS)["debris_balance_error"].max() < 1e-12
     if block.heat is not None:
         assert block.heat.balance_error.max() < 1e-8
 

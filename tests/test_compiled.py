@@ -12,8 +12,8 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from fenwear.bodies.assembly import compiled
-from fenwear.stack import ensure_folder
+from fenwear.algebra.assembled import compiled
+from fenwear.common.stack import ensure_folder
 
 
 @pytest.mark.mpi

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear.results.reading import load_history
+from fenwear.results.stored_history import load_history
 
 Run = Callable[..., Any]
 SMALL = (
@@ -56,7 +56,7 @@ ALL = """
 import json, sys
 from pathlib import Path
 from fenwear import load_case
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 for name, (case, *settings) in json.loads(sys.argv[2]).items():
     run_case(load_case(case, settings), name, Path(sys.argv[1]) / name, lambda message: None, progress="none")

@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import load_case, run
+from fenwear import load_case
 from fenwear.results.checkpoint import FILE, reached
-from fenwear.results.reading import load_history
+from fenwear.results.stored_history import load_history
+from fenwear.studies import run
 
 Run = Callable[..., Any]
 SMALL = (
@@ -524,7 +525,7 @@ def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str,
 TWICE = """
 import os, signal, sys
 from mpi4py import MPI
-from fenwear.signals import Signals
+from fenwear.common.signals import Signals
 
 with Signals(MPI.COMM_WORLD):
     MPI.COMM_WORLD.Barrier()  # each notes signals from here on

@@ -13,9 +13,9 @@ import typer
 from mpi4py import MPI
 
 from fenwear import __main__, cli
-from fenwear.errors import CaseError, OutputError
+from fenwear.common.errors import CaseError, OutputError
+from fenwear.common.stack import versions
 from fenwear.results.history import clear_directory, make_directory
-from fenwear.stack import versions
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import fenwear
-from fenwear.bodies.ready import meshes_folder
+from fenwear.bodies.ready_geometries import meshes_folder
 
 ROOT = Path(fenwear.__file__).parents[1]
 Run = Callable[..., Any]
@@ -107,7 +107,7 @@ def test_installed_wheel_works_elsewhere(wheel: Path, run_python: Run, tmp_path:
     install = ("-m", "pip", "install", "--no-deps", "--no-index", "--target", target, wheel)
     done = run_python(*install)
     assert done.returncode == 0, done.stderr
-    where = "import fenwear, fenwear.bodies.ready; print(fenwear.__file__); print(fenwear.bodies.ready.meshes_folder())"
+    where = "import fenwear, fenwear.bodies.ready_geometries as g; print(fenwear.__file__); print(g.meshes_folder())"
     found = run_python("-c", where, cwd=elsewhere, PYTHONPATH=str(target)).stdout.split()
     assert [Path(f).is_relative_to(target) for f in found] == [True, True]
     arguments = ("-m", "fenwear", "optimum", "monotonic-lz20")
@@ -130,7 +130,7 @@ def test_import_is_light(run_python: Run) -> None:
 def test_start_is_quick(run_python: Run) -> None:
     """The steady state needs no tables, statistics or plots: a third of its start."""
     late = "{'xarray', 'pandas', 'scipy.stats', 'matplotlib', 'pyvista', 'gmsh'}"
-    modules = "fenwear.cli.states, fenwear.cycle, fenwear.results.quantity"
+    modules = "fenwear.cli.state_commands, fenwear.steps, fenwear.results.quantity"
     code = f"import sys, {modules}; print(sorted({late} & set(sys.modules)))"
     assert run_python("-c", code).stdout.strip() == "[]"
 

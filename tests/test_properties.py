@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 
 from fenwear import Tribosystem, assemble, load_case, march, steady, vary
-from fenwear.arrays import Array
-from fenwear.cycle import Block, stability_number
-from fenwear.heat.exchange import CROSSING, TERMS
+from fenwear.common.arrays import Array
+from fenwear.heat.heat_exchange import CROSSING, TERMS
+from fenwear.steps import Block, stability_number
 
 HALF_WIDTH = 30.0  # mm
 FRICTION = 0.5  # at most: with more of it Newton's iteration for contact may stagnate, see the last test

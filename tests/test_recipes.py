@@ -20,13 +20,13 @@ from fenwear import (
     register_law,
     steady,
 )
-from fenwear.assembly import laws, place_case
-from fenwear.case.contact import CONTACT_LAWS
+from fenwear.case.contact_table import CONTACT_LAWS
 from fenwear.case.dependence import forget_laws
-from fenwear.cycle.gross_sliding import GrossSliding
-from fenwear.interface import patches
-from fenwear.interface.patches import CHARTS, Side
-from fenwear.run import run_case
+from fenwear.steps.gross_sliding import GrossSliding
+from fenwear.studies.run import run_case
+from fenwear.surfaces import patches
+from fenwear.surfaces.patches import CHARTS, Side
+from fenwear.system import contact_laws, place_case
 
 # ---- A law of contact: the strip is dragged back under a share of its load, as the tool of a shaping machine is.
 
@@ -62,7 +62,7 @@ def dragged() -> Iterator[str]:
     """Register the law, and forget it."""
     register_contact_law(DraggedBack.name, DraggedBack())
     yield DraggedBack.name
-    del laws.LAWS[DraggedBack.name]
+    del contact_laws.LAWS[DraggedBack.name]
     CONTACT_LAWS.discard(DraggedBack.name)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from fenwear import CaseError
-from fenwear.cli.base import REMOVED, check_removed
+from fenwear.cli.application import REMOVED, check_removed
 
 
 @pytest.mark.parametrize("word", sorted(REMOVED))

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from fenwear import CaseError, load_case
-from fenwear.assembly import place_case
-from fenwear.bodies.ready import meshes_folder
+from fenwear.bodies.ready_geometries import meshes_folder
 from fenwear.case.templates import template_names, write_case_of
-from fenwear.plausibility import RULES, Seen
+from fenwear.checks import RULES, Seen
+from fenwear.system import place_case
 
 
 def told(case: Path | str, *settings: str) -> list[str]:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, load_case
-from fenwear.assembly import assemble, place_case
 from fenwear.case import Case
-from fenwear.cycle import march, steady
+from fenwear.steps import march, steady
+from fenwear.system import assemble, place_case
 from fenwear_verify.solid import describe
 
 COARSE = ("geometry.degree=1", "geometry.order=1")

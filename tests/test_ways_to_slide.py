@@ -13,7 +13,7 @@ from dolfinx.mesh import CellType, create_mesh, create_rectangle
 from mpi4py import MPI
 
 from fenwear import CaseError, assemble, load_case, make_case, march, own_mesh, steady
-from fenwear.bodies.mesh import BodyMesh
+from fenwear.bodies.distributed_mesh import BodyMesh
 from fenwear.results import registry
 
 Marker = Callable[[Any], Any]

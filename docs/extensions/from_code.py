@@ -15,11 +15,11 @@ from executed import code_key
 from pydantic import BaseModel
 from sphinx.util.docutils import SphinxDirective
 
-from fenwear.bodies.ready import ready_geometries
+from fenwear.bodies.ready_geometries import ready_geometries
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import between, registry, roughness, sheet, steps
+from fenwear.results import layer_results, registry, roughness, sheet, time_steps
 from fenwear_verify.suite import registered
 from fenwear_verify.validation import Experiment, experiments
 from fenwear_verify.validation.command import draw, markdown
@@ -131,13 +131,13 @@ class Results(Written):
             "With heat": registry.OF_HEAT,
             "With heat.track": registry.OF_TRACK,
             "Solids and rings, in place of the plane variables": others,
-            "Coatings; names of the strip's variables end in _strip": between.of_coated("punch"),
-            "Creep; names of the strip's variables end in _strip": between.of_creeping("punch"),
-            "Cycles as tables, in solids": steps.OF_TABLE,
+            "Coatings; names of the strip's variables end in _strip": layer_results.of_coated("punch"),
+            "Creep; names of the strip's variables end in _strip": layer_results.of_creeping("punch"),
+            "Cycles as tables, in solids": time_steps.OF_TABLE,
             "Rough surfaces; names of the strip's variables end in _strip": roughness.of_body("punch"),
-            "With contact.law = coulomb": steps.IN_STEPS,
-            "With contact.law = coulomb and heat": steps.OF_HEAT,
-            "With contact.law = coulomb in solids, further or in place of these": steps.of_solids(),
+            "With contact.law = coulomb": time_steps.IN_STEPS,
+            "With contact.law = coulomb and heat": time_steps.OF_HEAT,
+            "With contact.law = coulomb in solids, further or in place of these": time_steps.of_solids(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -17,12 +17,12 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled
+from fenwear.algebra.assembled import assembled
+from fenwear.algebra.factor import factored
+from fenwear.bodies.elastic_material import measure
 from fenwear.bodies.elasticity import PREFIX, ElasticBody
-from fenwear.bodies.factor import factored
-from fenwear.bodies.material import measure
 from fenwear.case import Kind
+from fenwear.common.arrays import Array
 
 ON_AXIS = 1e-9  # of the contact's largest radius
 

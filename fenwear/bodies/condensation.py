@@ -18,13 +18,13 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array, Nodes
-from fenwear.bodies import kept
-from fenwear.bodies.assembly import transposed_times
+from fenwear.algebra.assembled import transposed_times
+from fenwear.algebra.factor import entries, make_together, operations, solve_together
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import entries, make_together, operations, solve_together
 from fenwear.bodies.response import Request, by_surface, respond_together
-from fenwear.parallel import total
+from fenwear.common import disk_cache
+from fenwear.common.arrays import Array, Nodes
+from fenwear.common.parallel import total
 
 BOUNDARY_SHARE = 1.0  # of the factor's operations that joining the ranks' boundaries may take
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
@@ -133,7 +133,7 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
     comm = requests[0].elastic.body.mesh.comm
     if not keep:
         return _condensed(requests)
-    places = [kept.known(comm, one.identity, fresh=fresh) for one in requests]
+    places = [disk_cache.known(comm, one.identity, fresh=fresh) for one in requests]
     both = list(zip(requests, places, strict=True))
     computed = iter(_condensed([one for one, place in both if not place.arrays]))
     condensed = []

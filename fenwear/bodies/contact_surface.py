@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fenwear.arrays import Array, Mask
-from fenwear.bodies.assembly import assembled_vector
-from fenwear.bodies.grid import RegularGrid
-from fenwear.bodies.mesh import BodyMesh
-from fenwear.bodies.round import Round, rounds_of
-from fenwear.case.bodies import Profile
-from fenwear.errors import CaseError, InputError
+from fenwear.algebra.assembled import assembled_vector
+from fenwear.bodies.distributed_mesh import BodyMesh
+from fenwear.bodies.grid_surface import RegularGrid
+from fenwear.bodies.round_surfaces import Round, rounds_of
+from fenwear.case.body_tables import Profile
+from fenwear.common.arrays import Array, Mask
+from fenwear.common.errors import CaseError, InputError
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
 NO_WEIGHT = 1e-9  # of the largest: what rounding leaves

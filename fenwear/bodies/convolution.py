@@ -19,8 +19,8 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Nodes
-from fenwear.bodies.tensor import TensorWeights
+from fenwear.algebra.tensor_interpolation import TensorWeights
+from fenwear.common.arrays import Array, Nodes
 
 SAME = 1e-9  # of tables: none
 CACHE = 2**18  # bytes of waves that are transformed at a time

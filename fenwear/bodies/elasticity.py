@@ -18,20 +18,20 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 from ufl.algorithms.check_arities import ArityMismatch
 
-from fenwear import compat
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled, assembled_vector, compiled
+from fenwear.algebra.assembled import assembled, assembled_vector, compiled
+from fenwear.algebra.factor import Factor, make_together, solve_together
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
-from fenwear.bodies.factor import Factor, make_together, solve_together
-from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.distributed_mesh import BodyMesh
+from fenwear.bodies.elastic_material import ElasticLaw, measure, strain_of
+from fenwear.bodies.grid_surface import RegularGrid
 from fenwear.bodies.guides import GuideAnswer, Guides, Loose, make_guides
-from fenwear.bodies.material import ElasticLaw, measure, strain_of
-from fenwear.bodies.mesh import BodyMesh
 from fenwear.bodies.substructure import Boundary, Substructures
 from fenwear.bodies.supports import Supports
 from fenwear.case import AUTO, CONDENSED, Body, Load, Setup
-from fenwear.errors import CaseError, InputError
-from fenwear.parallel import total
+from fenwear.common import compat
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import total
 
 PREFIX = "fenwear_elasticity_"
 BY_SIZE = Setup()

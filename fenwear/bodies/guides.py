@@ -32,9 +32,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector, compiled
-from fenwear.parallel import total
+from fenwear.algebra.assembled import assembled_vector, compiled
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 
 
 class Loose(NamedTuple):

@@ -29,12 +29,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
 from fenwear.bodies.convolution import EVERY, Convolution, GridOperator
-from fenwear.bodies.correction import constants_of
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.half_space_correction import constants_of
 from fenwear.bodies.response import Request
-from fenwear.errors import CaseError, InputError
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
 
 UNEVEN = 0.01  # of the spacing: how far a node may be off the grid
 WIDE = 1.25  # of a cell: what a node has at most; 1.5 between cells of one spacing and of two

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.files.groups import GroupedMesh
 
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
+from fenwear.algebra.factor import available, entries, moved, solve_together
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import available, entries, moved, solve_together
-from fenwear.parallel import total
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
 SAME = 1e-9  # of unit vectors: one direction

@@ -20,9 +20,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear.arrays import Array, Mask
-from fenwear.bodies.assembly import assembled_here
-from fenwear.bodies.factor import Factor, condense_only, factored_here, schur_complement, solved, without_factor
+from fenwear.algebra.assembled import assembled_here
+from fenwear.algebra.factor import Factor, condense_only, factored_here, schur_complement, solved, without_factor
+from fenwear.common.arrays import Array, Mask
 
 Numbers = NDArray[np.int64]
 

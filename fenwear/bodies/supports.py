@@ -10,15 +10,15 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear import compat
-from fenwear.arrays import Mask
+from fenwear.bodies.connected_parts import connected_parts, part_boxes
 from fenwear.bodies.contact_surface import ContactSurface, Trace
+from fenwear.bodies.distributed_mesh import BodyMesh
 from fenwear.bodies.guides import Loose
-from fenwear.bodies.mesh import BodyMesh
-from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Body, Kind, Support
-from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import ENTITIES
+from fenwear.common import compat
+from fenwear.common.arrays import Mask
+from fenwear.common.errors import CaseError, InputError
+from fenwear.files.mesh_file import ENTITIES
 
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.

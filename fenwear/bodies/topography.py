@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.grid_surface import RegularGrid
 from fenwear.case import Topography
-from fenwear.errors import CaseError, InputError
-from fenwear.files.heights import Heights, read_heights
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.files.height_maps import Heights, read_heights
 
 COARSE = 4.0  # spacings that the shortest wave length needs
 USUAL = 8.0  # spacings of the shortest wave length by default

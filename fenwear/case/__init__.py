@@ -1,17 +1,17 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
-from fenwear.case.bodies import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support, Topography
-from fenwear.case.contact import Contact
-from fenwear.case.course import Output, Run, Setup
+from fenwear.case.body_tables import AUTO, CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support, Topography
+from fenwear.case.contact_table import Contact
 from fenwear.case.dependence import State, register_law
-from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
-from fenwear.case.materials import Material
-from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
-from fenwear.case.plausible import plausibility_warnings
-from fenwear.case.quantities import Kind
+from fenwear.case.heat_table import Heat, Track
+from fenwear.case.material_tables import Material
+from fenwear.case.motion_table import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.case.reading import builtin_cases, changed_case, heat_of, load_case, make_case
+from fenwear.case.run_tables import Output, Run, Setup
 from fenwear.case.schema import Case
-from fenwear.case.thermal import Heat, Track
+from fenwear.case.table_parts import Kind
+from fenwear.case.unlikely_values import plausibility_warnings
+from fenwear.case.wear_table import Dependence, Stick, Wear, WearLaw
 
 __all__ = [
     "AUTO",

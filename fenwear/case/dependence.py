@@ -10,7 +10,7 @@ code.
 Laws of one's own are functions that a program in Python has registered by name; a case file alone cannot. A law may
 have states: fields at the contact's nodes that it remembers, such as the thickness of an oxide film or the damage of a
 surface. They begin somewhere, and their rates are functions of the conditions of each node, of the wear there and of
-the states themselves. `fenwear.layers.memory` integrates them.
+the states themselves. `fenwear.laws.law_states` integrates them.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from typing import Any, TypeVar, overload
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.errors import CaseError, InputError
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
 
 VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm")
 UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm",

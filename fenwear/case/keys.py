@@ -15,11 +15,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fenwear.case.bodies import Body
-from fenwear.case.laws import Dependence, WearLaw
-from fenwear.case.quantities import UNIT, Unit, unit_of
+from fenwear.case.body_tables import Body
 from fenwear.case.schema import Case, part_models
-from fenwear.errors import CaseError, InputError
+from fenwear.case.table_parts import UNIT, Unit, unit_of
+from fenwear.case.wear_table import Dependence, WearLaw
+from fenwear.common.errors import CaseError, InputError
 
 LIMITS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
 SCALARS = ("number", "integer", "string")

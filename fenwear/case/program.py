@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.case.course import ProgramStep
-from fenwear.case.csv_table import CsvTable, read_csv
-from fenwear.case.motions import Cycle, OneWay, Rotation, Tabulated
+from fenwear.case.motion_table import Cycle, OneWay, Rotation, Tabulated
+from fenwear.case.run_tables import ProgramStep
 from fenwear.case.schema import Case
-from fenwear.errors import CaseError, InputError
+from fenwear.common.csv_table import CsvTable, read_csv
+from fenwear.common.errors import CaseError, InputError
 
 LENGTHS = {"cycles": "", "distance": "mm", "time": "s"}
 COLUMNS = {

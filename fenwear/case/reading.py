@@ -11,18 +11,18 @@ from typing import Any, get_args
 
 import pydantic
 
-from fenwear.case.csv_table import read_profile
+from fenwear.case.body_names import ROLES
+from fenwear.case.heat_table import Heat
 from fenwear.case.keys import all_keys, find_keys
-from fenwear.case.laws import Dependence
-from fenwear.case.motions import read_cycle
-from fenwear.case.names import ROLES
-from fenwear.case.plausible import written
+from fenwear.case.motion_table import read_cycle
 from fenwear.case.program import check_length, half_cycles_of, read_program
-from fenwear.case.removed import replacement
+from fenwear.case.removed_keys import replacement
 from fenwear.case.schema import MADE, Case, Given, Written, part_models
-from fenwear.case.thermal import Heat
-from fenwear.case.units import shown
-from fenwear.errors import CaseError, InputError, did_you_mean
+from fenwear.case.unlikely_values import written
+from fenwear.case.wear_table import Dependence
+from fenwear.common.csv_table import read_profile
+from fenwear.common.errors import CaseError, InputError, did_you_mean
+from fenwear.common.units import shown
 
 PLACEHOLDER = 2  # half-cycles, until the program is read
 UNSET = "unset"  # the key that takes keys of the base away
@@ -217,8 +217,8 @@ def make_case(
     Args:
         data: The tables.
         folder: Where paths in it start.
-        meshes: Of "punch" and "strip", as `fenwear.bodies.mesh.own_mesh` makes them, in place of `geometry.file`.
-        stresses: Of either, as `fenwear.bodies.material.OwnLaw`, in place of the isotropic stress of its material.
+        meshes: Of "punch" and "strip", as `fenwear.own_mesh` makes them, in place of `geometry.file`.
+        stresses: Of either, as `fenwear.OwnLaw`, in place of the isotropic stress of its material.
 
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.

@@ -14,16 +14,16 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import Body, CourseLoad, Geometry, Grid, Load, Model
-from fenwear.case.checks import AGAINST_STICK, case_problems
-from fenwear.case.contact import Contact
-from fenwear.case.course import Output, Program, Run, Setup
-from fenwear.case.laws import Dependence, Stick, Wear, depends_on
-from fenwear.case.materials import Material
-from fenwear.case.motions import PLACES, Cycle, Motions, OneWay, Oscillation, Rotation
-from fenwear.case.names import Names, renamed
-from fenwear.case.quantities import Part
-from fenwear.case.thermal import Heat, diffusion_of
+from fenwear.case.body_names import Names, renamed
+from fenwear.case.body_tables import Body, CourseLoad, Geometry, Grid, Load, Model
+from fenwear.case.contact_table import Contact
+from fenwear.case.exclusions import AGAINST_STICK, case_problems
+from fenwear.case.heat_table import Heat, diffusion_of
+from fenwear.case.material_tables import Material
+from fenwear.case.motion_table import PLACES, Cycle, Motions, OneWay, Oscillation, Rotation
+from fenwear.case.run_tables import Output, Program, Run, Setup
+from fenwear.case.table_parts import Part
+from fenwear.case.wear_table import Dependence, Stick, Wear, depends_on
 
 NEAR = 2.0  # ratio of diffusion lengths below which a variant keeps the mesh of its base
 OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
@@ -97,7 +97,7 @@ class Case(Part):
     @model_validator(mode="before")
     @classmethod
     def _groups_by_role(cls, data: Any) -> Any:
-        """Return the tables with groups of the geometry by the bodies' roles; see `names`."""
+        """Return the tables with groups of the geometry by the bodies' roles; see `body_names`."""
         if not isinstance(data, Mapping):
             return data
         names = Names.of(data)

@@ -18,8 +18,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from fenwear.case.reading import builtin_cases, make_case
-from fenwear.case.units import convert
-from fenwear.errors import CaseError, InputError, did_you_mean
+from fenwear.common.errors import CaseError, InputError, did_you_mean
+from fenwear.common.units import convert
 
 if TYPE_CHECKING:
     import jinja2

@@ -10,8 +10,8 @@ import typer
 from mpi4py import MPI
 
 from fenwear.case import builtin_cases
-from fenwear.cli.base import JsonOption, answer, app, print_json, suggested_keys
-from fenwear.parallel import on_root
+from fenwear.cli.application import JsonOption, answer, app, print_json, suggested_keys
+from fenwear.common.parallel import on_root
 
 
 @app.command("info")
@@ -29,10 +29,10 @@ def info_command(
     as_json: JsonOption = False,
 ) -> None:
     """Print the versions of the stack and the built-in cases; explain a key of cases; or list the content of a file."""
-    from fenwear.bodies import kept
-    from fenwear.bodies.ready import ready_geometries
+    from fenwear.bodies.ready_geometries import ready_geometries
     from fenwear.case.keys import find_keys
-    from fenwear.stack import versions
+    from fenwear.common import disk_cache
+    from fenwear.common.stack import versions
 
     geometries = ready_geometries()
     if key in geometries:
@@ -50,7 +50,7 @@ def info_command(
             texts += [f"  {name:22} {geometry.title}" for name, geometry in geometries.items()]
         answer({"keys": [asdict(k) for k in found]}, lambda: "\n".join(texts), as_json=as_json)
     else:
-        stack = {"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()}
+        stack = {"versions": versions(), "cases": builtin_cases(), "kept": disk_cache.summary()}
         answer(stack, lambda: _stack_text(**stack), as_json=as_json)
 
 

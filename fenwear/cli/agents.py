@@ -18,8 +18,8 @@ from typing import Annotated, Any
 
 import typer
 
-from fenwear.cli.base import app
-from fenwear.errors import StackError
+from fenwear.cli.application import app
+from fenwear.common.errors import StackError
 
 Tool = Callable[..., Awaitable[str]]
 LOOPBACK = "127.0.0.1"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 
 BROKEN = 1e-3  # above which the conditions do not hold; solvers leave 1e-8, the coupling with heat 1e-5
 

@@ -22,15 +22,15 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import block_diag
 
-from fenwear.arrays import Array, Mask, Nodes
-from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
+from fenwear.algebra.submatrices import Blocks, Dense, Operator, Solve, eliminate, joined
+from fenwear.common.arrays import Array, Mask, Nodes
+from fenwear.common.errors import FULL_START, INTERIOR, SOFTER_START, ConvergenceError, Remedies
+from fenwear.common.parallel import Team
+from fenwear.contact.grid_contact import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import TOLERANCE, Inequality
-from fenwear.contact.operators import Blocks, Dense, Operator, Solve, eliminate, joined
-from fenwear.errors import FULL_START, INTERIOR, SOFTER_START, ConvergenceError, Remedies
-from fenwear.interface import Interface
-from fenwear.interface.compliance import EVERY
-from fenwear.interface.convolution import GridCompliance
-from fenwear.parallel import Team
+from fenwear.surfaces import Interface
+from fenwear.surfaces.compliance import EVERY
+from fenwear.surfaces.grid_compliance import GridCompliance
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"

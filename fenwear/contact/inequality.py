@@ -11,7 +11,7 @@ residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim.
 again, SNES starts. An operator whose solutions cost by their digits goes through sets itself, to some of them.
 
 Where SNES does not converge an interior-point method does, which ends at a solution wherever there is one, for matrices
-as those of contact without friction (see `fenwear.contact.interior`).
+as those of contact without friction (see `fenwear.algebra.interior_point`).
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 from petsc4py import PETSc
 
-from fenwear.arrays import Array, Mask
-from fenwear.contact.interior import complementary
-from fenwear.contact.operators import Approximate, Dense, Indices, Operator, Phases, Solve
-from fenwear.errors import ConvergenceError
+from fenwear.algebra.interior_point import complementary
+from fenwear.algebra.submatrices import Approximate, Dense, Indices, Operator, Phases, Solve
+from fenwear.common.arrays import Array, Mask
+from fenwear.common.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1

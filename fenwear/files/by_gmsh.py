@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.errors import CaseError, InputError
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.stack import importing
 from fenwear.files.gmsh_child import arrays_of
-from fenwear.files.mesh import ENTITIES, KINDS, Block, MeshFile, MeshSet
-from fenwear.stack import importing
+from fenwear.files.mesh_file import ENTITIES, KINDS, Block, MeshFile, MeshSet
 
 
 def _library() -> Any:

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.errors import CaseError, InputError, did_you_mean
+from fenwear.common.errors import CaseError, InputError, did_you_mean
 from fenwear.files.by_gmsh import in_process
 from fenwear.files.groups import BODIES, MEASURES, PLANE, POWERS, normal
-from fenwear.files.mesh import ENTITIES, listed
+from fenwear.files.mesh_file import ENTITIES, listed
 
 FLAT = 1e-3  # of its length: how deep a flat shape may be, as OpenCASCADE's boxes are larger than shapes
 WORDS = (("vertex",), ("edge",), ("face",), ("solid", "body"))  # what others call points, curves, surfaces, volumes

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, listed, wrong
-from fenwear.files.table import TableError, decoded
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.table_files import TableError, decoded
+from fenwear.files.mesh_file import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, listed, wrong
 
 DEEPEST = 20  # includes within each other, and sets of sets
 # Keywords that say nothing of nodes, elements and sets; those of a step are passed over with it.

@@ -8,29 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.errors import CaseError, InputError
-from fenwear.files import by_gmsh, exchange
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.table_files import TableError, read_table
+from fenwear.files import by_gmsh, mesh_formats
 from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import entities, entities_text, read_shapes
 from fenwear.files.deck import read_deck
 from fenwear.files.groups import MEASURES
-from fenwear.files.heights import MAPS, read_heights
-from fenwear.files.mesh import ENTITIES, KINDS, MeshFile, sound
-from fenwear.files.table import TableError, read_table
+from fenwear.files.height_maps import MAPS, read_heights
+from fenwear.files.mesh_file import ENTITIES, KINDS, MeshFile, sound
 
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".inp": ("Abaqus, CalculiX", read_deck),
-    ".med": ("Salome", exchange.read_med),
+    ".med": ("Salome", mesh_formats.read_med),
     ".unv": ("I-deas universal", by_gmsh.read),
     ".cgns": ("CGNS", by_gmsh.read),
     ".bdf": ("Nastran", by_gmsh.read_bulk),
     ".nas": ("Nastran", by_gmsh.read_bulk),
-    ".exo": ("Exodus", exchange.read_exodus),
-    ".e": ("Exodus", exchange.read_exodus),
-    ".ex2": ("Exodus", exchange.read_exodus),
-    ".vtu": ("VTK", exchange.read_vtu),
-    ".xdmf": ("XDMF", exchange.read_xdmf),
+    ".exo": ("Exodus", mesh_formats.read_exodus),
+    ".e": ("Exodus", mesh_formats.read_exodus),
+    ".ex2": ("Exodus", mesh_formats.read_exodus),
+    ".vtu": ("VTK", mesh_formats.read_vtu),
+    ".xdmf": ("XDMF", mesh_formats.read_xdmf),
 }
 MESHES = tuple(READERS)
 

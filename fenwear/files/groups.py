@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.errors import CaseError, InputError
-from fenwear.files.mesh import (
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.files.mesh_file import (
     ENTITIES,
     KINDS,
     SHOWN,

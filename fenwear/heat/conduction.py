@@ -9,7 +9,7 @@ the heat of its temperature theta_in with it, and it leaves with its own:
     k d theta/dn = rho c (v . n) (theta - theta_in)   where v . n < 0,
 
 which makes the form coercive: its boundary part is (1/2) rho c |v . n| theta². Steps are implicit
-Euler's, of which `fenwear.heat.exchange` makes a rule of second order. Advection is stabilised by
+Euler's, of which `fenwear.heat.heat_exchange` makes a rule of second order. Advection is stabilised by
 streamline upwinding with the whole residual (SUPG), so that the order of the elements is kept.
 """
 
@@ -27,20 +27,28 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenwear import compat
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled, assembled_vector, compiled, destroy, interpolate, times, transposed_times
+from fenwear.algebra.assembled import (
+    assembled,
+    assembled_vector,
+    compiled,
+    destroy,
+    interpolate,
+    times,
+    transposed_times,
+)
+from fenwear.algebra.factor import Factor, factored
 from fenwear.bodies.contact_surface import contact_tag, trace_of
+from fenwear.bodies.elastic_material import measure
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import Factor, factored
-from fenwear.bodies.material import measure
 from fenwear.case import Body, Heat, Kind
-from fenwear.case.thermal import Track
-from fenwear.errors import CaseError, InputError
-from fenwear.heat.material import ConductionLaw
-from fenwear.interface.placement import ZERO
-from fenwear.parallel import total
-from fenwear.sliding.field import ALONG_X, SlidingField
+from fenwear.case.heat_table import Track
+from fenwear.common import compat
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import total
+from fenwear.heat.fourier_law import ConductionLaw
+from fenwear.surfaces.placement import ZERO
+from fenwear.surfaces.sliding_field import ALONG_X, SlidingField
 
 PREFIX = "fenwear_heat_"
 CONVECTING, CONTACT, HELD, INSULATED = 1, 2, 3, 4

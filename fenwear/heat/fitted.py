@@ -26,15 +26,15 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, hstack, vstack
 
-from fenwear.arrays import Array
-from fenwear.bodies import kept
-from fenwear.bodies.factor import Factor, available, entries, make_together
-from fenwear.errors import HeatError
+from fenwear.algebra.factor import Factor, available, entries, make_together
+from fenwear.common import disk_cache
+from fenwear.common.arrays import Array
+from fenwear.common.errors import HeatError
+from fenwear.common.parallel import once, total
 from fenwear.heat.conduction import PREFIX, HeatBody, HeatStep, Surroundings
-from fenwear.heat.field import CHUNK, ReducedBasis, ReducedField, modal_basis
 from fenwear.heat.reduction import PASSES, ROUNDING, reduced_basis
 from fenwear.heat.side import EARLIER
-from fenwear.parallel import once, total
+from fenwear.heat.temperature import CHUNK, ReducedBasis, ReducedField, modal_basis
 
 STEPS = 40  # of a cycle, the last ones, that both are led through at most
 FLAT = 1e-6  # of the thermal gap: what of it is less beside a rigid motion counts against that
@@ -231,7 +231,7 @@ def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> Reduced
             yield from (*step.a.getValuesCSR(), *step.b.getValuesCSR(), step.source, step.carried, step.entering)
         yield from (body.initial(), body.held, body.storage, body.convected)
 
-    place = kept.known(comm, parts, fresh=fresh)
+    place = disk_cache.known(comm, parts, fresh=fresh)
     if place.arrays:
         return ReducedBasis(body, place.arrays["lift"], place.arrays["columns"])
     basis = make()

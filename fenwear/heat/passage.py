@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fenwear.interface import ContactPair, Placement, transfer_at
-from fenwear.interface.placement import HERE
-from fenwear.sliding.field import SlidingField, Way
-from fenwear.sliding.motion import Motion
+from fenwear.surfaces import ContactPair, Placement, transfer_at
+from fenwear.surfaces.motion import Motion
+from fenwear.surfaces.placement import HERE
+from fenwear.surfaces.sliding_field import SlidingField, Way
 
 INSTANTS = 8  # places at most that stand for those of a step
 

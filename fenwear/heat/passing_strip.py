@@ -10,7 +10,7 @@ same step: with C the transfer of a step's places, W the nodes' areas and A = M 
     (A - h C^T W C) theta = B theta_before + f - h C^T W theta_a + C^T W q,
 
 which Woodbury's formula solves with A alone, the same for all places. On its modes A is diagonal, see
-`fenwear.heat.field`.
+`fenwear.heat.temperature`.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from fenwear.arrays import Array
 from fenwear.case import Heat
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.field import FullField, Functional, Propagation, ReducedBasis, ReducedField, modal_basis
 from fenwear.heat.fitted import TRIES, Trial, Way, certificate, contact_responses, pressures, rigid_gaps
 from fenwear.heat.passage import Passage
 from fenwear.heat.reduction import reduced_basis
 from fenwear.heat.side import STAGE, Fineness, HeatedCycle, StepPlan, chosen
-from fenwear.parallel import total
-from fenwear.sliding.motion import Motion
+from fenwear.heat.temperature import FullField, Functional, Propagation, ReducedBasis, ReducedField, modal_basis
+from fenwear.surfaces.motion import Motion
 
 
 class ReciprocatingField:

@@ -9,13 +9,14 @@ from functools import cache, partial
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
-from fenwear.arrays import Array
 from fenwear.case import Heat, Track
-from fenwear.errors import CaseError, InputError
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import once, total
+from fenwear.heat.closed_track import TrackField, section_modes
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.exchange import HeatExchange
-from fenwear.heat.field import FullField, Functional, ReducedField
 from fenwear.heat.fitted import BasisRequest, Trial, Way, fitted_field, kept_basis, made, pressures, rigid_gaps
+from fenwear.heat.heat_exchange import HeatExchange
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing_strip import MANY, PassingStrip, ReciprocatingField
 from fenwear.heat.side import (
@@ -30,11 +31,10 @@ from fenwear.heat.side import (
     chosen,
     step_plans,
 )
-from fenwear.heat.track import TrackField, section_modes
-from fenwear.interface import ContactPair
-from fenwear.parallel import once, total
-from fenwear.sliding.field import SlidingField
-from fenwear.sliding.motion import Motion
+from fenwear.heat.temperature import FullField, Functional, ReducedField
+from fenwear.surfaces import ContactPair
+from fenwear.surfaces.motion import Motion
+from fenwear.surfaces.sliding_field import SlidingField
 
 Moved = Callable[[Array], Array]  # displacement of the trace nodes (N, d, k), mm, by temperatures (owned, k)
 Opened = Callable[[Array], Array]  # gap at the contact nodes (n, k), mm, by temperatures (owned, k)

@@ -23,11 +23,11 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_array, diags_array
 
-from fenwear.arrays import Array
-from fenwear.errors import ConvergenceError
+from fenwear.common.arrays import Array
+from fenwear.common.errors import ConvergenceError
+from fenwear.common.parallel import total
 from fenwear.heat.conduction import ALONE, HeatBody, HeatStep, Surroundings
-from fenwear.heat.field import ReducedBasis
-from fenwear.parallel import total
+from fenwear.heat.temperature import ReducedBasis
 
 RATIO = 4.0  # of one time scale to the next
 RUNG = 3.0  # of one speed to the next, of a program of many

@@ -9,7 +9,7 @@ the end of the first half-cycle, from rest on.
 
 To and fro the strip is at rest in its own frame, and its modes are known, theta_k' = -lambda_k theta_k + b_k, so that
 the cycle that repeats needs no marching, whatever the step: with a constant b a step leaves R(lambda dt) of what is
-missing to b / lambda, R being that of the rule of `fenwear.heat.exchange`.
+missing to b / lambda, R being that of the rule of `fenwear.heat.heat_exchange`.
 """
 
 from __future__ import annotations
@@ -20,15 +20,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
 from fenwear.case import Heat
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 from fenwear.heat.conduction import HeatBody, Surroundings
-from fenwear.heat.field import Field, Functional
 from fenwear.heat.passage import Passage
-from fenwear.parallel import total
-from fenwear.sliding.motion import Motion
+from fenwear.heat.temperature import Field, Functional
+from fenwear.surfaces.motion import Motion
 
-STAGE = 1 - 1 / np.sqrt(2)  # gamma: of a time step, how long each of its two stages is, see `fenwear.heat.exchange`
+STAGE = 1 - 1 / np.sqrt(
+    2
+)  # gamma: of a time step, how long each of its two stages is, see `fenwear.heat.heat_exchange`
 EARLIER = (1 - STAGE) / STAGE  # r: how often the first one counts
 
 
@@ -214,7 +216,7 @@ class HeatedCycle:
         return np.asarray(self.reading @ np.divide(state, missing, out=np.zeros_like(state), where=lasts))
 
     def _factor(self, duration: float) -> Array:
-        """Return what a step leaves of each mode (dim,), by the rule of `fenwear.heat.exchange`."""
+        """Return what a step leaves of each mode (dim,), by the rule of `fenwear.heat.heat_exchange`."""
         each = self.rates * duration
         stage = 1 / (1 + STAGE * each)
         return np.asarray(stage * (1 + EARLIER * (stage - 1)))

@@ -1,7 +1,7 @@
 """A stage of both bodies on small bases at given conductances, through what the contact meets of them.
 
 Of the coordinates s of a body the contact meets its temperature without flux, theta_c = C (D s + b), alone, from which
-and from the friction heat the fluxes follow, see `fenwear.heat.fluxes`:
+and from the friction heat the fluxes follow, see `fenwear.heat.contact_fluxes`:
 
     s' = D s + b + R (q + h_b (theta_c - theta_a)),
 
@@ -13,8 +13,8 @@ The linear map of the reduced coordinates of both bodies over a step, or a stage
     s' = P s + b + Q (friction heat),    P = P_0 + R M^-1 r(theta_0),
 
 P_0 and theta_0 the coordinates and surface temperatures without flux, R the response to fluxes, which are M^-1 r, see
-`fenwear.heat.fluxes`. Where a factor of M serves other conductances with a few rows c changed, R M^-1 at these rows is
-all that its map is changed by: a correction of as low a rank.
+`fenwear.heat.contact_fluxes`. Where a factor of M serves other conductances with a few rows c changed, R M^-1 at these
+rows is all that its map is changed by: a correction of as low a rank.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from fenwear.arrays import Array
-from fenwear.heat.field import Field, Functional, Propagation
-from fenwear.heat.fluxes import Fluxes, FluxFactor, FluxUpdate, Sources
+from fenwear.common.arrays import Array
+from fenwear.heat.contact_fluxes import Fluxes, FluxFactor, FluxUpdate, Sources
+from fenwear.heat.temperature import Field, Functional, Propagation
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from fenwear.arrays import Array
-from fenwear.case.names import BY_ROLE, Names
-from fenwear.errors import CaseError, InputError
-from fenwear.report.course import directions_present, mark_few
+from fenwear.case.body_names import BY_ROLE, Names
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.report.drawn_surface import gaps_of, model_of, part_lines
 from fenwear.report.key_numbers import ALL_LINES, flat, line_of, number_text, read_case, read_summary
 from fenwear.report.lines import fields_of, tracks_of, worn_range
-from fenwear.report.stick import loop_of
+from fenwear.report.run_figures import directions_present, mark_few
+from fenwear.report.stick_figures import loop_of
 from fenwear.report.style import (
     direction_words,
     from_zero,
@@ -28,11 +29,10 @@ from fenwear.report.style import (
     save,
     strip_moves,
 )
-from fenwear.report.surface import gaps_of, model_of, part_lines
 from fenwear.results.disk import finite, writing
 from fenwear.results.quantity import in_kelvin
-from fenwear.results.reading import by_cycles, read_history, resolves
 from fenwear.results.sheet import shown
+from fenwear.results.stored_history import by_cycles, read_history, resolves
 
 FORMATS = (".png", ".pdf", ".svg")
 COURSES = {

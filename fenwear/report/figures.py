@@ -8,8 +8,8 @@ from pathlib import Path
 import xarray
 from matplotlib.figure import Figure
 
-from fenwear.report.bodies import field_figures
-from fenwear.report.course import course_figures
+from fenwear.report.body_figures import field_figures
+from fenwear.report.drawn_surface import cut_places, gaps_of, model_of, part_lines, sides_of
 from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.lines import (
     LATE,
@@ -25,12 +25,12 @@ from fenwear.report.lines import (
     with_late_pressures,
 )
 from fenwear.report.maps import has_tracks, map_figure, tracks_figure, with_surfaces
-from fenwear.report.stick import stick_figures, with_sums
+from fenwear.report.run_figures import course_figures
+from fenwear.report.stick_figures import stick_figures, with_sums
 from fenwear.report.style import STANDARD, Style, direction_words, name_bodies, save, strip_moves, wrapped
-from fenwear.report.surface import cut_places, gaps_of, model_of, part_lines, sides_of
 from fenwear.results.disk import write_text
-from fenwear.results.reading import by_cycles, read_history, resolves
 from fenwear.results.sheet import BODIES
+from fenwear.results.stored_history import by_cycles, read_history, resolves
 
 FOLDER = "figures"
 CAPTIONS = "captions.txt"

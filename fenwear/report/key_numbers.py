@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fenwear.case.names import Names
-from fenwear.errors import CaseError, InputError
+from fenwear.case.body_names import Names
+from fenwear.common.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
-from fenwear.results.reading import in_current_names
 from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, Line, shown
+from fenwear.results.stored_history import in_current_names
 
 UNITS = {
     "_per_s": "1/s",

@@ -14,8 +14,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.report.course import cycle_ends, directions_present, levels, temperature_unit
+from fenwear.common.arrays import Array
+from fenwear.report.drawn_surface import along_contact, cut_places, gaps_of, model_of, parted, surface_of
+from fenwear.report.run_figures import cycle_ends, directions_present, levels, temperature_unit
 from fenwear.report.style import (
     NARROW,
     STANDARD,
@@ -28,7 +29,6 @@ from fenwear.report.style import (
     panels,
     shades,
 )
-from fenwear.report.surface import along_contact, cut_places, gaps_of, model_of, parted, surface_of
 from fenwear.results.sheet import BODIES
 
 LAST = 0.1  # of what is done, that a mean pressure is of
@@ -71,7 +71,7 @@ class Field(NamedTuple):
         return f"{self.title} ({self.unit})" if self.unit != "1" else self.title
 
 
-# Of cycles with time steps: `fenwear.report.stick.with_sums` adds them up.
+# Of cycles with time steps: `fenwear.report.stick_figures.with_sums` adds them up.
 OF_CYCLES = (
     Field("cycle_slip", "punch", "slip in a cycle", "µm", 1e3, "YlGnBu"),
     Field("cycle_work", "punch", "work of friction in a cycle", "µJ/mm²", 1e3, "YlOrRd"),

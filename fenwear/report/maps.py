@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Mask
+from fenwear.common.arrays import Array, Mask
+from fenwear.report.drawn_surface import AXES, Surface, model_of, surface_of
 from fenwear.report.lines import Field, pressure_top
 from fenwear.report.style import (
     BLUE,
@@ -32,7 +33,6 @@ from fenwear.report.style import (
     panels_of_maps,
     row_of,
 )
-from fenwear.report.surface import AXES, Surface, model_of, surface_of
 from fenwear.results.roughness import evaluated, levelled
 from fenwear.results.sheet import BODIES
 

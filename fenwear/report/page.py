@@ -17,17 +17,17 @@ import jinja2
 import xarray
 from markupsafe import Markup
 
-from fenwear.case.names import BY_ROLE, Names
-from fenwear.errors import CaseError, OutputError
-from fenwear.report.bodies import DrawingError, draw_pictures
+from fenwear.case.body_names import BY_ROLE, Names
+from fenwear.common.errors import CaseError, OutputError
+from fenwear.report.body_figures import DrawingError, draw_pictures
 from fenwear.report.figures import FOLDER, TEXTS, caption, draw_figures
 from fenwear.report.key_numbers import Number, answers, flat, names_in, read_case, read_summary, states
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
-from fenwear.results.reading import read_history
 from fenwear.results.registry import known
 from fenwear.results.sheet import BODIES, UNCERTAINTY
+from fenwear.results.stored_history import read_history
 
 REPORT = "report.html"
 WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise", "cyclically")

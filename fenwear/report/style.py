@@ -19,10 +19,10 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from fenwear.arrays import Array
-from fenwear.case.names import Names
-from fenwear.case.units import convert
-from fenwear.errors import CaseError, InputError
+from fenwear.case.body_names import Names
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.units import convert
 
 FORMATS = ("png", "pdf", "svg")
 LEAST, MOST = 50.0, 500.0  # mm

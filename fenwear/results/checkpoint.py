@@ -22,18 +22,18 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, grows, regridded, renewed
 from fenwear.case import Case
-from fenwear.compat import geometry_dofmap
-from fenwear.cycle.state import RunState
-from fenwear.cycle.totals import none_yet
-from fenwear.errors import CaseError, InputError
+from fenwear.common.arrays import Array
+from fenwear.common.compat import geometry_dofmap
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import on_root
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.field import HeatState
-from fenwear.parallel import on_root
+from fenwear.heat.temperature import HeatState
+from fenwear.laws.wear import WornDepths
 from fenwear.results.disk import check_room, replacing
-from fenwear.sliding.wear import WornDepths
+from fenwear.steps.run_state import RunState
+from fenwear.steps.run_totals import none_yet
+from fenwear.system import Tribosystem, grows, regridded, renewed
 
 FILE = "checkpoint.npz"
 CASE, EXTREMES = "case", "extremes"  # names of its texts

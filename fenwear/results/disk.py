@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from fenwear.errors import OutputError
+from fenwear.common.errors import OutputError
 
 
 @contextmanager

@@ -28,19 +28,19 @@ import xarray
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.assembly import place_case
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, load_case, make_case
-from fenwear.case.csv_table import profile_text
-from fenwear.errors import CaseError, InputError
-from fenwear.initial_shape import InitialShape
-from fenwear.parallel import on_root
+from fenwear.common.arrays import Array
+from fenwear.common.csv_table import profile_text
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import on_root
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, make_directory, write_case
+from fenwear.results.history_surfaces import surface_cells
 from fenwear.results.quantity import RECORD
-from fenwear.results.reading import by_cycles, read_history, resolves
-from fenwear.results.surfaces import surface_cells
+from fenwear.results.stored_history import by_cycles, read_history, resolves
+from fenwear.steps.initial_shape import InitialShape
+from fenwear.system import place_case
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"

@@ -18,20 +18,20 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.algebra.assembled import interpolate, times
 from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
-from fenwear.bodies.assembly import interpolate, times
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.subcells import linear_cells
-from fenwear.compat import facet_nodes
+from fenwear.common.arrays import Array
+from fenwear.common.compat import facet_nodes
+from fenwear.common.parallel import on_root
 from fenwear.heat.conduction import HeatBody
-from fenwear.interface.placement import in_model, in_space
-from fenwear.parallel import on_root
+from fenwear.laws.wear import WornDepths
 from fenwear.results.disk import check_room, replacing, writing
 from fenwear.results.hdf5 import append, step_of, write
 from fenwear.results.quantity import degrees_of
-from fenwear.sliding.wear import WornDepths
+from fenwear.surfaces.placement import in_model, in_space
+from fenwear.system import Tribosystem
 
 if TYPE_CHECKING:
     import xarray

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 from scipy.spatial import KDTree
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.results.disk import check_room, replacing
 
 if TYPE_CHECKING:

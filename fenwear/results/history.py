@@ -14,21 +14,21 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, grows, kept_volume, node_maps, on_nodes
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.grid_surface import RegularGrid
 from fenwear.case import Case
 from fenwear.case.program import stages_of
-from fenwear.cycle import Block
-from fenwear.errors import CaseError, InputError
-from fenwear.results import roughness, steps
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.stack import versions
+from fenwear.results import roughness, time_steps
 from fenwear.results.disk import check_room, replacing, write_text, writing
 from fenwear.results.hdf5 import Netcdf
+from fenwear.results.history_surfaces import Column, conforming, on_mesh, part_columns, surface_columns
 from fenwear.results.quantity import KELVIN, Quantity, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
-from fenwear.results.surfaces import Column, conforming, on_mesh, part_columns, surface_columns
-from fenwear.stack import versions
+from fenwear.steps import Block
+from fenwear.system import Tribosystem, grows, kept_volume, node_maps, on_nodes
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 # What runs and sweeps leave in their folders.
@@ -76,7 +76,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         return {
             **surface_columns(system),
             **part_columns(system, plane=False),
-            **steps.columns(system),
+            **time_steps.columns(system),
             **roughness.columns(system),
         }
     arc = pair.punch.arc is not None
@@ -94,7 +94,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         columns |= _outline(pair.punch, "")
     if system.strip_changes and pair.strip.arc is not None:
         columns |= _outline(pair.strip, "_strip")
-    return {**columns, **part_columns(system, plane=True), **steps.columns(system), **roughness.columns(system)}
+    return {**columns, **part_columns(system, plane=True), **time_steps.columns(system), **roughness.columns(system)}
 
 
 def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
@@ -248,8 +248,8 @@ class HistoryWriter:
             OutputError: as `add`.
         """
         old, columns = self._variables, columns_of(after)
-        if steps.STEP in columns:
-            columns[steps.STEP] = self._columns[steps.STEP]
+        if time_steps.STEP in columns:
+            columns[time_steps.STEP] = self._columns[time_steps.STEP]
         self._system = after
         self._begin_anew(columns, lambda rows: _on_grid(rows, old, before, after))
 
@@ -264,18 +264,18 @@ class HistoryWriter:
 
     def _over_steps(self, rows: Rows) -> Rows:
         """Return rows whose half-cycles have as many time steps as the file has; it gets more where they have more."""
-        own = [rows[name].shape[1] for name, one in self._variables.items() if steps.STEP in one.dims]
-        if own and max(own) > len(self._columns[steps.STEP].values):
-            column = self._columns[steps.STEP]._replace(values=np.arange(1, max(own) + 1))
-            self._begin_anew({**self._columns, steps.STEP: column}, self._padded)
+        own = [rows[name].shape[1] for name, one in self._variables.items() if time_steps.STEP in one.dims]
+        if own and max(own) > len(self._columns[time_steps.STEP].values):
+            column = self._columns[time_steps.STEP]._replace(values=np.arange(1, max(own) + 1))
+            self._begin_anew({**self._columns, time_steps.STEP: column}, self._padded)
         return self._padded(rows)
 
     def _padded(self, rows: Rows) -> Rows:
-        if steps.STEP not in self._columns:
+        if time_steps.STEP not in self._columns:
             return rows
-        count = len(self._columns[steps.STEP].values)
+        count = len(self._columns[time_steps.STEP].values)
         return {
-            name: steps.padded(values, count, axis=1) if steps.STEP in self._variables[name].dims else values
+            name: time_steps.padded(values, count, axis=1) if time_steps.STEP in self._variables[name].dims else values
             for name, values in rows.items()
         }
 
@@ -306,9 +306,9 @@ class HistoryWriter:
                 stored = file["half_cycle"][:]
                 if "largest_temperature" in file:  # a run continues in the degrees that it began with
                     self._degrees = degrees_in(str(file["largest_temperature"].attrs["units"]))
-                if steps.STEP in self._columns:  # more than the case's where a step of its program had more
-                    column = self._columns[steps.STEP]._replace(values=file[steps.STEP][:])
-                    self._columns = {**self._columns, steps.STEP: column}
+                if time_steps.STEP in self._columns:  # more than the case's where a step of its program had more
+                    column = self._columns[time_steps.STEP]._replace(values=file[time_steps.STEP][:])
+                    self._columns = {**self._columns, time_steps.STEP: column}
                 missing = [name for name, one in self._variables.items() if file[name].ndim != len(one.dims)]
             if missing:
                 raise KeyError(missing[0])  # of an older version
@@ -405,7 +405,7 @@ def _attributes(system: Tribosystem) -> dict[str, Any]:
         "versions": json.dumps(versions()),
         **({"model": system.case.model.kind} if solid else {}),
         **({GRID: grid.numbers} if grid is not None and grows(system) else {}),
-        **steps.attributes(system),
+        **time_steps.attributes(system),
     }
 
 

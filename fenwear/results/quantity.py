@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.common.arrays import Array
 
 if TYPE_CHECKING:
     import xarray  # with pandas, half a second that commands without tables spare themselves

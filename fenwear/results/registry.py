@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.cycle import Block
-from fenwear.cycle.state import all_phases
-from fenwear.cycle.steady_cycle import SteadyCycle
-from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.interface import is_translation
-from fenwear.results import between, place, roughness, sheet, steps
+from fenwear.common.arrays import Array
+from fenwear.heat.heat_exchange import CROSSING, TERMS
+from fenwear.results import forces_and_place, layer_results, roughness, sheet, time_steps
 from fenwear.results.quantity import RECORD, Quantity
+from fenwear.steps import Block
+from fenwear.steps.run_state import all_phases
+from fenwear.steps.steady_cycle import SteadyCycle
+from fenwear.surfaces import is_translation
 
 if TYPE_CHECKING:
-    from fenwear.assembly import Tribosystem
+    from fenwear.system import Tribosystem
 
 ALONG = ("half_cycle", "x")
 TURNS = {"moved": "mm", "turned": "rad"}  # units of the rigid motions of bodies, by how their names begin
@@ -162,7 +162,7 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
         *(OF_HEAT if heat else ()),
         *(OF_TRACK if track else ()),
         *sheet.quantities(system),
-        *(one for room in (between, place, roughness, steps) for one in room.quantities(system)),
+        *(one for room in (layer_results, forces_and_place, roughness, time_steps) for one in room.quantities(system)),
         IN_CYCLE,
     ]
     if case.model.kind != "plane":
@@ -178,9 +178,15 @@ def _prototypes() -> dict[str, Quantity]:
     for body in sheet.BODIES:
         listed += [*sheet.of_a_body(body), *sheet.of_a_plane_body(body)]
         listed += sheet.of_the_scar(body, sheet.PLACES, ("length", "width"))
-        listed += [*between.of_creeping(body), *between.of_coated(body), *roughness.of_body(body)]
-    listed += [*place.of_bore("", dict), *steps.IN_STEPS, *steps.of_solids(), *between.OF_DEBRIS, *between.OF_FLOW]
-    listed += [IN_CYCLE, *steps.OF_CYCLE]
+        listed += [*layer_results.of_creeping(body), *layer_results.of_coated(body), *roughness.of_body(body)]
+    listed += [
+        *forces_and_place.of_bore("", dict),
+        *time_steps.IN_STEPS,
+        *time_steps.of_solids(),
+        *layer_results.OF_DEBRIS,
+        *layer_results.OF_FLOW,
+    ]
+    listed += [IN_CYCLE, *time_steps.OF_CYCLE]
     return {one.name: one for one in listed}
 
 

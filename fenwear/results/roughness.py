@@ -12,12 +12,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.cycle import Block
+from fenwear.common.arrays import Array
+from fenwear.results.history_surfaces import Column
 from fenwear.results.quantity import RECORD, InTable, Quantity
-from fenwear.results.surfaces import Column
+from fenwear.steps import Block
+from fenwear.system import Tribosystem
 
 FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
 ON_HULL = 1e-9  # spacings: rounding

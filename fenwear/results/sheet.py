@@ -1,6 +1,6 @@
 """Numbers of a tribometer's sheet, of every half-cycle and of a whole run: volumes, rates, scars, forces, work.
 
-Depths belong to the shape, all else to what has been added up, see `fenwear.cycle.totals`:
+Depths belong to the shape, all else to what has been added up, see `fenwear.steps.run_totals`:
 
     normal force         F, the load: what the contact carries along the approach of the bodies, mean of the half-cycle;
     pressure integral    of p over the contact, mean of the half-cycle: more than F where the contact is curved;
@@ -21,13 +21,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.case.names import Names
-from fenwear.cycle import Block
+from fenwear.case.body_names import Names
+from fenwear.common.arrays import Array
+from fenwear.results.history_surfaces import ScarGeometry, scar_geometry, without_noise
 from fenwear.results.quantity import RECORD, InTable, Quantity, numbers
-from fenwear.results.surfaces import ScarGeometry, scar_geometry, without_noise
+from fenwear.steps import Block
+from fenwear.system import ContactSetup
 
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end

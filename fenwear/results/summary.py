@@ -20,21 +20,21 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Mask
-from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.bodies.supports import axes
-from fenwear.case.names import Names
-from fenwear.cycle import Block
-from fenwear.cycle.steady_cycle import SteadyCycle
-from fenwear.cycle.totals import SUMS, approach
-from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.results import between, place, sheet, steps
-from fenwear.results.place import node_forces
+from fenwear.case.body_names import Names
+from fenwear.common.arrays import Array, Mask
+from fenwear.common.stack import versions
+from fenwear.heat.heat_exchange import CROSSING, TERMS
+from fenwear.laws.wear import WornDepths
+from fenwear.results import forces_and_place, layer_results, sheet, time_steps
+from fenwear.results.forces_and_place import node_forces
+from fenwear.results.history_surfaces import ContactNet, at_places, conforming, contact_net, without_noise
 from fenwear.results.quantity import degrees_of, numbers
 from fenwear.results.registry import quantities_of
-from fenwear.results.surfaces import ContactNet, at_places, conforming, contact_net, without_noise
-from fenwear.sliding.wear import WornDepths
-from fenwear.stack import versions
+from fenwear.steps import Block
+from fenwear.steps.run_totals import SUMS, approach
+from fenwear.steps.steady_cycle import SteadyCycle
+from fenwear.system import ContactSetup, Tribosystem
 
 LINE, POINT = 4.0, 4.7  # p_0 / k
 
@@ -229,11 +229,11 @@ def sheet_of(last: Block) -> dict[str, Any]:
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
     sliding |= numbers(last, "sliding", known)
     bodies = {body: own for body in sheet.BODIES if (own := sheet.body_numbers(last, body, known))}
-    cycle = steps.table_cycle(last)
+    cycle = time_steps.table_cycle(last)
     if cycle is not None:
-        sliding |= steps.sliding_numbers(last, cycle)
-        bodies = {body: own | steps.body_numbers(last, cycle, body) for body, own in bodies.items()}
-    states = {between.STATES: found} if (found := between.states(last)) else {}
+        sliding |= time_steps.sliding_numbers(last, cycle)
+        bodies = {body: own | time_steps.body_numbers(last, cycle, body) for body, own in bodies.items()}
+    states = {layer_results.STATES: found} if (found := layer_results.states(last)) else {}
     return {"sliding": sliding, **bodies, **states, **numbers(last, "end", known)}
 
 
@@ -260,7 +260,7 @@ def nominal_pressure(placed: ContactSetup, load: float) -> dict[str, float]:
 
     So of surfaces that lie on each other before they wear, and of a shaft in a bore: F / (D L).
     """
-    if not (conforming(placed.pair) or place.bores_of(placed)):
+    if not (conforming(placed.pair) or forces_and_place.bores_of(placed)):
         return {}
     seen = np.maximum(np.einsum("id,id->i", placed.pair.normal, approach(placed.rigid)), 0.0)
     area = placed.bodies.punch.thickness * float(placed.pair.weights @ seen)

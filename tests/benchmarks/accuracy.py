@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear import Block, assemble, evolve, load_case
-from fenwear.accuracy import uncertainty, values_of
 from fenwear.case import Case
+from fenwear.checks import uncertainty, values_of
 
 EXACT = 1e-9  # of a number: an error that is rounding
 ELEMENTS = "geometry.parameters.elements_along_contact"
@@ -110,7 +110,7 @@ TRIALS = {
 }  # fmt: skip
 
 GROOVE = ("geometry.parameters.across=6", "geometry.parameters.clearance=0.1")
-# No choice in `fenwear.accuracy` was made on these: other kinds, shapes, loads, friction and degrees.
+# No choice in `fenwear.checks` was made on these: other kinds, shapes, loads, friction and degrees.
 OTHERS = {
     "low punch, mu 0.4, 150": along(
         "example1", 12, 36, "run.half_cycles=150", "geometry.degree=2", "contact.friction=0.4",

@@ -24,8 +24,8 @@ from mpi4py import MPI
 from scipy import stats
 
 from fenwear import load_case
-from fenwear.arrays import Array
-from fenwear.life import DataSet, LeastSquares, Noise, Series, Unknown, calibrate
+from fenwear.common.arrays import Array
+from fenwear.studies import DataSet, LeastSquares, Noise, Series, Unknown, calibrate
 
 SMALL = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"]
 KEYS = ("wear.punch.coefficient", "wear.punch.pressure_exponent", "contact.friction")

@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 from fenwear import assemble, jump, load_case
-from fenwear.arrays import Array
-from fenwear.cycle import Block
+from fenwear.common.arrays import Array
+from fenwear.steps import Block
 
 CYCLES = (1_000, 5_000, 10_000, 18_000)
 LOAD, RADIUS, YOUNG, POISSON = 18.5, 6.0, 200e3, 0.3  # N/mm, mm, MPa, 1

@@ -21,12 +21,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bodies"))
 
 from test_fine import on_layer
 
-from fenwear.arrays import Array
-from fenwear.sliding.local_laws import BodyRate, LocalWear
-from fenwear.stick import Imposed, StickState, advance, untouched
-from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.final import final_shape
-from fenwear.stick.interface import OppositeBodies
+from fenwear.common.arrays import Array
+from fenwear.laws.local_laws import BodyRate, LocalWear
+from fenwear.steps.stick_cycle import PartialSlipProblem
+from fenwear.steps.stick_final import final_shape
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_state import Imposed, StickState
 from fenwear_verify.half_space_stick import Elastic, on_grid
 from fenwear_verify.stick_solids import RIGID, to_and_fro
 

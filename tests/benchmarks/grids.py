@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from fenwear import assemble, load_case
-from fenwear.cycle import steady
+from fenwear.steps import steady
 
 BALL = (
     "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",

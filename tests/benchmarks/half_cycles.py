@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from fenwear import Tribosystem, assemble, load_case, march
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 
 HALF_CYCLES, RUNS = 2600, 5
 CASES = {

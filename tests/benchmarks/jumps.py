@@ -21,10 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from combinations import FEATURES, LAWS, STICK, closed
 
 from fenwear import FenwearError, State, assemble, load_case, register_law
-from fenwear.arrays import Array
-from fenwear.cycle import evolve
-from fenwear.cycle.jump_step import Stepper
-from fenwear.stick.cycle import PartialSlipProblem
+from fenwear.common.arrays import Array
+from fenwear.steps import evolve
+from fenwear.steps.jump_step import Stepper
+from fenwear.steps.stick_cycle import PartialSlipProblem
 
 TOLERANCES = (1e-2, 3e-3, 1e-3)
 FINEST = 1e-4

@@ -31,11 +31,11 @@ import numpy as np
 import scipy.fft
 from mpi4py import MPI
 
-from fenwear.arrays import Array
+from fenwear.algebra.submatrices import Dense, Indices, Solve, Updating
+from fenwear.common.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Dense, Indices, Solve, Updating
-from fenwear.interface import Interface, RigidEquilibrium
+from fenwear.surfaces import Interface, RigidEquilibrium
 
 COMM = MPI.COMM_WORLD
 WEAR, LOAD, RADIUS = 5e-4, 6.6e-4, 8.0  # gap worn by unit pressure in a step; mean pressure over all; of the sphere
@@ -82,7 +82,7 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Rigid:
-    """A punch that can only come down, as `fenwear.interface.RigidEquilibrium` has it."""
+    """A punch that can only come down, as `fenwear.surfaces.RigidEquilibrium` has it."""
 
     weights: Array
     mean_pressure: float = LOAD
@@ -130,7 +130,7 @@ def grid(side: int) -> Interface:
 
 @dataclass(frozen=True)
 class Wearing:
-    """What a step wears, as `fenwear.sliding.wear.StepWear` has it."""
+    """What a step wears, as `fenwear.laws.wear.StepWear` has it."""
 
     def opening(self, pressure: Array) -> Array:
         """Return the depth."""

@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from fenwear import assemble, jump, load_case
-from fenwear.stick.setup import partial_slip_problem
+from fenwear.steps.stick_setup import partial_slip_problem
 
 
 def main() -> None:

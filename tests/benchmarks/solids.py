@@ -22,10 +22,10 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear import Tribosystem
-from fenwear.assembly import elastic, place_case, with_exchange
 from fenwear.case import Case, make_case
 from fenwear.contact import SlidingContact
-from fenwear.cycle import jump, march, steady
+from fenwear.steps import jump, march, steady
+from fenwear.system import elastic, place_case, with_exchange
 from fenwear_verify.full_space import FullContact
 
 PARTS = ("warm", "jumps", "steady", "full", "heat")

@@ -15,7 +15,7 @@ import numpy as np
 
 from fenwear import Tribosystem, assemble, load_case, march, steady
 from fenwear.contact import SlidingContact
-from fenwear.cycle import jump
+from fenwear.steps import jump
 from fenwear_verify.full_space import FullContact
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.results.fields import Fields, body_fields
 from fenwear_verify.bodies import two_blocks
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.arrays import Array
 from fenwear.bodies import supports
 from fenwear.bodies.condensation import CondensedBody, condense
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.common.arrays import Array
 
 SMALL = ("geometry.parameters.elements_along_contact=8",)
 

@@ -8,12 +8,12 @@ import pytest
 from mpi4py import MPI
 
 from fenwear.bodies.contact_surface import ContactSurface, corner_functions, vertex_surface
+from fenwear.bodies.distributed_mesh import build_meshes
+from fenwear.bodies.elastic_material import isotropic
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import isotropic
-from fenwear.bodies.mesh import build_meshes
 from fenwear.case import Body, Geometry, Material
-from fenwear.interface.overlap import ChartedSurface, Patch, tabulate
-from fenwear.interface.transfer import dual_transfer
+from fenwear.surfaces.overlap import ChartedSurface, Patch, tabulate
+from fenwear.surfaces.transfer import dual_transfer
 
 
 def elastic(parameters: dict[str, float], degree: int, file: str = "solid_blocks.geo", order: int = 1) -> ElasticBody:
@@ -103,7 +103,7 @@ def test_forces_on_the_trace(degree: int) -> None:
 def test_no_pressure_on_the_axis() -> None:
     """At r = 0 the weight of a node is zero for degree 2 and more: it carries none; 2 pi r integrates to the area."""
     from fenwear import load_case
-    from fenwear.assembly import place_case
+    from fenwear.system import place_case
 
     for degree in (1, 2, 3):
         sizes = ("inner_radius=0", "margin_inside=0", "strip_across=9")

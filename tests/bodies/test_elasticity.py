@@ -16,10 +16,10 @@ from dolfinx.mesh import CellType, Mesh, create_rectangle, locate_entities_bound
 from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, load_case
-from fenwear.assembly import elastic_body
-from fenwear.bodies.material import Isotropic, lame, region_field, strain
-from fenwear.bodies.mesh import BodyMesh, build_meshes
-from fenwear.compat import interpolation_points
+from fenwear.bodies.distributed_mesh import BodyMesh, build_meshes
+from fenwear.bodies.elastic_material import Isotropic, lame, region_field, strain
+from fenwear.common.compat import interpolation_points
+from fenwear.system import elastic_body
 
 Plane = Literal["stress", "strain"]
 COMM = MPI.COMM_WORLD

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fenwear import Tribosystem, assemble, load_case, march, vary
-from fenwear.arrays import Array
-from fenwear.parallel import total
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 from fenwear.results.fields import body_fields
 from fenwear_verify.full_space import nothing_condensed
 

@@ -10,10 +10,11 @@ import pytest
 from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.bodies import condensation, factor, response, substructure
-from fenwear.bodies.assembly import times
+from fenwear.algebra import factor
+from fenwear.algebra.assembled import times
+from fenwear.bodies import condensation, response, substructure
 from fenwear.bodies.condensation import CondensedBody
-from fenwear.errors import ConvergenceError
+from fenwear.common.errors import ConvergenceError
 
 SMALL = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
 BALL = ("geometry.order=1", "geometry.parameters.across=4", "geometry.parameters.core=0")

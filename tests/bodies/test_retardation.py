@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenwear.bodies.creep import Retardation
-from fenwear.case.materials import Creep, Retarded
+from fenwear.bodies.creep_law import Retardation
+from fenwear.case.material_tables import Creep, Retarded
 
 LAW = Retardation(np.array([0.5, 2.0]), np.array([0.3, 40.0]))
 DURATIONS = np.array([0.2, 0.1, 0.4])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
-from fenwear.results.place import quantities
+from fenwear.results.forces_and_place import quantities
 from fenwear.results.quantity import computed
 
 TURNING = """

@@ -10,11 +10,11 @@ import xarray
 from waves import FULL, HEIGHT, LENGTH, wavy
 
 from fenwear import CaseError
-from fenwear.assembly import assemble
-from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.grid_surface import RegularGrid
 from fenwear.bodies.topography import heights_on
 from fenwear.case import Topography
-from fenwear.cycle import evolve
+from fenwear.steps import evolve
+from fenwear.system import assemble
 
 GRID = RegularGrid((-0.5, -0.25), (0.01, 0.01), (101, 51), 2, 0.0)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fenwear import load_case
-from fenwear.assembly import set_up_by
 from fenwear.case.program import stages_of
+from fenwear.system import set_up_by
 
 DIFFUSIVITY = 50e3 / 3.6e6 * 1e3  # of the brake pad's disc, mm²/s
 

@@ -13,9 +13,9 @@ import pytest
 
 from fenwear.case import builtin_cases, load_case
 from fenwear.case.keys import all_keys, find_keys, json_schema
-from fenwear.case.laws import Dependence
-from fenwear.case.units import convert
-from fenwear.errors import CaseError
+from fenwear.case.wear_table import Dependence
+from fenwear.common.errors import CaseError
+from fenwear.common.units import convert
 
 ROOT = Path(__file__).parents[2]
 

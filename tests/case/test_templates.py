@@ -13,7 +13,7 @@ from scipy.special import ellipe, ellipk
 
 from fenwear import assemble, jump, load_case, make_case, march, steady
 from fenwear.case.templates import fill_in, find_template, template_names, values, write_case_of
-from fenwear.errors import CaseError
+from fenwear.common.errors import CaseError
 
 USUAL = [
     *("ball-on-disc", "ball-on-flat", "block-on-ring", "brake-pad"),

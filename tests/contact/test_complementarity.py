@@ -10,13 +10,13 @@ import pytest
 from half_space_ball import ball
 
 from fenwear import Tribosystem, assemble, evolve, march, steady
+from fenwear.checks import Seen, StateMonitor
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.contact.condensed import CondensedContact
-from fenwear.cycle.jump_method import FINE
-from fenwear.cycle.jump_step import LOOSEST
-from fenwear.interface import compliance
-from fenwear.plausibility import Seen, StateMonitor
+from fenwear.steps.jump_method import FINE
+from fenwear.steps.jump_step import LOOSEST
+from fenwear.surfaces import compliance
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
 

@@ -12,11 +12,11 @@ from petsc4py import PETSc
 from scipy.optimize import brentq
 
 from fenwear import ConvergenceError, Tribosystem, assemble, march
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
+from fenwear.common.errors import INTERIOR
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
-from fenwear.errors import INTERIOR
-from fenwear.interface import Interface
-from fenwear.sliding.wear import WornDepths
+from fenwear.laws.wear import WornDepths
+from fenwear.surfaces import Interface
 from fenwear_verify.full_space import FullContact
 
 P = 1000.0  # load per thickness, N/mm

@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from fenwear import assemble, load_case
 from fenwear.contact import ContactState
-from fenwear.cycle import Block, evolve
-from fenwear.cycle.jump_method import Moment, Trend
+from fenwear.steps import Block, evolve
+from fenwear.steps.jump_method import Moment, Trend
 from fenwear_verify.full_space import FullContact, nothing_condensed
 
 CLOSE = 1e-8

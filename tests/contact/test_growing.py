@@ -11,11 +11,11 @@ import pytest
 from half_space_ball import ball
 
 from fenwear import Case, assemble, evolve, load_case, run_case, steady
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, node_maps, outgrown, regridded
-from fenwear.bodies.grid import RegularGrid
-from fenwear.cycle.block import Block
-from fenwear.cycle.state import carried_by, on_other_grid
+from fenwear.bodies.grid_surface import RegularGrid
+from fenwear.common.arrays import Array
+from fenwear.steps.block import Block
+from fenwear.steps.run_state import carried_by, on_other_grid
+from fenwear.system import Tribosystem, node_maps, outgrown, regridded
 
 
 def growing(grid: dict[str, Any], **more: Any) -> Case:

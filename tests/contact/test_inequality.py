@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fenwear import ConvergenceError, Tribosystem, jump, march, steady
-from fenwear.arrays import Array
+from fenwear.algebra.submatrices import Blocks, Dense, Updating, joined, whole
+from fenwear.common.arrays import Array
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Blocks, Dense, Updating, joined, whole
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -219,7 +219,7 @@ def test_phases(m: int, bordered: bool, coupled: bool) -> None:
 def many(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take few nodes as if they were many."""
     for name in ("DENSE", "DIRECT", "LARGE"):
-        monkeypatch.setattr(f"fenwear.contact.operators.{name}", 0)
+        monkeypatch.setattr(f"fenwear.algebra.submatrices.{name}", 0)
 
 
 @pytest.mark.usefixtures("many")
@@ -227,7 +227,7 @@ def many(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("m", [1, 2, 5])
 def test_wear_that_opens_all_phases(m: int, restarts: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps that wear next to nothing to a hundred times the elastic gap: by GMRES, and where that may not iterate."""
-    monkeypatch.setattr("fenwear.contact.krylov.RESTARTS", restarts)
+    monkeypatch.setattr("fenwear.algebra.krylov.RESTARTS", restarts)
     random, n = np.random.default_rng(m), 40
     matrices = np.zeros((m, n + 2, n + 2))
     modes = np.stack([np.ones(n), np.linspace(-1, 1, n)], axis=1)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fenwear import CaseError
-from fenwear.bodies.mesh import write_msh
+from fenwear.bodies.distributed_mesh import write_msh
 from fenwear.case import Geometry
 from fenwear.files.by_gmsh import gmsh_model
 from fenwear.files.cad import read_shapes

@@ -33,11 +33,11 @@ from bases import base
 from pool import Verdict, verdicts
 
 from fenwear import Case, assemble, load_case, make_case
-from fenwear.accuracy import uncertainty
-from fenwear.bodies.mesh import write_msh
+from fenwear.bodies.distributed_mesh import write_msh
 from fenwear.case import plausibility_warnings
-from fenwear.cycle import evolve, steady
-from fenwear.errors import FenwearError, MeshQualityError
+from fenwear.checks import uncertainty
+from fenwear.common.errors import FenwearError, MeshQualityError
+from fenwear.steps import evolve, steady
 
 SECONDS = 60.0  # of processor time
 NAMES = tuple(bases.BASES)

@@ -15,7 +15,7 @@ import numpy as np
 import pint
 import xarray
 
-from fenwear.bodies.ready import constants, meshes_folder
+from fenwear.bodies.ready_geometries import constants, meshes_folder
 
 Tables = dict[str, Any]
 COUNTS = re.compile(r"elements|grading|growth|angle|pins|across|around|along|layers|quarter|tetrahedra|^outer$|spread")

@@ -41,10 +41,10 @@ from pool import verdicts
 
 from fenwear import load_case, make_case, run_case
 from fenwear.case.templates import fill_in, find_template
-from fenwear.cycle.jump_method import FINE
-from fenwear.cycle.jump_step import LOOSEST
-from fenwear.errors import FenwearError
-from fenwear.results.reading import load_history
+from fenwear.common.errors import FenwearError
+from fenwear.results.stored_history import load_history
+from fenwear.steps.jump_method import FINE
+from fenwear.steps.jump_step import LOOSEST
 
 SECONDS = 600.0  # of processor time
 EXACT = 1e-9

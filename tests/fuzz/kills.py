@@ -26,9 +26,9 @@ import numpy as np
 import xarray
 
 from fenwear import Case, make_case, run_case
-from fenwear.errors import FenwearError
+from fenwear.common.errors import FenwearError
 from fenwear.results.checkpoint import FILE
-from fenwear.results.reading import load_history
+from fenwear.results.stored_history import load_history
 
 KINDS = {  # and half-cycles: seconds of which most are not the set-up
     "example1": 2000, "example1-heat": 1500, "fretting": 1200, "implicit laws": 200, "stick": 3000,

@@ -18,7 +18,7 @@ import cases
 
 from fenwear import CaseError, assemble, make_case
 from fenwear.case.dependence import VARIABLES, evaluate, parse_expression
-from fenwear.errors import FenwearError, InputError
+from fenwear.common.errors import FenwearError, InputError
 
 
 @pytest.mark.process
@@ -34,7 +34,7 @@ def test_sample(task: Any, count: int) -> None:
 def test_the_fuzzer_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is no use if it cannot fail: units that are converted wrongly."""
     units = [seed for seed in range(200) if (unit := cases.mutated(seed)[1]) is not None and unit[1] is not None]
-    monkeypatch.setattr("fenwear.case.quantities.convert", lambda value, unit: 1.0)
+    monkeypatch.setattr("fenwear.case.table_parts.convert", lambda value, unit: 1.0)
     assert any(cases.try_case(seed)[0] == "wrong" for seed in units)
 
 

@@ -13,11 +13,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import invariants
 
-from fenwear.assembly import Tribosystem
-from fenwear.cycle.state import RunState
-from fenwear.cycle.totals import PhaseMeter
+from fenwear.laws.wear import WornDepths
 from fenwear.results import checkpoint
-from fenwear.sliding.wear import WornDepths
+from fenwear.steps.run_state import RunState
+from fenwear.steps.run_totals import PhaseMeter
+from fenwear.system import Tribosystem
 
 # One seed of each kind, and each thing that is asked at least once; a night tries thousands of others.
 SEEDS = {

@@ -11,12 +11,12 @@ from dolfinx.mesh import CellType, create_rectangle, locate_entities, locate_ent
 from mpi4py import MPI
 
 from fenwear import Case, Tribosystem, assemble, make_case
+from fenwear.bodies.distributed_mesh import BodyMesh
+from fenwear.bodies.elastic_material import isotropic
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import isotropic
-from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Heat, Material
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.material import isotropic_conduction
+from fenwear.heat.fourier_law import isotropic_conduction
 
 SIDES, BOTTOM, CONTACT = 1, 2, 3
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, march, steady
-from fenwear.assembly import steady_exchange
+from fenwear.system import steady_exchange
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 ISOLATED = ("heat.convection=0", "strip.temperatures=[]")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from fenwear import Case, Tribosystem, assemble, jump, march
-from fenwear.cycle import follow_program
-from fenwear.cycle.steady import steady
-from fenwear.errors import CaseError
+from fenwear.common.errors import CaseError
 from fenwear.results import checkpoint
+from fenwear.steps import follow_program
+from fenwear.steps.steady import steady
 
 Edited = Callable[..., Case]
 SMALL = (

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.assembly import expansions, with_exchange, with_reduced_heat
-from fenwear.heat.exchange import TERMS, HeatExchange
+from fenwear.checks import Seen, fineness_text
 from fenwear.heat.fitted import rigid_gaps
+from fenwear.heat.heat_exchange import TERMS, HeatExchange
 from fenwear.heat.prepare import opened_gap
-from fenwear.plausibility import Seen, fineness_text
-from fenwear.stick.heat import free_expansion
+from fenwear.steps.stick_heat import free_expansion
+from fenwear.system import expansions, with_exchange, with_reduced_heat
 
 COARSE = ("geometry.degree=2", "geometry.parameters.strip_length=160", "geometry.parameters.strip_height=16")
 

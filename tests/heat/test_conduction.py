@@ -12,7 +12,7 @@ import pytest
 import ufl
 from dolfinx import fem
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.heat.conduction import HeatBody
 
 Make = Callable[..., Any]

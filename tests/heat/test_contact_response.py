@@ -9,9 +9,9 @@ import pytest
 
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import condensation
+from fenwear.common.parallel import total
 from fenwear.heat.fitted import _by_columns, contact_responses
 from fenwear.heat.prepare import contact_rows, inflows
-from fenwear.parallel import total
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "heat.convecting_faces=true")
 

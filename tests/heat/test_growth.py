@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import newton
 
 from fenwear import Tribosystem
-from fenwear.cycle import growth_rate
+from fenwear.steps import growth_rate
 
 Make = Callable[..., Any]
 WIDTH, HEIGHT, FRICTION = 4.0, 12.0, 1e-3

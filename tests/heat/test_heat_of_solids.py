@@ -10,17 +10,17 @@ import pytest
 from dolfinx.mesh import CellType, create_box, create_rectangle
 from mpi4py import MPI
 
-from fenwear.arrays import Array
+from fenwear.bodies.distributed_mesh import own_mesh
+from fenwear.bodies.elastic_material import Isotropic, Kind, lame
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import Isotropic, Kind, lame
-from fenwear.bodies.mesh import own_mesh
 from fenwear.case import Body, Heat, Support, Track
+from fenwear.common.arrays import Array
+from fenwear.heat.closed_track import CELLS, TrackField, section_modes
 from fenwear.heat.conduction import HeatBody, Surroundings
-from fenwear.heat.field import ReducedField
-from fenwear.heat.material import ConductionLaw
+from fenwear.heat.fourier_law import ConductionLaw
 from fenwear.heat.reduction import reduced_basis
-from fenwear.heat.track import CELLS, TrackField, section_modes
-from fenwear.sliding.field import SlidingField
+from fenwear.heat.temperature import ReducedField
+from fenwear.surfaces.sliding_field import SlidingField
 
 K, RHO_C = 3.0, 2.0
 TURNING = SlidingField(turn=(0.0, 0.0, 1.0))

@@ -10,12 +10,12 @@ import pytest
 from scipy.linalg import eigvals
 
 from fenwear import Tribosystem, assemble, make_case, march, steady, vary
-from fenwear.assembly import steady_exchange
 from fenwear.case.program import stages_of
-from fenwear.cycle import growth_rate
-from fenwear.cycle.program import at_stage
-from fenwear.errors import HeatError
-from fenwear.heat.field import ReducedField
+from fenwear.common.errors import HeatError
+from fenwear.heat.temperature import ReducedField
+from fenwear.steps import growth_rate
+from fenwear.steps.program_stages import at_stage
+from fenwear.system import steady_exchange
 
 Make = Callable[..., Any]
 STEEL = {"young": 2e5, "poisson": 0.3, "conductivity": 55, "heat_capacity": 4.6e8, "density": 7.8e-9, "expansion": 1e-5}
@@ -172,7 +172,7 @@ def test_material_enters_at_the_given_temperature() -> None:
 
 def test_heat_out_of_bounds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps that grow end the run by an error that says heat; not where friction is all that warms."""
-    monkeypatch.setattr("fenwear.cycle.gross_sliding.PARTS", ())
+    monkeypatch.setattr("fenwear.steps.gross_sliding.PARTS", ())
     system = pad_on_strip(500.0)
     field = system.exchange.sides[1].field
     list(march(system, 10, implicit=True))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from fenwear.heat.field import ReducedBasis, ReducedField, modal_basis
+from fenwear.heat.temperature import ReducedBasis, ReducedField, modal_basis
 
 DURATION = 0.05
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.special import erf
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
-from fenwear.arrays import Array
-from fenwear.assembly import steady_exchange
 from fenwear.case import Case
-from fenwear.heat.exchange import CROSSING, TERMS
-from fenwear.heat.periodic import CycleHeat
+from fenwear.common.arrays import Array
+from fenwear.heat.heat_exchange import CROSSING, TERMS
+from fenwear.heat.periodic_heat import CycleHeat
+from fenwear.system import steady_exchange
 
 TO_STRIP = {"partition": 0.0, "debris": 0.0, "conductance": 0.0, "conducting": "nominal", "convection": 0.0}
 POSITIONS = 3

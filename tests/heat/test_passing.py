@@ -7,8 +7,8 @@ import pytest
 from strip_frame import Strip, periodic
 
 from fenwear import CaseError, Tribosystem, assemble, load_case
-from fenwear.assembly import with_reduced_heat
-from fenwear.heat.periodic import CycleHeat
+from fenwear.heat.periodic_heat import CycleHeat
+from fenwear.system import with_reduced_heat
 
 ALL_TO_STRIP = ("heat.partition=0", "heat.debris=0", "heat.conductance=0", "heat.conducting=nominal")
 PRESSURE, FREQUENCY, WIDTH = 10.0, 10.0, 60.0

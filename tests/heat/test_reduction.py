@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from fenwear import Case, ConvergenceError, Tribosystem, assemble, load_case, march
-from fenwear.arrays import Array
-from fenwear.cycle import Block
+from fenwear.common.arrays import Array
 from fenwear.heat import passing_strip, prepare
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.heat_exchange import TERMS
 from fenwear.heat.reduction import _Growing
+from fenwear.steps import Block
 
 # Faces that convect and no debris: all losses, and a strong feedback.
 COARSE = (

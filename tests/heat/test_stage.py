@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.heat_exchange import HeatExchange
 
 Make = Callable[..., Any]
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12", "heat.steps=3")
@@ -28,7 +28,7 @@ CASES = {
 
 def conducted(exchange: HeatExchange, few: int, patch: pytest.MonkeyPatch) -> list[np.ndarray]:
     """Return states, terms and changes of a few half-cycles, by matrices up to so many nodes."""
-    patch.setattr("fenwear.heat.exchange.FEW", few)
+    patch.setattr("fenwear.heat.heat_exchange.FEW", few)
     exchange._forget()
     n, state, found = len(exchange.weights), exchange.initial(), []
     pressure = np.linspace(0.0, 3.0, n)

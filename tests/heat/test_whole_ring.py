@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from fenwear import load_case
-from fenwear.assembly import place_case
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.heat_exchange import TERMS
 from fenwear.heat.prepare import prepare_exchange
-from fenwear.sliding.motion import make_motion
+from fenwear.surfaces.motion import make_motion
+from fenwear.system import place_case
 
 Floats = NDArray[np.float64]
 K, RHO_C, ROUND, PAD, MESHED = 50.0, 3.6, 502.0, 84.0, 120.0

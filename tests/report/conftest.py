@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fenwear import load_case
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 EVIL = '<script>alert("1")</script> & <img src=x onerror=alert(1)>'
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")

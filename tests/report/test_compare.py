@@ -12,7 +12,7 @@ import pytest
 
 from fenwear import CaseError, load_case
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "run.half_cycles=6")
 RUNS = {"plain": ("example1",), "rough": ("example1", "contact.friction=0.3"), "hot": ("example1-heat",)}

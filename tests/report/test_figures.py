@@ -12,8 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fenwear import CaseError, load_case
-from fenwear.report.bodies import element_edges
-from fenwear.report.course import course_figure
+from fenwear.report.body_figures import element_edges
 from fenwear.report.figures import all_figures, draw_figures
 from fenwear.report.lines import (
     LATE,
@@ -25,8 +24,9 @@ from fenwear.report.lines import (
     wear_map_figure,
     with_late_pressures,
 )
+from fenwear.report.run_figures import course_figure
 from fenwear.report.style import COLOURS, Style, chosen_formats, chosen_look, shades
-from fenwear.results.reading import load_history, read_history
+from fenwear.results.stored_history import load_history, read_history
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
 SHOWN = {"shape", "profiles", "wear_map", "pressure", "peaks", "volume", "scar", "friction", "convergence"}

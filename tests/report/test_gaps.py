@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from fenwear.report.surface import gaps_of, part_lines, parted, sides_of
+from fenwear.report.drawn_surface import gaps_of, part_lines, parted, sides_of
 
 
 def test_no_line_over_a_gap() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from fenwear import load_case
 from fenwear.report.page import numbers_of, page, write_report
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "run.half_cycles=6")
 VOID = {"meta", "link", "img", "br"}

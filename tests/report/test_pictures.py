@@ -10,7 +10,7 @@ import pytest
 import xarray
 from matplotlib.image import imread
 
-from fenwear.report.bodies import (
+from fenwear.report.body_figures import (
     FIELDS,
     DrawingError,
     common_view,

@@ -10,11 +10,11 @@ import pytest
 import xarray
 
 from fenwear.case.reading import load_case
-from fenwear.report.course import course_figure, course_figures
 from fenwear.report.lines import fields_of
 from fenwear.report.maps import with_surfaces
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.report.run_figures import course_figure, course_figures
+from fenwear.results.stored_history import load_history
+from fenwear.studies.run import run_case
 
 SETTINGS = (
     "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",

@@ -7,8 +7,8 @@ import pytest
 import xarray
 from matplotlib.figure import Figure
 
-from fenwear.arrays import Array
-from fenwear.report.surface import Surface, cut_places
+from fenwear.common.arrays import Array
+from fenwear.report.drawn_surface import Surface, cut_places
 
 ROUND, RADIUS = 24, 10.0
 

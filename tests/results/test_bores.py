@@ -9,11 +9,11 @@ import pytest
 import xarray
 
 from fenwear import assemble, load_case, march, vary
-from fenwear.cycle import evolve
-from fenwear.results.place import quantities
+from fenwear.results.forces_and_place import quantities
 from fenwear.results.quantity import computed
 from fenwear.results.summary import contact_sheets
-from fenwear.run import run_case
+from fenwear.steps import evolve
+from fenwear.studies.run import run_case
 
 MU, CLEARANCE = 0.1, 0.02
 COARSE = [

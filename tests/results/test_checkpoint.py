@@ -16,10 +16,10 @@ import pytest
 import xarray
 
 from fenwear import Tribosystem, load_case
-from fenwear.cycle.state import RunState
 from fenwear.results import checkpoint
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.results.stored_history import load_history
+from fenwear.steps.run_state import RunState
+from fenwear.studies.run import run_case
 
 Run = Callable[..., Any]
 SMALL = (
@@ -139,8 +139,8 @@ def test_jumps_are_saved_long_before_a_block_of_them_is_full(tmp_path: Path, mon
         saved.append(state.half_cycle)
         save(directory, system, state, extremes)
 
-    monkeypatch.setattr("fenwear.run.BLOCK_SECONDS", 0.0)
-    monkeypatch.setattr("fenwear.signals.LOOK", 0.0)
+    monkeypatch.setattr("fenwear.studies.run.BLOCK_SECONDS", 0.0)
+    monkeypatch.setattr("fenwear.common.signals.LOOK", 0.0)
     monkeypatch.setattr(checkpoint, "save", noted)
     settings = (
         "run.half_cycles=400",

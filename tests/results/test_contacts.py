@@ -12,10 +12,10 @@ import xarray
 from mpi4py import MPI
 
 from fenwear import CaseError, assemble, load_case, make_case
-from fenwear.report.surface import surface_of
+from fenwear.report.drawn_surface import surface_of
 from fenwear.results.summary import contact_text
-from fenwear.run import run_case
-from tests.bodies.test_parts import tables
+from fenwear.studies.run import run_case
+from tests.bodies.test_connected_parts import tables
 
 LOADS = {"left": -300.0, "right": -900.0}
 

@@ -10,11 +10,11 @@ import xarray
 
 from fenwear import load_case, read_history
 from fenwear.case import changed_case
-from fenwear.report.course import temperature_unit
 from fenwear.report.figures import all_figures
+from fenwear.report.run_figures import temperature_unit
 from fenwear.results.export import export
 from fenwear.results.quantity import ICE, in_kelvin
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 SMALL = (
     "geometry.degree=1",

@@ -13,10 +13,10 @@ import pytest
 import xarray
 
 from fenwear import CaseError, load_case
-from fenwear.errors import OutputError
+from fenwear.common.errors import OutputError
 from fenwear.results.export import export
-from fenwear.results.reading import by_cycles, load_history
-from fenwear.run import run_case
+from fenwear.results.stored_history import by_cycles, load_history
+from fenwear.studies.run import run_case
 
 BARE = ("output.fields_at=[]", "output.report=false", "output.uncertainty=false")
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=8", *BARE)

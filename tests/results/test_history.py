@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
-from fenwear.arrays import Array
-from fenwear.cycle.program import Span
-from fenwear.report.course import mean_pressure, nominal_width
+from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march
+from fenwear.common.arrays import Array
+from fenwear.report.run_figures import mean_pressure, nominal_width
 from fenwear.results.history import HistoryWriter, free_directory, make_directory
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.results.stored_history import load_history
+from fenwear.steps.program_stages import Span
+from fenwear.studies import run
+from fenwear.studies.run import run_case
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
 QUIET = ("output.report=false", "output.uncertainty=false")
@@ -95,7 +96,7 @@ def test_blocks_are_written_without_gaps(
     settings = (f"run.half_cycles={count}", f"output.every={every}")
     at_once, _ = save(tmp_path / "one", *settings)
     monkeypatch.setattr("fenwear.results.history.SECONDS_BETWEEN_WRITES", 0.0)
-    monkeypatch.setattr("fenwear.cycle.driver.LOOK", 0.0)
+    monkeypatch.setattr("fenwear.steps.driver.LOOK", 0.0)
     in_blocks, _ = save(tmp_path / "two", *settings)
     xarray.testing.assert_identical(at_once, in_blocks.assign_attrs(at_once.attrs))
 

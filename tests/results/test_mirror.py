@@ -10,12 +10,12 @@ import ufl
 from dolfinx import fem
 
 from fenwear import assemble, load_case, march
-from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.parallel import total
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import total
 from fenwear.results.fields import body_fields
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.results.stored_history import load_history
+from fenwear.studies.run import run_case
 
 CREEP = "punch.creep={terms=[{compliance=0.5, time='2 s'}]}"
 QUICK = ("run.half_cycles=3", "output.report=false", "output.uncertainty=false", "output.fields_at=[]")

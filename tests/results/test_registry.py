@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, assemble, load_case, steady
-from fenwear.cycle import evolve
-from fenwear.cycle.steady_cycle import cycle_of_state
-from fenwear.life import Model, evaluate, parse_quantity, read_data
 from fenwear.report.key_numbers import flat, read_summary
-from fenwear.results import between
+from fenwear.results import layer_results
+from fenwear.results.history_surfaces import at_places
 from fenwear.results.quantity import RECORD, Quantity, computed
-from fenwear.results.reading import current_names, load_history
 from fenwear.results.registry import known, quantities_of
+from fenwear.results.stored_history import current_names, load_history
 from fenwear.results.summary import nominal_pressure
-from fenwear.results.surfaces import at_places
-from fenwear.run import run_case
+from fenwear.steps import evolve
+from fenwear.steps.steady_cycle import cycle_of_state
+from fenwear.studies import Model, evaluate, parse_quantity, read_data
+from fenwear.studies.run import run_case
 
 JUMPS = ["run.integration=jump", "geometry.degree=1"]
 FINE = "geometry.parameters.elements_along_contact"
@@ -117,7 +117,7 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
     pair = SimpleNamespace(weights=weights, strip=SimpleNamespace(weights=weights))
     system = SimpleNamespace(pair=pair, coatings=(np.ones(len(weights)), np.zeros(len(weights))))
     block: Any = SimpleNamespace(system=system, wear=depth, wear_strip=0 * depth)
-    found = computed(block, between.of_coated("punch"))
+    found = computed(block, layer_results.of_coated("punch"))
     assert found["worn_through_of_scar"] == pytest.approx([0.5])
     assert found["worn_through_of_surface"] == pytest.approx([0.1])
 

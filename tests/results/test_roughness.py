@@ -10,7 +10,7 @@ import pytest
 from waves import FULL, HEIGHT, LENGTH, wavy
 
 from fenwear import run_case
-from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.grid_surface import RegularGrid
 from fenwear.results.roughness import levelled, sa_sq
 
 

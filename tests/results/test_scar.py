@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fenwear import Tribosystem, load_case
-from fenwear.assembly import place_case
 from fenwear.bodies.subcells import linear_cells
-from fenwear.results.surfaces import EDGE, conforming, extents, scar_geometry
+from fenwear.results.history_surfaces import EDGE, conforming, extents, scar_geometry
+from fenwear.system import place_case
 
 
 def grid(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import xarray
 from fenwear import load_case
 from fenwear.results.fields import SERIES
 from fenwear.results.hdf5 import TRIANGLE, Step, append
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
 
 
 @pytest.mark.parametrize("name", ["fretting", "example1-heat"])

@@ -13,15 +13,15 @@ import xarray
 
 from fenwear import Tribosystem, assemble, jump, load_case, march
 from fenwear.case.templates import write_case_of
-from fenwear.cycle import Block, follow
-from fenwear.interface.placement import in_model
+from fenwear.results.history_surfaces import without_noise
 from fenwear.results.quantity import computed
-from fenwear.results.reading import load_history
 from fenwear.results.registry import quantities_of
 from fenwear.results.sheet import sheet_rows, sheet_text
+from fenwear.results.stored_history import load_history
 from fenwear.results.summary import sheet_of
-from fenwear.results.surfaces import without_noise
-from fenwear.run import run_case
+from fenwear.steps import Block, follow
+from fenwear.studies.run import run_case
+from fenwear.surfaces.placement import in_model
 
 Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import xarray
 
-import fenwear.signals
+import fenwear.common.signals
 from fenwear import ConvergenceError, load_case
-from fenwear.cycle.phase import PhaseEnd, PhaseStep
-from fenwear.errors import InterruptedRunError
-from fenwear.results.reading import load_history
-from fenwear.results.surfaces import EDGE
-from fenwear.run import run_case
+from fenwear.common.errors import InterruptedRunError
+from fenwear.results.history_surfaces import EDGE
+from fenwear.results.stored_history import load_history
+from fenwear.steps.phase import PhaseEnd, PhaseStep
+from fenwear.studies.run import run_case
 
 NO_PICTURES = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]")
 COARSE = (*NO_PICTURES, "geometry.degree=1", "geometry.order=1")
@@ -132,8 +132,8 @@ def test_interrupted_within_a_step(tmp_path: Path, name: str, monkeypatch: pytes
         return looks == 12
 
     with monkeypatch.context() as patched:
-        patched.setattr(fenwear.signals.RunMonitor, "look", look)
-        patched.setattr(fenwear.signals, "LOOK", -1.0)
+        patched.setattr(fenwear.common.signals.RunMonitor, "look", look)
+        patched.setattr(fenwear.common.signals, "LOOK", -1.0)
         with pytest.raises(InterruptedRunError, match="to resume: --resume"):
             run(tmp_path / "cut", name, *how)
     reached = int(history(tmp_path / "cut").half_cycle[-1])

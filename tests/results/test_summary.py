@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from fenwear import Case, load_case, make_case
-from fenwear.report.course import program_figure
 from fenwear.report.page import page
+from fenwear.report.run_figures import program_figure
 from fenwear.results.export import export
-from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet_text
-from fenwear.run import run_case
+from fenwear.results.stored_history import load_history
+from fenwear.studies.run import run_case
 
 STEPS = [
     {"time": "0.5 s", "angular_speed": "20 rad/s"},

@@ -9,8 +9,8 @@ import pytest
 
 from fenwear import load_case
 from fenwear.report.maps import has_tracks, tracks_figure
-from fenwear.results.reading import load_history
-from fenwear.run import run_case
+from fenwear.results.stored_history import load_history
+from fenwear.studies.run import run_case
 
 SMALL = ("geometry.parameters={radius=14, clearance=0.1, contact_angle=60, across=4, around=2, cup_layers=1, "
          "ball_layers=1}", "geometry.degree=2", "run.half_cycles=2", "run.integration='explicit'",

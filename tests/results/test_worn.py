@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, assemble, load_case, run_case
-from fenwear.assembly import build_bodies, place_case
 from fenwear.bodies.contact_surface import profiled
-from fenwear.case.bodies import Profile
-from fenwear.errors import FenwearError
+from fenwear.case.body_tables import Profile
+from fenwear.common.errors import FenwearError
 from fenwear.results.export import TRIANGLE, export_worn, profile_of
-from fenwear.results.reading import load_history
+from fenwear.results.stored_history import load_history
+from fenwear.system import build_bodies, place_case
 
 QUIET = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]", "geometry.follow_wear='never'")
 PLANE = ("geometry.parameters.elements_along_contact=12", "run.integration='explicit'", *QUIET)

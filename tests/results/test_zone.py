@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from fenwear import load_case
-from fenwear.assembly import place_case
 from fenwear.report.page import page
-from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet_text
+from fenwear.results.stored_history import load_history
 from fenwear.results.summary import net_of
-from fenwear.run import run_case
+from fenwear.studies.run import run_case
+from fenwear.system import place_case
 
 
 def test_nodes_across_a_line_contact() -> None:

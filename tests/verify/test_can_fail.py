@@ -13,16 +13,16 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear import Tribosystem
-from fenwear.arrays import Array
-from fenwear.assembly import bodies, placing
-from fenwear.bodies import material
-from fenwear.bodies.material import Isotropic
+from fenwear.bodies import elastic_material
+from fenwear.bodies.elastic_material import Isotropic
+from fenwear.common.arrays import Array
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import ContactPair, Interface, RigidEquilibrium
-from fenwear.sliding.local_laws import Wear
-from fenwear.sliding.motion import Motion
+from fenwear.heat.heat_exchange import TERMS, HeatExchange
+from fenwear.laws.local_laws import Wear
+from fenwear.surfaces import ContactPair, Interface, RigidEquilibrium
+from fenwear.surfaces.motion import Motion
+from fenwear.system import both_bodies, placing
 from fenwear_verify import flash as flash_cases
 from fenwear_verify import registered, run_cases
 from fenwear_verify import wear as wear_cases
@@ -92,19 +92,19 @@ def opposite_moment(patch: Patch) -> None:
 
 def punch_without_poisson(patch: Patch) -> None:
     """The punch in plane stress, so that E* lacks its 1 - nu²."""
-    right = bodies.isotropic
+    right = both_bodies.isotropic
 
     def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
         return right(body, regions, materials, "stress" if body.name == "punch" else kind)
 
-    patch.setattr(bodies, "isotropic", isotropic)
+    patch.setattr(both_bodies, "isotropic", isotropic)
 
 
 def lame_of_the_other_plane(patch: Patch) -> None:
     """Plane stress for plane strain, and the other way round."""
-    right = material.lame
+    right = elastic_material.lame
     other = {"stress": "strain", "strain": "stress"}
-    patch.setattr(material, "lame", lambda young, poisson, plane: right(young, poisson, other[plane]))
+    patch.setattr(elastic_material, "lame", lambda young, poisson, plane: right(young, poisson, other[plane]))
 
 
 def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
@@ -147,7 +147,7 @@ def collocated(patch: Patch) -> None:
         first, second = patches[0].first, patches[0].second
         return csr_array(interpolation(second.s[:, 0], second.degree, first.s[:, 0]))
 
-    patch.setattr(sys.modules["fenwear.interface.pair"], "dual_transfer", transfer)
+    patch.setattr(sys.modules["fenwear.surfaces.pair"], "dual_transfer", transfer)
 
 
 def half_distance(patch: Patch) -> None:
@@ -199,14 +199,16 @@ def other_share(patch: Patch) -> None:
 def thermal_modulus_without_poisson(patch: Patch) -> None:
     """E alpha in place of E alpha / (1 - nu) and E alpha / (1 - 2 nu)."""
 
-    right = bodies.isotropic
+    right = both_bodies.isotropic
 
     def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
         of_region = {region: materials[name] for region, name in regions.items()}
         modulus = {r: m.young * (m.expansion or 0.0) for r, m in of_region.items()}
-        return replace(right(body, regions, materials, kind), thermal_modulus=material.region_field(body, modulus))
+        return replace(
+            right(body, regions, materials, kind), thermal_modulus=elastic_material.region_field(body, modulus)
+        )
 
-    patch.setattr(bodies, "isotropic", isotropic)
+    patch.setattr(both_bodies, "isotropic", isotropic)
 
 
 def material_the_other_way(patch: Patch) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Bodies, Tribosystem, assemble, build_bodies
 from fenwear.case import Case, load_case, make_case
+from fenwear.common.arrays import Array
+from fenwear.system import Bodies, Tribosystem, assemble, build_bodies
 
 STEEL = {"young": 2e5, "poisson": 0.3}
 

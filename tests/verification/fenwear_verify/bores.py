@@ -10,12 +10,12 @@ from functools import cache
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import make_case
-from fenwear.cycle import Block, jump
-from fenwear.results.place import quantities
+from fenwear.common.arrays import Array
+from fenwear.results.forces_and_place import quantities
 from fenwear.results.quantity import computed
+from fenwear.steps import Block, jump
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 RADIUS, YOUNG, POISSON, LOAD = 10.0, 210e3, 0.3, 50.0  # of the bore, mm; MPa; N/mm

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import jump, steady
+from fenwear.common.arrays import Array
+from fenwear.steps import jump, steady
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

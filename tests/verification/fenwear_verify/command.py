@@ -10,10 +10,10 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenwear.errors import CaseError, InputError
-from fenwear.parallel import on_root
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import on_root
+from fenwear.common.stack import versions
 from fenwear.results.history import CASE, free_directory, make_directory
-from fenwear.stack import versions
 from fenwear_verify.page import page
 from fenwear_verify.paper import BRIEF, FULL, Scope, paper_rows, section
 from fenwear_verify.suite import Outcome, Row, VerificationCase, registered, run_cases

@@ -7,7 +7,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear_verify.bodies import bodies_of_blocks, clamped
 from fenwear_verify.manufactured import (

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.common.arrays import Array
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin, rigid_punch, two_blocks
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import quad
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import changed_case
-from fenwear.cycle import decay_rates, growth_rate, march
+from fenwear.common.arrays import Array
+from fenwear.steps import decay_rates, growth_rate, march
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.bodies import rigid_punch
 from fenwear_verify.half_space import disc_case
 from fenwear_verify.solid import MODULUS, RIGID, STEEL

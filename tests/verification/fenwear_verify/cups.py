@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear import steady
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import jump
+from fenwear.common.arrays import Array
+from fenwear.steps import jump
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin
 from fenwear_verify.suite import Result, Row, number, observed_order, order, profile, verification
 

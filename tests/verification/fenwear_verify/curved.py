@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.plausibility.boundary import contact_limits
+from fenwear.checks.surface_ends import contact_limits
+from fenwear.common.arrays import Array
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import STEEL, builtin
 from fenwear_verify.contact import measured_half_width, semi_ellipse
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification

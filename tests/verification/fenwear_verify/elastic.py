@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy import cos, pi, sin
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.results.fields import body_fields
 from fenwear_verify.bodies import bodies_of_blocks, clamped, two_blocks
 from fenwear_verify.manufactured import (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import times
-from fenwear.heat.field import HeatState
+from fenwear.algebra.assembled import times
+from fenwear.common.arrays import Array
+from fenwear.heat.temperature import HeatState
 from fenwear.results.fields import body_fields
 from fenwear_verify.bodies import bodies_of_blocks, builtin, clamped, two_blocks
 from fenwear_verify.conduction import MATERIAL, owned_nodes

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.flash.response import Instants, Periodic, cell_integrals
+from fenwear.common.arrays import Array
+from fenwear.heat.moving_sources import Instants, Periodic, cell_integrals
 from fenwear_verify.moving_source import HALF, RHO_C, K, rise_in_source
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

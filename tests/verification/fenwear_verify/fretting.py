@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 import scipy.integrate
 
-from fenwear.arrays import Array
-from fenwear.assembly import assemble, build_bodies, make_sliding
 from fenwear.case import load_case, make_case
-from fenwear.cycle import jump, march
-from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
-from fenwear.stick.final import final_shape, stick_zone
-from fenwear.stick.setup import partial_slip_problem
+from fenwear.common.arrays import Array
+from fenwear.steps import jump, march
+from fenwear.steps.stick_final import final_shape, stick_zone
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import StickInterface, untouched
+from fenwear.steps.stick_setup import partial_slip_problem
+from fenwear.steps.stick_state import Imposed, StickState
+from fenwear.system import assemble, build_bodies, make_sliding
 from fenwear_verify.stick import pressed_half_planes
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

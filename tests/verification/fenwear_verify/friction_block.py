@@ -13,10 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import build_bodies, make_sliding
 from fenwear.case import Case, make_case
-from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
+from fenwear.common.arrays import Array
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import StickInterface, untouched
+from fenwear.steps.stick_state import Imposed, StickState
+from fenwear.system import build_bodies, make_sliding
 from fenwear_verify.suite import Line, Plot, Result, number, verification
 
 PLACES = np.array([0.0, 1.25, 5.0, 7.5, 11.25])  # mm

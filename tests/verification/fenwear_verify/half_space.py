@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, place_case
 from fenwear.case import Case
+from fenwear.common.arrays import Array
+from fenwear.system import Tribosystem, assemble, place_case
 from fenwear_verify.solid import MODULUS, RIGID, ROTATION, STEEL, describe, middles
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

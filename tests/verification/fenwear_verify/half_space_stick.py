@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 
-from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.half_space import HalfSpace, influence
-from fenwear.interface import ContactPair, RigidEquilibrium
-from fenwear.interface.placement import HERE
-from fenwear.sliding.field import ALONG_X
-from fenwear.stick.interface import OppositeBodies
+from fenwear.common.arrays import Array
+from fenwear.steps.stick_interface import OppositeBodies
+from fenwear.surfaces import ContactPair, RigidEquilibrium
+from fenwear.surfaces.placement import HERE
+from fenwear.surfaces.sliding_field import ALONG_X
 
 # Signs of (u_x, u_y, u_z) at the mirror images in x and in y: pulled along x, or pressed alone.
 MIRRORS = {"pulled": ((1, -1, 1), (1, -1, 1)), "pressed": ((-1, 1, 1), (1, -1, 1))}

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case, make_case
-from fenwear.cycle import Block, jump, march
+from fenwear.common.arrays import Array
+from fenwear.steps import Block, jump, march
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.suite import Line, Plot, Result, Row, number, verification
 
 RADIUS, FORCE = 17.5, 15.75  # mm; N/mm

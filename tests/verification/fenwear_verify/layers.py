@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import quad
 
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import growth_rate, march
-from fenwear.layers import LayerStep
+from fenwear.laws import LayerStep
+from fenwear.steps import growth_rate, march
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import rigid_punch, two_blocks
 from fenwear_verify.suite import Result, Row, number, verification
 from fenwear_verify.wear import HALF_WIDTH, MEAN, STROKE, half_plane_rates, stiffness_rates

@@ -12,9 +12,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector, compiled
+from fenwear.algebra.assembled import assembled_vector, compiled
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.common.arrays import Array
 from fenwear_verify.suite import Line, Plot
 
 DEGREES = (1, 2, 3, 4)

@@ -10,10 +10,10 @@ from scipy.integrate import quad
 from scipy.special import erf, k0e
 
 from fenwear import load_case
-from fenwear.arrays import Array
-from fenwear.assembly import ContactSetup, place_case
+from fenwear.common.arrays import Array
 from fenwear.heat.conduction import Surroundings
 from fenwear.heat.prepare import prepare_exchange
+from fenwear.system import ContactSetup, place_case
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 HALF, CONDUCTIVITY, CAPACITY = 30.0, 55.0, 7.8e-9 * 4.6e8  # of the source, mm; of the strip

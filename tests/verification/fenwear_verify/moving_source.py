@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import ContactSetup, place_case
+from fenwear.common.arrays import Array
 from fenwear.heat.conduction import Surroundings
-from fenwear.sliding.field import SlidingField
+from fenwear.surfaces.sliding_field import SlidingField
+from fenwear.system import ContactSetup, place_case
 from fenwear_verify.solid import STEEL, describe
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import make_case
+from fenwear.common.arrays import Array
 from fenwear.results.fields import body_fields
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.bodies import builtin
 from fenwear_verify.suite import Line, Plot, Result, number, verification
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import fsolve
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear_verify.bodies import builtin
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

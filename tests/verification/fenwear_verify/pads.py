@@ -16,9 +16,9 @@ import numpy as np
 from scipy.interpolate import CloughTocher2DInterpolator
 
 from fenwear import vary
-from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem
+from fenwear.common.arrays import Array, Mask
 from fenwear.contact import SlidingContact
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin
 from fenwear_verify.brakes import INNER, OUTER, PADS, SPEED
 from fenwear_verify.full_space import FullContact

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.report.page import Picture, picture, render
 from fenwear.report.style import COLOURS, DASHES, panels
 from fenwear_verify.suite import Line, Outcome, Plot

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.assembly import assemble
 from fenwear.case import load_case
-from fenwear.cycle import jump, march, steady
+from fenwear.steps import jump, march, steady
+from fenwear.system import assemble
 from fenwear_verify.suite import Result, Row, profile, verification
 
 

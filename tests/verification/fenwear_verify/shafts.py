@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear import assemble, load_case, vary
-from fenwear.arrays import Array
-from fenwear.assembly import ContactSetup, Tribosystem, place_case
 from fenwear.case import Case
+from fenwear.common.arrays import Array
+from fenwear.system import ContactSetup, Tribosystem, place_case
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 RADIUS, TIGHT, LENGTH, SPAN, LOAD, MU = 10.0, 1e-5, 16.0, 60.0, 2000.0, 0.1  # mm; N

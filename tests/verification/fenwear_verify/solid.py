@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import Case, make_case
-from fenwear.cycle import growth_rate, march, steady
+from fenwear.common.arrays import Array
+from fenwear.steps import growth_rate, march, steady
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 YOUNG, POISSON = 210_000.0, 0.3

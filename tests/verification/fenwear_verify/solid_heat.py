@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, build_bodies
-from fenwear.cycle import critical_speed, growth_rate, march, steady
+from fenwear.common.arrays import Array
 from fenwear.heat.conduction import HeatBody, Surroundings
-from fenwear.sliding.field import SlidingField
+from fenwear.steps import critical_speed, growth_rate, march, steady
+from fenwear.surfaces.sliding_field import SlidingField
+from fenwear.system import Tribosystem, build_bodies
 from fenwear_verify.solid import STEEL, describe, solve
 from fenwear_verify.suite import Result, Row, number, order, profile, verification
 from fenwear_verify.thermal import (

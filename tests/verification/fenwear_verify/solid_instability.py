@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import critical_speed, growth_rate
+from fenwear.steps import critical_speed, growth_rate
+from fenwear.system import Tribosystem
 from fenwear_verify.solid import solve
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, verification
 from fenwear_verify.thermal import EXPANSION, POISSON, RHO_C, SMALL_FRICTION, YOUNG, K, rate_without_steps

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import jump
+from fenwear.steps import jump
+from fenwear.system import Tribosystem
 from fenwear_verify.half_space import growth_of
 from fenwear_verify.solid import RIGID, STEEL, solve
 from fenwear_verify.suite import Result, Row, number, order, verification

@@ -8,10 +8,12 @@ from functools import cache
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import build_bodies, make_sliding
-from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
-from fenwear.stick.position import surface_gradient, surface_strain
+from fenwear.common.arrays import Array
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import StickInterface, untouched
+from fenwear.steps.stick_position import surface_gradient, surface_strain
+from fenwear.steps.stick_state import Imposed, StickState
+from fenwear.system import build_bodies, make_sliding
 from fenwear_verify.bodies import STEEL, two_block_case
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

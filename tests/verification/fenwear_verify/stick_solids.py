@@ -8,14 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from fenwear.arrays import Array, Mask
-from fenwear.sliding.local_laws import BodyRate, LocalWear
-from fenwear.stick import Imposed, StickState, advance, untouched
-from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.final import final_shape, stick_zone
-from fenwear.stick.interface import OppositeBodies
-from fenwear.stick.jump import first_cycle, jumped
-from fenwear.stick.program import Program, TimeStep
+from fenwear.common.arrays import Array, Mask
+from fenwear.laws.local_laws import BodyRate, LocalWear
+from fenwear.steps.stick_cycle import PartialSlipProblem
+from fenwear.steps.stick_final import final_shape, stick_zone
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_jump import first_cycle, jumped
+from fenwear.steps.stick_program import Program, TimeStep
+from fenwear.steps.stick_state import Imposed, StickState
 from fenwear_verify.half_space_stick import Elastic, half_spaces
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, verification
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, SupportsFloat, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.errors import CaseError, FenwearError, InputError
+from fenwear.common.errors import CaseError, FenwearError, InputError
 
 Verdict = Literal["agrees", "differs", "not run"]
 T = TypeVar("T")

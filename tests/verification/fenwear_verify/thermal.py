@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from fenwear import vary
-from fenwear.assembly import Tribosystem, steady_exchange
-from fenwear.cycle import critical_speed, growth_rate, jump, march
-from fenwear.heat.exchange import TERMS
+from fenwear.heat.heat_exchange import TERMS
+from fenwear.steps import critical_speed, growth_rate, jump, march
+from fenwear.system import Tribosystem, steady_exchange
 from fenwear_verify.bodies import builtin, two_blocks
 from fenwear_verify.suite import Line, Plot, Result, Row, number, profile, verification
 

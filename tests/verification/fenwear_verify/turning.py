@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import growth_rate, march, steady
+from fenwear.common.arrays import Array
+from fenwear.steps import growth_rate, march, steady
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import relief_rates
 from fenwear_verify.solid import (
     MODULUS,

@@ -9,12 +9,12 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fenwear import vary
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.cycle import growth_rate, jump, march, stability_number, steady
-from fenwear.optimum import WearRates
-from fenwear.optimum import optimum as minimal_dissipation
-from fenwear.sliding.pressure_law import PressureLaw
+from fenwear.common.arrays import Array
+from fenwear.laws.optimum import WearRates
+from fenwear.laws.optimum import optimum as minimal_dissipation
+from fenwear.laws.pressure_law import PressureLaw
+from fenwear.steps import growth_rate, jump, march, stability_number, steady
+from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin, relief_rates, rigid_punch
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

@@ -7,10 +7,10 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from fenwear.assembly import Bodies, Tribosystem
 from fenwear.contact import SlidingContact
-from fenwear.cycle.gross_sliding import GrossSliding
-from fenwear.stick import increment
+from fenwear.steps import stick_increment
+from fenwear.steps.gross_sliding import GrossSliding
+from fenwear.system import Bodies, Tribosystem
 from fenwear_verify.full_space.contact import FullContact
 from fenwear_verify.full_space.step import FullStep
 
@@ -45,7 +45,7 @@ def nothing_condensed() -> Iterator[None]:
             (Tribosystem, "phase_contact", phases_of),
             (Tribosystem, "passed_contact", passed),
             (GrossSliding, "replicated", lambda *_: False),
-            (increment, "_step", FullStep),
+            (stick_increment, "_step", FullStep),
         ):
             patches.enter_context(patch.object(owner, name, new))
         yield

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import block_array, block_diag, coo_array, csr_array, diags_array
 
-from fenwear.arrays import Array
-from fenwear.assembly import Bodies
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.stick.position import Position
+from fenwear.common.arrays import Array
+from fenwear.steps.stick_position import Position
+from fenwear.system import Bodies
 
 GUIDES = ("rotations", "couples")
 

@@ -24,14 +24,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
+from fenwear.algebra.submatrices import whole
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.common.arrays import Array
+from fenwear.common.parallel import lasting
 from fenwear.contact.condensed import ContactState, SlidingContact, WearCompliance
 from fenwear.contact.inequality import check, configure
-from fenwear.contact.operators import whole
-from fenwear.interface import ContactPair, RigidEquilibrium
-from fenwear.interface.equilibrium import relative_motion
-from fenwear.parallel import lasting
+from fenwear.surfaces import ContactPair, RigidEquilibrium
+from fenwear.surfaces.equilibrium import relative_motion
 
 # Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
 # much, over the scale of gaps, makes the node open.

@@ -19,11 +19,11 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from fenwear.arrays import Array
-from fenwear.errors import ConvergenceError
-from fenwear.parallel import on_root
-from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement, derivative
-from fenwear.stick.interface import meshed
+from fenwear.common.arrays import Array
+from fenwear.common.errors import ConvergenceError
+from fenwear.common.parallel import on_root
+from fenwear.steps.stick_equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement, derivative
+from fenwear.steps.stick_interface import meshed
 from fenwear_verify.full_space.bodies import WholeBodies, whole_bodies
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.report.style import (
     ALONG_CONTACT,
     BLUE,

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.cycle.thermal import gap_volume
-from fenwear.errors import ConvergenceError
+from fenwear.common.arrays import Array
+from fenwear.common.errors import ConvergenceError
+from fenwear.steps.heated_phase import gap_volume
+from fenwear.system import Tribosystem
 
 MOST = 100.0  # iterations times relaxation: long before, the pressure is the contact's
 

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear_verify.paper.published import (
     DIFFERENCE,
     LARGEST_PRESSURE,

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from markupsafe import Markup
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear.report.page import Picture, picture, render
 from fenwear_verify.paper.figures import Picture as Drawing
 from fenwear_verify.paper.figures import paper_figures

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
-from fenwear.cycle import SteadyState
+from fenwear.common.arrays import Array
+from fenwear.steps import SteadyState
 from fenwear_verify.paper.published import (
     PEAK_HALF_CYCLE,
     TEMPERATURE_HALF_CYCLE,

@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 
 from fenwear import vary
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case
-from fenwear.cycle import growth_rate, jump, march, monotonic, steady
+from fenwear.steps import growth_rate, jump, march, monotonic, steady
+from fenwear.system import Tribosystem, assemble
 from fenwear_verify.paper.published import (
     MONOTONIC_TEMPERATURE,
     PERIODIC_TEMPERATURE,

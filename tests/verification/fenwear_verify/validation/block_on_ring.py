@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fenwear.life import measured_folder
+from fenwear.studies import measured_folder
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, root_mean_square
 from fenwear_verify.validation.runs import area_below, history_of, uncertainty, widths
 

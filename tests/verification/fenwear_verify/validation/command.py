@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.parallel import on_root
+from fenwear.common.parallel import on_root
+from fenwear.common.stack import versions
 from fenwear.report.style import COLOURS, Style, panels
-from fenwear.stack import versions
 from fenwear_verify.command import new_folder, write_results
 from fenwear_verify.validation.experiment import Comparison, Experiment, Finding, Scope, experiments
 

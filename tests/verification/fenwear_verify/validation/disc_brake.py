@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
 from fenwear_verify.validation.runs import history_of, uncertainty
 

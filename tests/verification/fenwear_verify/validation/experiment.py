@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear_verify.suite import chosen
 
 Scope = Literal["short", "full"]  # of a computation: short ones have coarser meshes, for the tests

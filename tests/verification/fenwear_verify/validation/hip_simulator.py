@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.common.arrays import Array
 from fenwear_verify.validation.experiment import Comparison, Curve, Finding, Scope, experiment, table
 from fenwear_verify.validation.runs import history_of
 

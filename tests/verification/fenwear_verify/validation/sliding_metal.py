@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t as student
 
-from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.life import calibrate, read_data
-from fenwear.life.keys import parse_unknown
-from fenwear.life.model import Model
-from fenwear.life.predictor import Predictor
+from fenwear.common.arrays import Array
+from fenwear.studies import calibrate, read_data
+from fenwear.studies.model import Model
+from fenwear.studies.numeric_keys import parse_unknown
+from fenwear.studies.predictor import Predictor
 from fenwear_verify.validation.experiment import (
     Comparison,
     Curve,

@@ -1,0 +1,1 @@
+"""Numerical algebra without any physics: assembled matrices, factors, Krylov methods, complementarity, fixed points."""

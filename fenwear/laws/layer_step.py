@@ -1,0 +1,304 @@
+"""A step of half-cycles or cycles with what lies between: the gap by its own pressures, and its change of state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.common.arrays import Array
+from fenwear.laws.compliant_layer import CoatedClosure, compressed
+from fenwear.laws.debris import DebrisCycle
+from fenwear.laws.friction import ContactConditions
+from fenwear.laws.law_states import Evolution, Held
+from fenwear.laws.layers import DEBRIS, PLASTIC, Layers
+from fenwear.laws.wear import PhasesWear, StepWear, WornDepths
+
+NUDGE = 1e-6  # of the largest pressure, for differences
+
+
+@dataclass(frozen=True)
+class LayerEvolution:
+    """Wear of phases of the motion, one after the other, and its effect on the layers.
+
+    Attributes:
+        layers: The layers.
+        wear: Of these phases.
+        debris: Their effect on them.
+        evolution: Their effect on the states of laws; None without.
+        ended: States of laws at their end, where they are known.
+    """
+
+    layers: Layers
+    wear: PhasesWear
+    debris: DebrisCycle
+    evolution: Evolution | None = None
+    ended: Held | None = None
+
+    @classmethod
+    def over(
+        cls,
+        layers: Layers,
+        wear: PhasesWear,
+        slid: Array,
+        evolution: Evolution | None = None,
+        conditions: Sequence[ContactConditions] = (),
+    ) -> LayerEvolution:
+        """Return what phases do that slide by these distances (m, n), mm, at conditions that debris may be lost by."""
+        return cls(layers, wear, layers.debris.over(slid, conditions, layers.places(wear.pairs)), evolution)
+
+    def worn(
+        self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | float = 0.0
+    ) -> WornDepths:
+        """Return what the phases wear, and how the state of what lies between changes.
+
+        Args:
+            pressure: (m, n), MPa.
+            before: Depths and state at the start of the step.
+            cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
+            flowed: Addition to the plastic depth (n,), mm; by default nothing.
+        """
+        worn = self.wear.begun(before, cycles).worn(pressure)
+        if not len(before.between) and not len(before.carried):
+            return worn
+        changes, carried = np.zeros(before.between.shape), np.zeros(before.carried.shape)
+        if self.layers.debris.present:
+            lies = carried if self.layers.strip_carries else changes
+            lies[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
+        if self.layers.hardness < np.inf:
+            changes[self.layers.row(PLASTIC)] = flowed
+        found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
+        if self.evolution is None or not self.layers.memory.names:
+            return found
+        return self.layers.with_held(found, self._evolved(pressure, before, cycles))
+
+    def _evolved(self, pressure: Array, before: WornDepths, cycles: float | None) -> Held:
+        """Return by how much the states of laws change, as `worn`."""
+        assert self.evolution is not None
+        held = self.layers.held(before)
+        if cycles is None and self.ended is not None:
+            return self.evolution.memory.bounded(self.ended) - held
+        evolution = self.evolution.at(pressure)
+        if cycles is None:
+            return evolution.after(held) - held
+        return (evolution.implicit(held, cycles) - held).times(1 / cycles)
+
+    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array:
+        """Return the gap that the states of laws fill more (n,), mm, as `worn`."""
+        return self.layers.memory.fills @ self._evolved(pressure, before, cycles).contact
+
+    def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
+        """Return what is added to the thickness of the debris, and what is ejected, as `worn`.
+
+        At the contact's nodes (n,) each, or at those of a strip that carries it (n_strip,).
+        """
+        taken = self._where_it_lies(self.wear.begun(before, cycles).taken(pressure))
+        thickness = self.layers.lies(before)
+        if cycles is None:
+            return self.debris.change(thickness, taken)
+        return self.debris.rate(thickness, taken, cycles)
+
+    def resting(self, pressure: Array) -> Array:
+        """Return the thickness of the debris that such cycles leave in the end (n,), mm."""
+        lies = self.resting_where_it_lies(pressure)
+        return np.asarray(self.wear.pairs[0].wear_interpolation @ lies) if self.layers.strip_carries else lies
+
+    def resting_where_it_lies(self, pressure: Array) -> Array:
+        """Return the same at the nodes where it lies: the contact's, or those of a strip that carries it (n_strip,)."""
+        fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
+        return np.asarray(fed / self.debris.loss)
+
+    def _where_it_lies(self, depths: Array) -> Array:
+        """Return depths of the phases at the contact's nodes (m, n) where debris lies: there, or on the strip."""
+        places = self.layers.places(self.wear.pairs)
+        return np.array([onto @ own for onto, own in zip(places, depths, strict=True)]) if places else depths
+
+    def step(
+        self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
+    ) -> LayerStep | None:
+        """Return what the pressures of a step open in it; explicitly the compliance alone, None without one.
+
+        Args:
+            before, cycles: As of `worn`.
+            implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
+            capped: Whether the contact itself lets no pressure beyond the hardness.
+        """
+        gives_way = implicit or self.layers.gives_way(capped=capped)
+        return LayerStep(self, before, cycles, implicit, capped) if gives_way else None
+
+
+@dataclass(frozen=True)
+class LayerStep:
+    """The wear of a step at the pressures of its phases, and what lies between, as a compliance of the contact.
+
+    Put into the inequality it makes the step implicit: pressure, wear and the state of what lies between belong to its
+    end, so that it is stable for any number of cycles.
+
+    Attributes:
+        passing: The phases.
+        before: Depths and state at the start.
+        cycles: Of the step; None for the phases once.
+        implicit: Whether wear opens the gaps of the step itself; else the compliance alone.
+        capped: Whether the contact itself lets no pressure beyond the hardness.
+    """
+
+    passing: LayerEvolution
+    before: WornDepths
+    cycles: float | None
+    implicit: bool = True
+    capped: bool = False
+
+    @property
+    def _length(self) -> float:
+        return 1.0 if self.cycles is None else self.cycles
+
+    @property
+    def _wear(self) -> StepWear:
+        return StepWear(self._worn, self._length)
+
+    @property
+    def _worn(self) -> PhasesWear:
+        return self.passing.wear.begun(self.before, self.cycles)
+
+    def opening(self, pressure: Array) -> Array:
+        """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
+        passing = self.passing
+        closed = passing.layers.closing(pressure, capped=self.capped)
+        if passing.layers.softens:
+            closed = closed + self._coatings(pressure).closure(pressure)
+        if not self.implicit:
+            return closed
+        found = self._wear.opening(pressure)
+        if passing.layers.debris.present:
+            added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+            if passing.layers.strip_carries:
+                added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
+            found = found - added
+        if self._fills:
+            found = found - self._length * passing.filled(pressure, self.before, self.cycles)
+        return found + closed
+
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
+        if not self.implicit:
+            return np.zeros_like(pressure)
+        if self.passing.layers.strip_carries:
+            return None
+        found = self._wear.local(pressure)
+        if found is not None and self.passing.layers.softens:
+            found = found * self._felt(pressure)[0].mean(axis=0)  # of all phases: a step to the solution
+        return None if found is None else found - self._covered(pressure)
+
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
+        left, right = self._wear.border(pressure)
+        if self.passing.layers.softens:
+            left = self._felt_by_border(left, pressure)
+        if self.passing.layers.strip_carries:
+            left, right = self._with_carried(left, right, pressure)
+        if not self._fills and not self.passing.layers.lies_here:
+            return left, right
+        unit = np.eye(pressure.shape[1])
+        left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
+        return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
+
+    def _felt_by_border(self, left: Array, pressure: Array) -> Array:
+        """Return L of `border` with what coatings that are compressed leave of it."""
+        (punch, strip), n = self._felt(pressure), pressure.shape[1]
+        first = n if self._worn.punch.wears else 0
+        found = left.copy()
+        found[:, :, :first] *= punch[:, :, None]
+        found[:, :, first:] *= strip[:, :, None]
+        return found
+
+    def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
+        """Return both with what the strip carries between, as its wear."""
+        passing, pairs = self.passing, self.passing.wear.pairs
+        slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
+        reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])
+        puts = np.array([pair.wear_projection.toarray() for pair in pairs]) * slopes[:, :, None] * taken[:, None, :]
+        return np.concatenate([left, reads], axis=2), np.concatenate([right, -puts], axis=1)
+
+    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
+        """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
+        if not self.implicit:
+            return None, None
+        punch, strip = self._wear.by_body(pressure)
+        if self.passing.layers.softens:
+            both = zip((punch, strip), self._felt(pressure), strict=True)
+            punch, strip = (None if own is None else own * share.mean(axis=0) for own, share in both)
+        if self.passing.layers.strip_carries:
+            return punch, self._carried_below(pressure, strip)
+        if not self.passing.layers.lies_here:
+            return punch, strip
+        covered = self._covered(pressure)
+        return -covered if punch is None else punch - covered, strip
+
+    def _carried_below(self, pressure: Array, strip: Array | None) -> Array:
+        """Return what unit pressures wear off the strip less what they put on it (m, n), as at the places below them.
+
+        A step to the solution, on grids, whose residual has what is put on the strip as it is.
+        """
+        passing = self.passing
+        pairs = zip(passing.wear.pairs, passing.debris.slope(self.cycles), strict=True)
+        below = np.array([pair.wear_interpolation @ slope for pair, slope in pairs])
+        put = below * self._worn.taken_slope(pressure)
+        return -put if strip is None else strip - put
+
+    @property
+    def curved(self) -> bool:
+        """Whether a layer has a closure that is not linear."""
+        return self.passing.layers.gives_way(capped=self.capped)
+
+    def layer(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
+        if not self.curved:
+            return None
+        found = self.passing.layers.slope(pressure, capped=self.capped)
+        return found + self._coatings(pressure).slope(pressure) if self.passing.layers.softens else found
+
+    def _depths(self, pressure: Array) -> tuple[Array, Array]:
+        """Return the depths of punch and strip for the compliance of coatings: those at the step's end."""
+        punch, strip = self.before.punch, self.before.strip
+        if not self.implicit:
+            return punch, strip
+        lost = self._worn.worn(pressure)
+        return punch + self._length * lost.punch, strip + self._length * lost.strip
+
+    def _coatings(self, pressure: Array) -> CoatedClosure:
+        """Return the compliant coatings in each phase (m, n)."""
+        return self.passing.layers.coatings_closure(self.passing.wear.pairs, *self._depths(pressure))
+
+    def _felt(self, pressure: Array) -> tuple[Array, Array]:
+        """Return how much of what punch and strip lose opens the gap of each phase (m, n) each.
+
+        Where a coating goes that was compressed its compression does, too.
+        """
+        layers = self.passing.layers
+        left = layers.coatings_left(self.passing.wear.pairs, *self._depths(pressure))
+        punch, strip = (
+            np.where(own > 0, 1 - compressed(pressure, soft.modulus), 1.0)
+            for own, soft in zip(left, layers.soft, strict=True)
+        )
+        return punch, strip
+
+    def _covered(self, pressure: Array) -> Array:
+        """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
+        passing, found = self.passing, np.zeros_like(pressure)
+        if passing.layers.lies_here:
+            found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
+        if not self._fills:
+            return found
+        filled = passing.filled(pressure, self.before, self.cycles)
+        size = NUDGE * max(float(np.abs(pressure).max()), 1e-300)
+        for k in range(len(pressure)):
+            more = pressure.copy()
+            more[k] += size
+            found[k, :] += self._length * (passing.filled(more, self.before, self.cycles) - filled) / size
+        return found
+
+    @property
+    def _fills(self) -> bool:
+        """Whether states of laws fill a part of the gap."""
+        return self.passing.evolution is not None and self.passing.layers.memory.filling

@@ -1,0 +1,555 @@
+"""Coulomb's law with stick, as a law of contact: its bodies, its steps over half-cycles and over many cycles.
+
+A half-cycle goes in time steps (`cycle`), on the shape at its start; its wear is taken off at its end. A jump over many
+cycles is that of `jump`. The state of a run has a `Memory`: values that a time step needs of the step before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from zlib import crc32
+
+import numpy as np
+
+from fenwear.bodies.surface_operators import SurfaceOperator
+from fenwear.case import Case
+from fenwear.common.arrays import Array, Mask
+from fenwear.common.errors import CaseError, ConvergenceError, InputError
+from fenwear.contact import ContactState
+from fenwear.heat.temperature import HeatState
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord
+from fenwear.steps.driver import Loading, Watch
+from fenwear.steps.gross_sliding import LAW as SLIDING
+from fenwear.steps.run_state import RunState
+from fenwear.steps.run_totals import SUMS, Totals, approach, with_worn
+from fenwear.steps.stick_cycle import PartialSlipProblem, on_other_grid
+from fenwear.steps.stick_final import FinalShape, final_shape
+from fenwear.steps.stick_interface import StickInterface, meshed
+from fenwear.steps.stick_jump import first_cycle, jumped
+from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords
+from fenwear.steps.stick_setup import (
+    Ends,
+    Fineness,
+    fine_enough,
+    heated,
+    placed_by_slip,
+    same_steps,
+    touches,
+    unheated_problem,
+    with_ends,
+)
+from fenwear.steps.stick_state import NO_HEAT, PartialSlipState
+from fenwear.surfaces.motion import Motion, make_motion
+from fenwear.system import (
+    Bodies,
+    ContactLaw,
+    Preparation,
+    Tribosystem,
+    at_rim,
+    build_conduction,
+    carried,
+    joined,
+    node_maps,
+    on_nodes,
+    place_at_rest,
+    with_what_grows,
+)
+from fenwear.system.tribosystem import Condensed
+
+ROUNDING = 1e-9  # of a half-cycle: times that are the same
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Memory of a run besides depths and temperatures.
+
+    Attributes:
+        at: Where the time steps are; its depths and temperature are those of the run.
+        cycle: The last one, on the shape of the run, from which jumps continue; None where there is none.
+        warm: Temperatures at the end of that cycle, where there is one with heat; else none.
+        stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
+        made_of: Identity of the bodies and loads that the cycle belongs to.
+    """
+
+    at: PartialSlipState
+    cycle: FrettingCycle | None = None
+    warm: tuple[HeatState, ...] = ()
+    stuck: Array | None = None
+    made_of: float = 0.0
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The time steps of a half-cycle.
+
+    Attributes:
+        records: k of them.
+        before: Their pressures a cycle ago (k, n), MPa; NaN where there was none.
+        stuck: Which nodes stick all through the cycle that ends with them (n,).
+        energy_ratio: Friction's work over twice the largest force times the stroke.
+        jump_error: Estimated error of the jump that they end; 0 without.
+        first: Number of the first one in the cycle.
+        wear: Depths worn off both bodies in all of them.
+    """
+
+    records: TimeStepRecords
+    before: Array
+    stuck: Mask
+    energy_ratio: float
+    jump_error: float
+    first: int
+    wear: WornDepths
+
+    @property
+    def pressure(self) -> Array:
+        """At the end of each step (k, n), MPa."""
+        return self.records.pressure
+
+    @property
+    def gap(self) -> Array:
+        """At the end of each step (k, n), mm."""
+        return self.records.gap
+
+
+@dataclass(frozen=True)
+class StickSetup:
+    """Parts of a system that belong to the law.
+
+    Attributes:
+        problem: The bodies, and what is done to them in a cycle.
+        fineness: Of its time steps; None where they are taken as they are given.
+        made_of: Identity of these bodies and loads: it differs on other meshes, with other properties or in another
+            stage of a program.
+        ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
+        prepared: Whether heat is, and its time steps are fine enough, where they are to be.
+    """
+
+    problem: PartialSlipProblem
+    fineness: Fineness | None
+    made_of: float
+    ends: Ends | None = None
+    prepared: bool = True
+
+
+class Coulomb:
+    """The law: nodes stick, or slip against their friction."""
+
+    name = "coulomb"
+    sticks = True
+    memory: type | None = Memory
+
+    def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
+        """Return the system of a case whose bodies are built; collective."""
+        if bodies.punch.reach is not None:  # its grid begins around the first contact, pressed alone
+            bodies = SLIDING.of_bodies(case, bodies, heat="none", fresh=fresh).bodies
+        return system_of(case, bodies, law=self.name, heat=heat, fresh=fresh)
+
+    def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
+        """Return the system of the same case with the meshes or properties that these bodies have; collective."""
+        same = bodies.punch is system.bodies.punch
+        condensed = (system.condensed.punch, system.condensed.strip) if same else None
+        heat: Preparation = "as set" if system.law_state.prepared else "none"
+        ends = system.law_state.ends
+        return system_of(system.case, bodies, law=self.name, heat=heat, condensed=condensed, ends=ends)
+
+    def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
+        """Return the system of another case that shares the bodies that the change leaves; collective."""
+        before = system.case
+        bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
+        if before.loading != case.loading:
+            bodies = bodies.under(case)
+            condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
+        held, asked = ((one.heat, one.punch.boundary_of_heat, one.strip.boundary_of_heat) for one in (before, case))
+        if held != asked:
+            bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
+        moves = unheated_problem(case, bodies, condensed=condensed).interface.moves
+        same = condensed if moves == system.condensed.strip_moves else None
+        ends = system.law_state.ends if same_steps(before, case) else None
+        return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
+
+    def replicated(self, system: Tribosystem) -> bool:
+        """Return whether every rank could continue alone."""
+        return system.exchange.reduced
+
+    def elastic_length(self, system: Tribosystem) -> float:
+        """Return the gap that unit pressures open on average, mm/MPa."""
+        return float(system.law_state.problem.interface.middle.elastic_length)
+
+    def check_touching(self, system: Tribosystem) -> None:
+        """Make sure that the load brings the surfaces together; collective.
+
+        Raises:
+            CaseError: it does not.
+        """
+        if not touches(system.law_state.problem):
+            raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
+
+    def end(self, system: Tribosystem, properties_within: float | None = None) -> FinalShape:  # noqa: ARG002
+        """Return the shape to which partial slip wears, of the grid that its scar has grown to; collective.
+
+        Raises:
+            ConvergenceError: there is none, or none that does not depend on the way there.
+        """
+        if any(law.pressure_threshold > 0 for law in system.sliding.wear):
+            raise ConvergenceError(
+                "no one final shape exists with a pressure_threshold: slipping nodes keep any pressure below it, as "
+                "the way there has left it. Follow the wear by `run`"
+            )
+        system, found = with_what_grows(
+            system,
+            lambda own: final_shape(own.law_state.problem),
+            lambda found: np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)),
+        )
+        return replace(found, system=system)
+
+    def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
+        """Return what a run remembers on another contact grid; collective. Jumps continue from a cycle made there."""
+        (nodes, _), stuck = node_maps(before, after), memory.stuck
+        problems = before.law_state.problem, after.law_state.problem
+        worn = carried(memory.at.worn, before, after)
+        at = problems[1].led(partial(on_other_grid, memory.at, *problems, nodes, worn))
+        stuck = None if stuck is None else on_nodes(stuck, nodes, np.zeros(len(nodes)))
+        return Memory(at, stuck=stuck, made_of=memory.made_of)
+
+    def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
+        """Return the step of one half-cycle; implicitly, of one cycle."""
+        return (Cycles if implicit else HalfCycles)(system, watch, loading)
+
+    def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
+        """Return the step of many cycles."""
+        return Jumps(system, tolerance, watch, loading)
+
+
+LAW: ContactLaw = Coulomb()
+
+
+def system_of(
+    case: Case,
+    bodies: Bodies,
+    *,
+    law: str,
+    heat: Preparation = "as set",
+    fresh: bool = False,
+    condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
+    ends: Ends | None = None,
+) -> Tribosystem:
+    """Return the system of bodies that are built; collective.
+
+    Args:
+        case: With contact.law = "coulomb", or that of another law that resolves slip.
+        bodies: Of it.
+        law: By its name.
+        heat: Whether heat is prepared, and the time steps are halved until they are fine enough: "none" for neither.
+        fresh: Condense the bodies again, even where they are kept on disk.
+        condensed: Both, where they are condensed already.
+        ends: Where time steps end, in place of those that are fine enough.
+
+    Raises:
+        CaseError: a property of the geometry is wrong.
+        ConvergenceError: a time step of the first cycle did not converge.
+    """
+    problem = placed_by_slip(case, bodies, fresh=fresh, condensed=condensed)
+    interface, fineness = meshed(problem.interface), None
+    sliding = replace(interface.sliding, motion=_motion_at_rest(interface, case))
+    placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case, passes=interface.moves)
+    system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
+    if ends is not None:
+        problem = with_ends(problem, case, ends)
+    elif heat != "none":
+        problem = heated(problem, case)
+        if touches(problem):
+            problem, fineness = fine_enough(problem, case)
+            ends = fineness.ends
+    exchange = system.exchange if problem.heat is None else problem.heat.exchange
+    setup = StickSetup(problem, fineness, _told_apart(case, bodies), ends, heat != "none")
+    return replace(system, exchange=exchange, law_state=setup)
+
+
+def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
+    """Return the motion with a phase for each half-cycle."""
+    sliding, pair = interface.sliding, interface.middle.pair
+    if not sliding.motion.steps:
+        return make_motion(case.motion.model_copy(update={"positions": 1}))
+    rate = pair.weights @ sliding.field.rate(pair.opposite, pair.normal) / pair.weights.sum()
+    return sliding.measured_on(pair).motion.as_one(sliding.field.over(float(rate)))
+
+
+def _told_apart(case: Case, bodies: Bodies) -> float:
+    """Return a number of the wear that the meshes follow, the warmth of properties and what is done; collective."""
+    worn = 0.0 if bodies.followed is None else float(bodies.followed.punch.sum() + bodies.followed.strip.sum())
+    warm = 0.0 if bodies.warmed is None else float(sum(one.sum() for one in bodies.warmed))
+    done = case.motion, case.stick, case.contact, case.wear, case.heat, case.loading
+    return float(crc32(repr((worn, bodies.comm.allreduce(warm), done)).encode()))
+
+
+class _Run:
+    """Common part of steps over half-cycles and over many cycles."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
+        setup: StickSetup = system.law_state
+        self.system, self.setup, self.loading = system, setup, loading
+        self.problem = setup.problem.watching(watch)
+        self.strokes = system.motion.half_cycles
+        self.meter = Meter(system, self.problem)
+
+    def temperature(self, state: RunState) -> Array:
+        """Return the temperatures of a state on this system's bases (dim,)."""
+        exchange = self.system.exchange
+        return exchange.own(state.temperature).values
+
+    def at(self, state: RunState, load: float) -> PartialSlipState:
+        """Return where the time steps of a state are, with its own depths and temperatures."""
+        memory: Memory | None = state.memory
+        warm = self.temperature(state)
+        if memory is None:
+            at = self.problem.beginning(state.worn, load)
+            return replace(at, temperature=warm)
+        at, steps = memory.at, self.problem.program.steps
+        if len(at.pressures) != len(steps):
+            at = self.problem.forgotten(at)
+        at = replace(self.problem.shaped(at, state.worn), load=load, temperature=warm)
+        while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
+            at, _ = self.problem.half_cycle(at)
+        worn = self.problem.interface.layers.flown_as(state.worn, at.worn)
+        return replace(self.problem.shaped(at, worn), temperature=warm, slid=memory.at.slid)
+
+    def half_cycle(
+        self,
+        number: int,
+        steps: Steps,
+        states: tuple[WornDepths, Totals],
+        adds: Totals,
+        load: float,
+    ) -> HalfCycle:
+        """Return the record of a half-cycle.
+
+        Args:
+            number: Its own.
+            steps: Its time steps.
+            states: Depths and totals at its end.
+            adds: Its additions to the totals.
+            load: Factor of all loads.
+        """
+        records, stroke = steps.records, (number - 1) % self.strokes
+        middle = self.middle(steps)
+        contact = _contact(records, middle)
+        problem, step = self.problem, self.problem.program.steps[steps.first + middle]
+        position = problem.interface.position(step.offset)
+        pressed = records.pressure[middle] > 0
+        f = np.concatenate([records.pressure[middle], records.traction[middle].T.ravel()])
+        force = position.in_space(f) - records.pressure[middle][:, None] * position.pair.normal
+        ratio = np.where(pressed[:, None], force, 0.0) / np.where(pressed, records.pressure[middle], 1.0)[:, None]
+        loaded = problem.interface.loaded(step.fraction)
+        equilibrium = replace(position.rigid, resultant=loaded.resultant)
+        phase = PhaseRecord(stroke, contact, steps.before[middle], adds, ratio, equilibrium)
+        heat = None
+        if problem.heat is not None:
+            punch, strip = records.temperature[-1]
+            heat = HalfCycleHeat(punch, strip, records.heat.sum(axis=0), int(records.coupling.max()))
+        return HalfCycle(number, [phase], states[0], states[1], heat, load, steps)
+
+    def middle(self, steps: Steps) -> int:
+        """Return the time step of a half-cycle that ends nearest to its middle, the earlier of two, whatever rounds."""
+        ends = np.cumsum(steps.records.duration)
+        away = np.abs(ends / ends[-1] - 0.5)
+        return int(np.argmax(away <= away.min() + ROUNDING))
+
+
+class HalfCycles(_Run):
+    """Steps of one half-cycle; its wear is taken off at its end."""
+
+    def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next half-cycle, and its record."""
+        problem, load = self.problem, self.loading(state.half_cycle + 0.5)
+        begin = self.at(state, load)
+        at, records = problem.half_cycle(begin)
+        first, number = begin.next_step, state.half_cycle + 1
+        own = slice(first, first + len(records))
+        before = begin.pressures[own]
+        lost = problem.losses.worn_in(records, first, begin)
+        worn = replace(begin.worn + lost, crept=at.contact.crept)
+        adds = self.meter(records, first, lost)
+        totals = state.totals + adds
+        stroke, n = state.half_cycle % self.strokes, len(problem.weights)
+        stuck = _known_stuck(state.memory, self.strokes, n)
+        stuck[stroke] = records.stuck
+        ratio = _energy_ratio(records, problem.weights)
+        steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, 0.0, first, lost)
+        record = self.half_cycle(number, steps, (worn, totals), adds, load)
+        contacts = list(state.contacts)
+        contacts[stroke] = record.phases[0].contact
+        warm = self.system.exchange.at(at.temperature) if self.system.exchange.conducts else None
+        memory = Memory(
+            replace(at, worn=worn, held=None, temperature=NO_HEAT),
+            stuck=stuck.astype(float),
+            made_of=self.setup.made_of,
+        )
+        return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
+
+
+class Cycles(HalfCycles):
+    """Steps of one cycle whose wear is implicit, that of a jump over it; what is left of a cycle goes explicitly."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
+        super().__init__(system, watch, loading)
+        self._jumps = Jumps(system, np.inf, watch, loading)
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next cycle, and the record of its half-cycles."""
+        if state.half_cycle % self.strokes or until < state.half_cycle + self.strokes:
+            return super().__call__(state, until)
+        after, records = self._jumps(replace(state, jump_length=1), until)
+        return replace(after, jump_length=1), records
+
+
+class Jumps(_Run):
+    """Steps of as many cycles as the tolerance allows."""
+
+    def __init__(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> None:
+        super().__init__(system, watch, loading)
+        self.tolerance = tolerance
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next jump that is accurate enough, and its last cycle."""
+        problem, strokes, exchange = self.problem, self.strokes, self.system.exchange
+        now = self._cycle(state)
+        begun = None if state.finer is None else state.finer.worn
+        begin = replace(now, length=state.jump_length, finer=begun)
+        then = jumped(problem, begin, until // strokes, self.tolerance, self._load, self._fits)
+        cycles, number = then.number - now.number, round(then.number) * strokes
+        totals = state.totals + self._adds(now, then, cycles)
+        parts, old = _in_order(problem, then), _in_order(problem, now)
+        stuck = np.array([part[1].stuck for part in parts])
+        at_all = np.asarray(stuck.all(axis=0))
+        made, contacts = [], []
+        depths, sums = [then.worn], [totals]
+        ended = replace(then.end, worn=then.worn, held=None)
+        lost = [problem.losses.worn_in(records, first, ended) for first, records in parts]
+        adds = [self.meter(records, first, own) for (first, records), own in zip(parts, lost, strict=True)]
+        for k in reversed(range(1, strokes)):
+            depths.insert(0, depths[0] - lost[k])
+            sums.insert(0, sums[0] - adds[k])
+        for k, ((first, records), (_, earlier)) in enumerate(zip(parts, old, strict=True)):
+            before = records.pressure - (records.pressure - earlier.pressure) / cycles
+            steps = Steps(records, before, at_all, _energy_ratio(records, problem.weights), then.error, first, lost[k])
+            record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
+            contacts.append(record.phases[0].contact)
+            made.append(record)
+        warm = state.temperature
+        after: tuple[HeatState, ...] = ()
+        if exchange.conducts:
+            warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
+        kept = replace(then, end=replace(then.end, temperature=NO_HEAT), warm=NO_HEAT, finer=None)
+        memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.made_of)
+        done = RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory)
+        return (done if then.finer is None else replace(done, finer=self._finer(done, then, until))), made
+
+    def _finer(self, done: RunState, then: FrettingCycle, until: int) -> RunState:
+        """Return the state on the depths to which shorter jumps would have led; at the end with the cycle on them."""
+        assert then.finer is not None
+        off = self.meter.with_wear(done.totals.times(0.0), then.worn - then.finer)
+        memory: Memory | None = done.memory
+        if done.half_cycle == until and memory is not None:
+            cycle = first_cycle(self.problem, then.end, then.finer, then.number, then.warm)
+            memory = replace(memory, cycle=replace(cycle, warm=NO_HEAT, end=replace(cycle.end, temperature=NO_HEAT)))
+        return replace(done, worn=then.finer, totals=done.totals - off, memory=memory)
+
+    def _fits(self, cycle: FrettingCycle) -> bool:
+        """Return whether the contact has room on its grid: it grows before its rim is reached."""
+        return not at_rim(self.system, (cycle.worn.punch > 0) | cycle.records.touched)
+
+    def _load(self, cycles: float) -> float:
+        """Return the factor of all loads after so many cycles."""
+        return self.loading(cycles * self.strokes)
+
+    def _cycle(self, state: RunState) -> FrettingCycle:
+        """Return the cycle on the shape of a state: a new one where a stage of a program begins, or meshes are new."""
+        memory, exchange = state.memory, self.system.exchange
+        number = state.half_cycle // self.strokes
+        cycle: FrettingCycle | None = None if memory is None else memory.cycle
+        load = self._load(number)
+        if cycle is None or memory is None or memory.made_of != self.setup.made_of or cycle.end.load != load:
+            return first_cycle(self.problem, self.at(state, load), state.worn, number, self.temperature(state))
+        if not exchange.conducts:
+            return cycle
+        (after,) = memory.warm
+        end = replace(cycle.end, temperature=exchange.own(after).values)
+        return replace(cycle, end=end, warm=self.temperature(state))
+
+    def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: float) -> Totals:
+        """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
+        adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
+        found = (adds[0] + adds[1]).times(cycles / 2)
+        return self.meter.with_wear(found, then.worn - now.worn)
+
+
+def _contact(records: TimeStepRecords, step: int) -> ContactState:
+    own = slice(step, step + 1)
+    return ContactState(records.pressure[own], records.gap[own], records.rigid[own], int(records.iterations[step]))
+
+
+def _known_stuck(memory: Memory | None, strokes: int, nodes: int) -> Mask:
+    """Return which nodes stuck in each half-cycle before (strokes, n): all where nothing is known."""
+    if memory is None or memory.stuck is None:
+        return np.ones((strokes, nodes), dtype=bool)
+    return memory.stuck > 0
+
+
+def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
+    """Return friction's work of a half-cycle over twice its largest force times half the stroke."""
+    stroke, most = float(np.ptp(records.displacement)), float(np.abs(records.force).max())
+    return records.energy(weights) / max(most * stroke, 1e-300)
+
+
+def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[int, TimeStepRecords]]:
+    """Return the first steps and the records of a cycle's half-cycles in the order of the motion."""
+    steps, first, found = problem.program.steps, cycle.first_step, []
+    for records in cycle.half_cycles:
+        found.append((first, records))
+        first = (first + len(records)) % len(steps)
+    return sorted(found, key=lambda one: one[0])
+
+
+class Meter:
+    """Additions of time steps to the totals: see `fenwear.steps.run_totals`.
+
+    Args:
+        system: The bodies.
+        problem: Their loads.
+    """
+
+    def __init__(self, system: Tribosystem, problem: PartialSlipProblem) -> None:
+        self.system, self.problem = system, problem
+        self.thickness = system.bodies.punch.thickness
+
+    def __call__(self, records: TimeStepRecords, first: int, worn: WornDepths) -> Totals:
+        """Return what time steps add, the first of them that of this number in the cycle, which wear these depths."""
+        problem, thick = self.problem, self.thickness
+        slid, pressure = records.slip_magnitude, records.pressure
+        forces = pressure @ problem.weights
+        carried = np.where(forces > 0, forces, 1.0)
+        distance = (pressure * slid) @ problem.weights / carried
+        sums = dict.fromkeys(SUMS, 0.0)
+        sums["distance"] = float(distance.sum())
+        sums["load_path"] = thick * float(((pressure * slid) @ problem.weights).sum())
+        program = problem.program.steps
+        steps = [program[(first + k) % len(program)] for k in range(len(distance))]
+        for k, (step, way) in enumerate(zip(steps, distance, strict=True)):
+            position = problem.interface.position(step.offset)
+            f = np.concatenate([pressure[k], records.traction[k].T.ravel()])
+            force = thick * position.in_space(f * position.weights)
+            normal = thick * (pressure[k] * position.pair.weights)[:, None] * position.pair.normal
+            sums["load_distance"] += float((force * approach(position.rigid)).sum()) * float(way)
+            sums["drag_distance"] += float(np.linalg.norm((force - normal).sum(axis=0))) * float(way)
+        sums["work"] = thick * records.energy(problem.weights)
+        energy = records.dissipated.sum(axis=0)
+        of = np.array([step.half_cycle for step in steps])
+        share = records.duration / np.bincount(of, records.duration)[of]  # of its half-cycle: there may be several
+        found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
+        return self.with_wear(found, worn)
+
+    def with_wear(self, totals: Totals, worn: WornDepths) -> Totals:
+        """Return the totals with the volumes and masses of these depths."""
+        return with_worn(self.system, totals, worn)

@@ -1,0 +1,371 @@
+"""The implicit step of cycle jumps.
+
+A cycle takes the state y, the worn depths and the temperatures, to y + F(y). Let y(n) be smooth and meet
+the states of a march at whole numbers n of cycles: y(n + 1/2) changes by F(y(n)), so that to second order
+
+    dy/dn = f(y) = F(y - f(y) / 2):
+
+the cycle with the middle y begins half a cycle's change before it. (`jump_method`).
+A stage solves contact, wear and heat together: all phases of a cycle stand in one inequality
+with the wear of h = g N cycles at their own pressures,
+
+    gap_k = S_k p_k + H a_k + g_k + w_n + h beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
+
+and, with heat, the thermal gap at the end of each phase, which is linear in the same pressures. Its
+cycle begins at h - 1/2 cycles. Friction, wear and conductance are those of the stage itself: the
+pressure of each phase, and the temperature at its start. All phases meet the shape in the middle of the
+cycle, where those of a march come one after the other: they differ by the wear of half a cycle, as an
+explicit march does from an implicit one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+
+import numpy as np
+
+from fenwear.common.arrays import Array
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.heat.temperature import HeatState
+from fenwear.laws import Evolution
+from fenwear.laws.friction import ContactConditions
+from fenwear.laws.wear import NOTHING, PhasesWear, WornDepths
+from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord, heat_of_phases
+from fenwear.steps.coupled_phases import Coupled, DepthEvolution, check_cycle_memory
+from fenwear.steps.driver import Loading, Watch, as_given, unwatched
+from fenwear.steps.jump_method import HALVES, Attempt, Estimate, JumpLaw, Moment, Sizes, attempt
+from fenwear.steps.run_state import RunState, all_phases, beginning, parted
+from fenwear.steps.run_totals import PhaseMeter, Totals, with_coated
+from fenwear.system import CreepStage, Tribosystem, with_reduced_heat
+
+LOOSEST = 5e-3  # tolerance that contacts are solved to: of a rough run, too, they are told to fulfil their conditions
+
+
+@dataclass(frozen=True)
+class _Rate:
+    """Changes of temperature (dim,), depths and totals over the cycle of a solved stage.
+
+    Its conductances (m, n) are those by which it is heated. Wear through coatings depends on the begin and the length
+    of a step: `wear` is that of its phases.
+    """
+
+    heated: Array
+    worn: WornDepths
+    adds: Totals
+    conductances: Array
+    wear: PhasesWear
+
+
+@dataclass(frozen=True)
+class _Moment(Moment):
+    """Depths, temperatures (dim,) and totals, and of the stage that they are the end of, its rate."""
+
+    temperature: Array
+    totals: Totals
+    rate: _Rate | None = None
+
+
+class Stepper(JumpLaw[_Moment]):
+    """Implicit steps of any number of cycles."""
+
+    def __init__(
+        self, system: Tribosystem, tolerance: float, watch: Watch = unwatched, loading: Loading = as_given
+    ) -> None:
+        self.system = system = with_reduced_heat(system)
+        check_cycle_memory(system)
+        self.tolerance, self.watch, self.loading = tolerance, watch, loading
+        self._sizes = Sizes(system.layers, system.pair, system.creep.depth)
+        self.contact = system.phase_contact(range(len(system.motion.phases)))
+        self.ratios = system.friction_ratios()
+        self.wear = system.phases_wear
+        self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]
+        self.evolution = system.evolution(self.conditions)
+        self._measure([system.friction.values(one) for one in self.conditions])
+        self.coupled = Coupled(system, self.take)
+        self._flowed: Array | float = 0.0  # beyond the hardness, in the stage solved last
+        self._begin: RunState = beginning(system)  # of the jump
+        self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
+        self._last_cycle: list[HalfCycle] = []
+        follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
+        follows = follows or bool(system.layers.memory.names)
+        self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
+        by_friction = any(law.beta or law.energy for law in system.sliding.wear)
+        self._wear_follows = follows or (self._follows and by_friction)
+
+    def attempt(self, state: RunState, cycles: int) -> tuple[Attempt[_Moment], Estimate, list[HalfCycle]]:
+        """Return a jump, an estimate of its error, and the last cycle.
+
+        Raises:
+            ConvergenceError: it did not converge.
+        """
+        self._begin = state
+        made = attempt(self, self._moment(state), cycles)
+        return made, self._estimate(made), self._last_cycle
+
+    def state(self, moment: _Moment, half_cycle: int) -> RunState:
+        """Return the state of a run at a moment."""
+        contacts = parted(moment.contact)
+        return RunState(half_cycle, moment.worn, contacts, self._temperature(moment.temperature), moment.totals)
+
+    def finer(self, made: Attempt[_Moment] | None, end: RunState) -> RunState:
+        """Return where jumps of next to no length lead, from where they had led before the last attempt.
+
+        Args:
+            made: The attempt; None where it was marched, so that there is no estimate of it.
+            end: Its end.
+        """
+        fine = self._begin.finer
+        assert fine is not None
+        before = self._moment(fine)
+        if made is None:
+            moment = self.apart(self._moment(end), before, self._moment(self._begin), 1.0)
+        else:
+            moment = made.finer(self, made.begin if fine.worn is self._begin.worn else before)
+        return self.state(moment, end.half_cycle)
+
+    def apart(self, base: _Moment, one: _Moment, other: _Moment, share: float) -> _Moment:
+        """Return a moment, and a share of the difference of two others."""
+        contact = base.contact
+        if len(contact.pressure) and len(one.contact.pressure) and len(other.contact.pressure):
+            pressure = contact.pressure + share * (one.contact.pressure - other.contact.pressure)
+            rigid = contact.rigid + share * (one.contact.rigid - other.contact.rigid)
+            contact = replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
+        return _Moment(
+            self.system.layers.settled(base.worn + (one.worn - other.worn).times(share)),
+            contact,
+            base.time,
+            base.temperature + share * (one.temperature - other.temperature),
+            base.totals + (one.totals - other.totals).times(share),
+        )
+
+    def _estimate(self, made: Attempt[_Moment]) -> Estimate:
+        """Return the error of a jump."""
+        worn, wrong = (made.begin.worn, made.end.worn), (made.whole.worn - made.end.worn).times(HALVES)
+        estimate = self._sizes.estimate(worn, made, [wrong], HALVES * self._heat_difference(made))
+        missed = self._missed(made) if self._wear_follows else 0.0
+        return replace(estimate, depth=max(estimate.depth, self._through_difference(made), missed))
+
+    def _through_difference(self, made: Attempt[_Moment]) -> float:
+        """Return the largest difference of depths where coatings end, over the largest that the jump wears.
+
+        Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
+        """
+        found = 0.0
+        for body, thickness in zip(("punch", "strip"), self.system.coatings, strict=True):
+            first, one, other = (getattr(moment.worn, body) for moment in (made.begin, made.whole, made.end))
+            ended = (first < thickness) & (np.maximum(one, other) >= thickness)
+            apart = float(np.abs(one - other).max(where=ended, initial=0.0))
+            found = max(found, apart / max(float((other - first).max()), 1e-300))
+        return found
+
+    def _heat_difference(self, made: Attempt[_Moment]) -> float:
+        """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
+        exchange = self.system.exchange
+        states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.own(None))
+        first, second, initial = (np.array(exchange.contact_temperatures(state)) for state in states)
+        weights = self.system.pair.weights
+        apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
+        return apart / max(rise, 1e-300)
+
+    def _missed(self, made: Attempt[_Moment]) -> float:
+        """Return the error of what a jump wears where coefficients change with depth or distance, relative.
+
+        Its stages do not look at its begin: a coating that is worn through before the first of them would be missed.
+        Simpson's rule on the wear of a cycle at the begin, in the middle and at the end does, and is of higher order.
+        """
+        if not len(made.begin.contact.pressure):
+            return 0.0
+        done, strokes = self._begin.half_cycle, self.system.motion.half_cycles
+        begin, middle, end = (
+            self._rate(one, done + share * made.cycles * strokes)
+            for one, share in ((made.begin, 0.0), (made.half, 0.5), (made.end, 1.0))
+        )
+        simpson = (begin + middle.times(4.0) + end).times(made.cycles / 6)
+        worn = replace(made.end.worn - made.begin.worn, between=NOTHING, carried=NOTHING)
+        return self._sizes.area(simpson - worn) / max(self._sizes.area(worn), 1e-300)
+
+    def _rate(self, state: _Moment, half_cycles: float) -> WornDepths:
+        """Return what a cycle wears at the depths, temperatures and pressures of a moment."""
+        system, exchange = self.system, self.coupled.heat.exchange
+        pressures = state.contact.pressure
+        shear = system.ways.shear(pressures)
+        surfaces = exchange.contact_temperatures(exchange.at(state.temperature))
+        conditions: Sequence[ContactConditions] = [
+            system.conditions(k, pressures[k], surfaces, state.worn, half_cycles, shear) for k in range(len(pressures))
+        ]
+        evolution = system.evolution(conditions, state.worn)
+        conditions = evolution.around(system.layers.held(state.worn))
+        return system.wear.phases(conditions).begun(state.worn).worn(pressures)
+
+    def _solve_to(self, share: float) -> None:
+        """Solve contact to a share of the tolerance, where its digits cost; fully beyond a hardness, as flow stays."""
+        if isinstance(self.contact, CondensedContact) and self.system.layers.hardness == np.inf:
+            self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
+
+    def _moment(self, state: RunState) -> _Moment:
+        temperature = self.coupled.heat.exchange.own(state.temperature).values
+        return _Moment(state.worn, all_phases(state.contacts), 0.0, temperature, state.totals)
+
+    def _temperature(self, values: Array) -> HeatState | None:
+        """Return the temperatures of coordinates (dim,); None of none."""
+        return self.coupled.heat.exchange.at(values) if len(values) else None
+
+    def settled(self, end: _Moment) -> _Moment:
+        """Return the end of a step, which may have overshot."""
+        return replace(end, worn=self.system.layers.settled(end.worn))
+
+    def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
+        """Return the moment so many cycles as that of a stage later."""
+        rate, contact = stage.rate, stage.contact
+        assert rate is not None
+        lost, adds = rate.worn.times(cycles), rate.adds.times(cycles)
+        if rate.wear.coated:
+            own = rate.wear.begun(before.worn, cycles).worn(contact.pressure).times(cycles)
+            lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
+        temperature = before.temperature + cycles * rate.heated
+        return _Moment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
+
+    def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
+        """Return how depths follow in a stage where coefficients depend on them."""
+        if not self._follows:
+            return None
+        return DepthEvolution(worn, cycles, partial(self._wear, worn, cycles), self._done)
+
+    def _wear(self, before: WornDepths, cycles: float, pressure: Array) -> WornDepths:
+        return self.wear.begun(before, cycles).worn(pressure)  # as last taken
+
+    def _press(self, cycles: float) -> None:
+        """Take the time and the loads so many cycles after the begin of the jump."""
+        self._done = self._begin.half_cycle + cycles * self.system.motion.half_cycles
+        if self.loading is not as_given:
+            self._load = self.loading(self._done)
+            self.contact.press(self._load)
+
+    def stage(self, before: _Moment, cycles: float, time: float, near: ContactState, digits: float) -> _Moment:
+        """Return the moment `cycles` cycles later, by the cycle whose middle it is.
+
+        Plastic flow is no rate: all of it is there after as many cycles.
+        """
+        self._solve_to(digits)
+        self._press(time)
+        gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
+        if not len(near.pressure):  # the first of all: what conducts is seen from the contact without heat
+            near = self._solve(gap, self._of_first_phase(gap), (before.worn, cycles))
+        solved = self.coupled.solve(
+            before.temperature,
+            cycles - 0.5,
+            near,
+            lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
+            self._passing(before.worn, cycles),
+            lagged=True,
+        )
+        contact, begin = solved.contact, solved.temperature
+        heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
+        adds = reduce(Totals.__add__, self._adds(contact.pressure))
+        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
+        worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed * (1 / cycles))
+        worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
+        rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
+        return self.after(before, _Moment(worn, contact, time, begin, before.totals, rate), cycles)
+
+    def _of_first_phase(self, gap: Array) -> ContactState | None:
+        """Return the contact of the first phase alone, in every phase; None where all are found by factors at once.
+
+        Products cost as many times as much as there are phases, and sets of nodes are many from nothing.
+        """
+        if len(gap) == 1 or not (isinstance(self.contact, CondensedContact) and self.contact.gridded):
+            return None
+        alone = self.system.phase_contact([0])
+        alone.press(self._load)
+        first = alone.solve(gap[0])
+        pressure, open_, rigid = (np.repeat(own, len(gap), axis=0) for own in (first.pressure, first.gap, first.rigid))
+        return ContactState(pressure, open_, rigid, first.iterations)
+
+    def _solve(
+        self, gap: Array, start: ContactState | None, begin: tuple[WornDepths, float], coupling: Array | None = None
+    ) -> ContactState:
+        """Return contact of a stage from the depths before it, so many cycles on."""
+        self.watch()
+        worn, cycles = begin
+        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
+        step, near = passing.step(worn, cycles), start
+        gap, coupling = self._creep(worn, cycles).opening(gap, coupling)
+
+        def solve(flowed: Array) -> ContactState:
+            nonlocal near
+            near = self.contact.solve(gap + flowed, near, step, coupling)
+            return near
+
+        found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
+        return found
+
+    def _creep(self, worn: WornDepths, cycles: float) -> CreepStage:
+        """Return what creeps in a stage."""
+        return self.system.creep.stage(worn.crept, cycles, self.ratios, self._load)
+
+    def take(self, conditions: Sequence[ContactConditions], evolution: Evolution) -> None:
+        """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
+        system = self.system
+        self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
+        self._measure([system.friction.values(state) for state in conditions])
+        if system.friction.constant:
+            return
+        self.ratios = system.friction_ratios(conditions)
+        self.contact.slide(self.ratios)
+
+    def _measure(self, friction: Sequence[Array]) -> None:
+        self.meters = [PhaseMeter(self.system, k, mu, self.wear.some([k])) for k, mu in enumerate(friction)]
+
+    def _adds(self, pressure: Array) -> list[Totals]:
+        """Return what each phase of a cycle adds at its pressure (m, n)."""
+        return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
+
+    def ended(self, end: _Moment, cycles: float) -> None:
+        """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""
+        motion, found = self.system.motion, []
+        reached = self._begin.half_cycle + round(cycles) * motion.half_cycles
+        contacts, pressure = parted(end.contact), end.contact.pressure
+        before = np.concatenate([contact.pressure for contact in self._begin.contacts])
+        earlier = pressure - (pressure - before) / cycles  # in the cycle before
+        heats = self._last_cycle_heat(end)
+        # Half-cycles after one have worn what is missing at its end.
+        depths, totals = [end.worn], [end.totals]
+        adds, phases = self._adds(pressure), list(range(len(contacts)))
+        if self.wear.coated:
+            own_worn = [self._worn([k], contacts, end.worn) for k in phases]
+            adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
+        for stroke in reversed(range(1, motion.half_cycles)):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            depths.insert(0, depths[0] - self._worn(own, contacts, depths[0]))
+            totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
+        for stroke, depth in enumerate(depths):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            records = [PhaseRecord(k, contacts[k], earlier[k], adds[k], self.ratios[k]) for k in own]
+            number = reached - (motion.half_cycles - 1 - stroke)
+            heat = heat_of_phases(heats[k] for k in own)
+            load = self.loading(reached)
+            found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
+        self._last_cycle = found
+
+    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
+        pressures = np.concatenate([contacts[k].pressure for k in phases])
+        conditions = [self.conditions[k] for k in phases]
+        passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
+        return passing.worn(pressures, now)
+
+    def _last_cycle_heat(self, end: _Moment) -> list[HalfCycleHeat | None]:
+        """Return the heat of the cycle that ends a jump."""
+        assert end.rate is not None
+        if not self.coupled.heat.dim:
+            return [None] * len(end.contact.pressure)
+        heats: list[HalfCycleHeat | None] = []
+        exchange = self.coupled.heat.exchange
+        temperature = exchange.at(end.temperature - end.rate.heated)
+        for phase, pressure in enumerate(end.contact.pressure):
+            heated, conductance = self.coupled.mu[phase] * pressure, end.rate.conductances[phase]
+            temperature, terms = exchange.half_cycle(temperature, phase, heated, conductance)
+            surfaces = exchange.contact_temperatures(temperature, phase)
+            heats.append(HalfCycleHeat(*surfaces, terms, 1, temperature.bulk))
+        return heats

@@ -1,0 +1,403 @@
+"""One phase of the motion: contact, with or without heat, and its wear, at coefficients of its own state.
+
+The contacts of a phase over the last cycles, and where the next one is looked for from.
+
+Nodes in contact change as a polynomial of the cycles, which is known at the cycles before. Where surfaces close by a
+law, pressures near the edges of the contact are far from that; how near they are is not, whether they touch or not (see
+`fenwear.laws.compliant_layer`): so nodes come to touch where the polynomial has them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import comb
+
+import numpy as np
+
+from fenwear.algebra.fixed_point import fixed_point
+from fenwear.common.arrays import Array, Mask
+from fenwear.common.errors import ConvergenceError
+from fenwear.contact import CondensedContact, ContactSolver, ContactState
+from fenwear.heat.temperature import HeatState
+from fenwear.laws import LayerEvolution
+from fenwear.laws.compliant_layer import Law
+from fenwear.laws.debris import DebrisCycle
+from fenwear.laws.friction import ContactConditions, FollowingFriction
+from fenwear.laws.sliding_tensors import CycleShear
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.block import HalfCycleHeat, PhaseRecord
+from fenwear.steps.heated_phase import ColdContact, ThermalContact
+from fenwear.steps.run_state import pressure_scale
+from fenwear.steps.run_totals import PhaseMeter, Totals, with_coated
+from fenwear.system import Tribosystem, heating_friction
+
+# Shares of the last cycles in the next, by polynomials of rising degree.
+ONWARDS = np.array([[-comb(n, k) * (-1) ** k if k <= n else 0 for k in range(1, 7)] for n in range(1, 7)], dtype=float)
+MOST = np.array(1.0)  # change of nearness
+
+
+class Onwards:
+    """Extrapolates contacts of one phase from cycle to cycle.
+
+    Args:
+        nodes, modes: Numbers of nodes and of rigid modes.
+        law: Closure of the surfaces; None where they do not, or in proportion to the pressure.
+        hardness: Largest pressure, MPa.
+    """
+
+    def __init__(self, nodes: int, modes: int, law: Law | None, hardness: float) -> None:
+        self._law, self._hardness = law, hardness
+        self._nodes, self._known = nodes, np.zeros((len(ONWARDS), nodes + modes))  # each with its rigid motions
+        self._values = self._known[:, :nodes]
+        self._last: ContactState | None = None
+        self._count = 0  # of cycles that are known
+        self._alike = 0  # of them, in which the same nodes touch as in the last one
+        self._touching = b""
+
+    def keep(self, before: ContactState, contact: ContactState) -> None:
+        """Take a contact, and the one a cycle before it; what was known is forgotten where that is not the last one."""
+        pressure = contact.pressure[0]
+        self._count = min(self._count + 1, len(ONWARDS)) if before is self._last else 1
+        self._known[1:] = self._known[:-1]
+        self._values[0] = pressure if self._law is None else self._law.nearness(pressure, contact.gap[0])
+        self._known[0, self._nodes :], self._last = contact.rigid[0], contact
+        if self._law is None:
+            touching = (pressure > 0).tobytes()
+            self._alike = min(self._alike + 1, self._count) if touching == self._touching else 1
+            self._touching = touching
+
+    def start(self, before: ContactState) -> ContactState:
+        """Return the contact extrapolated from the last cycles."""
+        count = self._count
+        if count < 2 or before is not self._last:
+            return before
+        own, every = before.pressure[0], ONWARDS[count - 1, :count] @ self._known[:count]
+        further, rigid = every[: self._nodes], every[None, self._nodes :]
+        if self._law is None:
+            if self._alike < count:
+                self._as_long_as_they_touch(further)
+            further = np.where((own > 0) & (further > 0), further, own)
+        else:
+            last = self._values[0]
+            further = self._law.pressure_of(np.minimum(np.maximum(further, last - MOST), last + MOST))
+        if self._hardness < np.inf:
+            further = np.where((own < self._hardness) & (further < self._hardness), further, own)
+        return ContactState(further[None], before.gap, rigid, before.iterations)
+
+    def _as_long_as_they_touch(self, further: Array) -> None:
+        """Put pressures in place, extrapolated as far back as their nodes touch."""
+        values = self._values[: self._count]
+        fresh = np.flatnonzero((values[-1] <= 0) & (values[0] > 0))
+        touch = np.logical_and.accumulate(values[:, fresh] > 0).sum(axis=0)
+        further[fresh] = (ONWARDS[touch - 1, : self._count].T * values[:, fresh]).sum(axis=0)
+
+
+CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
+COEFFICIENTS_FAIL = (
+    "the coefficients of friction and wear and the pressure they depend on did not converge. Use a weaker dependence "
+    "on p, or a smoother table"
+)
+_Contact = tuple[ContactState, HeatState | None, HalfCycleHeat | None]
+_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
+
+
+@dataclass(frozen=True)
+class _Begin:
+    """The begin of a phase.
+
+    Attributes:
+        temperature: Of both bodies.
+        worn: Depths.
+        before: The same phase one cycle ago.
+        start: Where its contact is looked for; None from nothing.
+        near: Pressures there (n,), MPa: even ones where none are known. By edges of the contact those nodes touch that
+            carry one, as in a cycle ago: they do not go to and fro.
+        half_cycles: Done since the start of the run, in its middle.
+        cycle: Cross-shear and pressures a cycle ago; None in the first cycle.
+    """
+
+    temperature: HeatState
+    worn: WornDepths
+    before: ContactState
+    start: ContactState | None
+    near: Array
+    half_cycles: float
+    cycle: CycleShear | None
+
+
+@dataclass(frozen=True)
+class PhaseEnd:
+    """The end of a phase: its record, temperature and heat (None without), and the depths worn in it."""
+
+    record: PhaseRecord
+    temperature: HeatState | None
+    heat: HalfCycleHeat | None
+    worn: WornDepths
+
+
+class PhaseStep:
+    """Steps through one phase of the motion, again and again.
+
+    Args:
+        system: The assembled problem.
+        phase: Its number in the cycle.
+        implicit: Whether the pressure is that on the shape at the end of the phase.
+    """
+
+    def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
+        self.system, self.phase, self.implicit = system, phase, implicit
+        flows = implicit and system.layers.hardness < np.inf
+        self._at_begin = PhaseStep(system, phase, implicit=False) if flows else None
+        self._constant, self._load = system.constant_coefficients, 1.0
+        # Explicitly, wear and what remembers follow the pressure, and do not change it.
+        friction, asks = system.friction, system.friction.asks
+        apart = not self._constant and not implicit and not friction.remembers and not asks("edge")
+        self._wears_after = apart and friction.constant
+        self._slides_before = apart and not friction.constant and not asks("p", "pm")
+        follows = apart and not system.exchange.conducts and asks("p", "pm")
+        self._contact = system.passed_contact(phase)
+        self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
+        self._kind = ThermalContact if system.exchange.conducts else ColdContact
+        self._thermal = self._kind(system, phase, self._contact)
+        conditions = system.conditions(phase)
+        # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
+        more = system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+        self._staying = None if more else conditions
+        self._mu = system.friction.values(conditions)
+        self._friction_ratio = system.phase_friction(phase, self._mu)
+        wear = system.wear.phases([conditions], [phase])
+        self._passing = system.passing(wear, [phase])
+        self._debris, self._slid = self._passing.debris, system.path[[phase]]
+        self._edge: Array | None = None  # distances from it, for which debris is lost as it is there
+        self._flowed: Array | float = 0.0  # beyond the hardness, in the last solve
+        self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
+        self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
+        self._onwards: Onwards | None = None  # where the iterations of contact depend on their start
+        if self._follows or system.layers.closure is not None:
+            modes = system.rigids[phase].rigid_normal.shape[1]
+            self._onwards = Onwards(len(self._mu), modes, system.layers.closure, system.layers.hardness)
+        self._even = np.full(len(self._mu), system.rigid.mean_pressure)
+        self._meter = PhaseMeter(system, phase, self._mu, wear)
+
+    def solve(
+        self,
+        temperature: HeatState | None,
+        worn: WornDepths,
+        before: ContactState,
+        load: float = 1.0,
+        half_cycles: float = 0.0,
+        near: ContactState | None = None,
+        cycle: CycleShear | None = None,
+    ) -> PhaseEnd:
+        """Return the end of the phase.
+
+        Args:
+            temperature: At its start; None for the initial one.
+            worn: Depths at its start.
+            before: The same phase one cycle ago.
+            load: Factor of all loads.
+            half_cycles: Done since the start of the run, in its middle.
+            near: Where to start from in the first cycle, such as the phase before.
+            cycle: Cross-shear and pressures a cycle ago; None in the first cycle.
+
+        Raises:
+            ConvergenceError: contact, heat or the coefficients did not converge.
+        """
+        if load != self._load:
+            self._contact.press(load)
+            self._load = load
+        start = near
+        if before.solved:
+            start = before if self._onwards is None else self._onwards.start(before)
+        pressure = self._even if start is None else start.pressure[0]
+        at = _Begin(self.system.exchange.own(temperature), worn, before, start, pressure, half_cycles, cycle)
+        if self._at_begin is None:
+            return self._end_of(at)
+        # Surfaces flow as soon as they are pressed, before anything wears.
+        pressed = self._at_begin.solve(temperature, worn, before, load, half_cycles, near, cycle)
+        flown = self.system.layers.flown_as(worn, worn + pressed.worn)
+        end = self._end_of(replace(at, worn=flown))
+        return replace(end, worn=end.worn + (flown - worn))
+
+    def _end_of(self, at: _Begin) -> PhaseEnd:
+        """Return the end of the phase."""
+        gap = self.system.gap(self.phase, at.worn, passing=True)
+        if self._constant:
+            return self._end(at, *self._solve(at, gap, self._passing), self._passing)
+        if self._slides_before:  # friction is that of the state at the start
+            self._update(at.near, at, touching=at.near > 0)
+        if self._wears_after or self._slides_before:
+            contact, after, heat = self._solve(at, gap, self._passing)
+            return self._end(at, contact, after, heat, self._update(contact.pressure[0], at, ended=True))
+        if self._follows:
+            try:
+                return self._end_of_following(at, gap)
+            except ConvergenceError:  # in turn they may come together yet
+                pass
+        return self._end(at, *self._in_turn(at, gap))
+
+    def _end_of_following(self, at: _Begin, gap: Array) -> PhaseEnd:
+        """Return the end of the phase whose friction follows its pressure.
+
+        Raises:
+            ConvergenceError: Newton's method does not find both together.
+        """
+        mu = FollowingFriction(self.system.friction, self._conditions(at.near, None, at, at.near > 0))
+        contact = self._following(mu, at, gap)
+        if self.system.edges is None:
+            passing = self._taken(mu.at(contact.pressure[0]), at.worn, ended=True)
+        else:
+            passing = self._update(contact.pressure[0], at, ended=True)
+        return self._end(at, contact, None, None, passing)
+
+    def _in_turn(self, at: _Begin, gap: Array) -> _Solved:
+        """Return contact, heat and coefficients that belong together, found in turn.
+
+        Raises:
+            ConvergenceError: they do not converge.
+        """
+
+        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
+            nonlocal at
+            passing = self._update(pressure, at, touching=at.near > 0)
+            try:
+                contact, after, heat = self._solve(at, gap, passing)
+            except ConvergenceError as error:
+                largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
+                raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
+            at = replace(at, start=contact)
+            return contact.pressure[0], (contact, after, heat, passing), False
+
+        return fixed_point(
+            solve,
+            at.near,
+            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
+            COEFFICIENTS_FAIL,
+            team=self.system.team,
+        )
+
+    def _following(self, mu: FollowingFriction, at: _Begin, gap: Array) -> ContactState:
+        """Return the contact whose friction follows its pressure."""
+        assert isinstance(self._contact, CondensedContact)
+        self._contact.follow(mu, self._bare, self._along)
+        if self.system.layers.hardness == np.inf:
+            return self._contact.solve(gap, at.start, self._passing.step(at.worn, implicit=self.implicit))
+        if self._contact.most < np.inf:
+            return self._capped(at, gap, self._passing)[0]
+        return self._flowing(self._contact, at, gap, self._passing)[0]
+
+    def _update(
+        self, pressure: Array, at: _Begin, *, ended: bool = False, touching: Mask | None = None
+    ) -> LayerEvolution:
+        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
+
+        Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
+        that touch, by default those that carry this pressure.
+        """
+        surfaces = self.system.exchange.contact_temperatures(at.temperature, self.phase - 1)
+        return self._taken(self._conditions(pressure, surfaces, at, touching), at.worn, ended=ended)
+
+    def _conditions(
+        self, pressure: Array, surfaces: tuple[Array, Array] | None, at: _Begin, touching: Mask | None
+    ) -> ContactConditions:
+        """Return what coefficients depend on, as `Tribosystem.conditions`."""
+        system, worn = self.system, at.worn
+        if self._staying is None:
+            return system.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)
+        return self._staying.pressed(pressure, system.layers.facing(system.pairs[self.phase], worn))
+
+    def _taken(self, conditions: ContactConditions, worn: WornDepths, *, ended: bool) -> LayerEvolution:
+        """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""
+        system = self.system
+        evolution = system.evolution([conditions], worn, [self.phase])
+        # Coefficients are those of the states in the middle of the phase.
+        (conditions,), end, _ = evolution.through(system.layers.held(worn))
+        # Once the phase has ended its friction is known, but for one that has followed the pressure.
+        changes = not system.friction.constant and (self._follows or not ended)
+        if changes:
+            mu = self._mu = system.friction.values(conditions)
+            self._friction_ratio = self._bare + mu[:, None] * self._along
+            if not ended:
+                self._contact.slide([self._friction_ratio])
+                self._thermal.slide(heating_friction(system, mu, self.phase))
+        wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
+        ends = end if ended else None
+        return LayerEvolution(system.layers, wear, self._lost(conditions), evolution, ends)
+
+    def _lost(self, conditions: ContactConditions) -> DebrisCycle:
+        """Return what the phase does to debris at conditions: as before where no more than the same edges matter."""
+        layers, edge = self.system.layers, conditions.edge
+        if not layers.varies or (not layers.debris.of_state and edge is self._edge):
+            return self._debris
+        onto = layers.places([self.system.pairs[self.phase]])
+        self._debris, self._edge = layers.debris.over(self._slid, [conditions], onto), edge
+        return self._debris
+
+    @cached_property
+    def _uncapped(self) -> ContactSolver:
+        """The contact whose surfaces flow by and by."""
+        return self.system.passed_contact(self.phase, capped=False)
+
+    def _solve(self, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
+        contact = self._contact
+        if self.system.layers.hardness == np.inf:
+            wearing = passing.step(at.worn, implicit=self.implicit)
+            return self._thermal.solve(at.temperature, gap, at.start, wearing)
+        if isinstance(contact, CondensedContact) and contact.most < np.inf:
+            try:
+                return self._capped(at, gap, passing)
+            except ConvergenceError:  # so much flows that too little else carries on the way to the solution
+                contact = self._uncapped
+                contact.press(self._load)
+                contact.slide([self._friction_ratio])
+        return self._flowing(contact, at, gap, passing)
+
+    def _capped(self, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
+        """Return the end of a phase whose contact lets no pressure beyond the hardness."""
+        wearing = passing.step(at.worn, implicit=self.implicit, capped=True)
+        contact, after, heat = self._thermal.solve(at.temperature, gap, at.start, wearing)
+        self._flowed = self.system.layers.flowed(contact.pressure[0], contact.gap[0])
+        return replace(contact, gap=contact.gap + self._flowed), after, heat
+
+    def _flowing(self, solver: ContactSolver, at: _Begin, gap: Array, passing: LayerEvolution) -> _Contact:
+        """Return the end of a phase whose contact flows by and by."""
+        wearing, near, thermal = passing.step(at.worn, implicit=self.implicit), at.start, self._thermal
+        if solver is not self._contact:
+            thermal = self._kind(self.system, self.phase, solver)
+            thermal.slide(heating_friction(self.system, self._mu, self.phase))
+
+        def solve(flowed: Array) -> _Contact:
+            nonlocal near
+            found = thermal.solve(at.temperature, gap + flowed, near, wearing)
+            near = found[0]
+            return found
+
+        found, self._flowed = self.system.layers.flowing(solve, lambda found: found[0].pressure)
+        return found
+
+    def _end(
+        self,
+        at: _Begin,
+        contact: ContactState,
+        temperature: HeatState | None,
+        heat: HalfCycleHeat | None,
+        passing: LayerEvolution,
+    ) -> PhaseEnd:
+        if self._onwards is not None:
+            self._onwards.keep(at.before, contact)
+        alike = self.system.friction.constant and passing.wear is self._passing.wear
+        meter = self._meter if alike else self._meter.at(self._mu, passing.wear)
+
+        def left() -> tuple[Totals, WornDepths]:
+            pressure = contact.pressure[0]
+            lost = passing.worn(contact.pressure, at.worn, flowed=self._flowed)
+            creep = self.system.creep
+            if creep.creeps:
+                crept = creep.change(self.phase, at.worn.crept, pressure, self._friction_ratio, self._load)
+                lost = replace(lost, crept=crept)
+            return with_coated(self.system, meter(pressure), lost), lost
+
+        adds, lost = self.system.team.lead(left)
+        record = PhaseRecord(self.phase, contact, at.before.pressure[0], adds, self._friction_ratio)
+        return PhaseEnd(record, temperature, heat, lost)

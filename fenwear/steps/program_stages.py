@@ -1,0 +1,266 @@
+"""Test programs: stages of constant motion and surroundings one after the other, each on the operators of the last.
+
+A stage begins with the depths and temperatures that the stage before it has left. Loads may change within it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from fenwear.case import Case, Cycle
+from fenwear.case.program import Stage, held_at, stages_of
+from fenwear.common.errors import CaseError, InputError
+from fenwear.steps.block import Block
+from fenwear.steps.driver import Loading, as_given
+from fenwear.steps.run_state import RunState, carried_by, on_other_grid, with_phases
+from fenwear.steps.slow_changes import Integrate, follow
+from fenwear.system import Clock, ContactLaw, ContactSetup, Tribosystem, grows, regridded, with_case, with_room
+
+MOST_RECURRING = 16  # systems of stages that are held at once, each with its steps of heat
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where an integration ends at the latest, the factor of all loads on the way, and whether it is the last one.
+
+    The last one may end before, where its cycles repeat.
+    """
+
+    until: int
+    loading: Loading = as_given
+    last: bool = True
+
+    def periodic_within(self, asked: float | None) -> float | None:
+        """Return within what its cycles have to repeat to end it, as a case asks for; None where they cannot."""
+        return asked if self.last else None
+
+
+# Runs a system from a state over a span, and leaves at the first state for which it is told to.
+IntegrateSpan = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool], Span], Iterator[Block]]
+
+
+def follow_program(
+    system: Tribosystem, integrate: IntegrateSpan, half_cycles: int, start: RunState | None = None
+) -> Iterator[Block]:
+    """Yield the blocks of a run over the program of its case, whose meshes follow large wear; collective.
+
+    Args:
+        system: The assembled problem, of the case as it stands without its program.
+        integrate: Yields the blocks of a span on one system, such as `march` or `jump`.
+        half_cycles: The last one at most.
+        start: State to continue from; by default the beginning.
+
+    Raises:
+        CaseError: a load is given where supports and not the contact carry the loads.
+        ConvergenceError: as `integrate`.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    stages = stages_of(system.case)
+    if not stages:
+        yield from follow(system, _over(Span(half_cycles), integrate), start)
+        return
+    base, state, again = system, start, Recurring(stages)
+    for stage in stages:
+        done = 0 if state is None else state.half_cycle
+        if stage.end <= done:
+            continue
+        if stage.begin >= half_cycles:
+            return
+        span = Span(min(stage.end, half_cycles), loading_of(base, stage), stage is stages[-1])
+
+        def adapt(moved: Tribosystem, stage: Stage = stage) -> Tribosystem:
+            nonlocal base
+            base = moved
+            again.forget()
+            return again.at_stage(base, stage)
+
+        larger, state = _with_larger_grid(base, stage, state, span.loading(max(done, stage.begin)))
+        if larger is not base:
+            base = larger
+            again.forget()
+        own = again.at_stage(base, stage)
+        for block in follow(own, _over(span, integrate), with_phases(state, len(own.motion.phases)), adapt):
+            yield block
+            state = block.end
+            if state.half_cycle >= span.until:  # what it asks for by now the next stage has
+                break
+
+
+def _over(span: Span, integrate: IntegrateSpan) -> Integrate:
+    """Return what integrates over a span."""
+    return lambda system, state, leave: integrate(system, state, leave, span)
+
+
+def _with_larger_grid(
+    base: Tribosystem, stage: Stage, state: RunState | None, load: float
+) -> tuple[Tribosystem, RunState | None]:
+    """Return both on a grid that has room for the contact under loads that begin to act; collective.
+
+    Args:
+        base: Of the case.
+        stage: Stage that begins, or within which a run continues: its grid grows as it would have, not to a wider one.
+        state: Where a run is; None at its beginning, whose grid is around its first contact.
+        load: Factor of all loads.
+    """
+    while state is not None and state.half_cycle == stage.begin and grows(base):
+        own = at_stage(base, stage)
+        grid = with_room(own, state.worn, carried_by(state), load)
+        if grid is None:
+            break
+        base, before = regridded(base, grid), with_phases(state, len(own.motion.phases)) or state
+        state = on_other_grid(before, own, at_stage(base, stage))
+    return base, state
+
+
+def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
+    """Return the system with the motion and surroundings of a stage, sharing all operators that they leave; collective.
+
+    Args:
+        system: Of the case, on meshes as they are now.
+        stage: Of its program.
+    """
+    return _at_its_time(_varied(system, stage), system, stage)
+
+
+def _varied(system: Tribosystem, stage: Stage) -> Tribosystem:
+    """Return the system of the case of a stage, which leaves the bodies and their grids as they are; collective."""
+    law: ContactLaw = system.contact_law
+    return law.varied(system, stage.case)
+
+
+def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
+    return replace(staged, case=system.case, clock=Clock(stage.begin, stage.time, stage.slid))
+
+
+class Recurring:
+    """The systems of stages that come again in their program: the heat of a motion may take longer than its cycles."""
+
+    def __init__(self, stages: Sequence[Stage]) -> None:
+        """Take the stages of a program."""
+        self._times = Counter(map(_changes, stages))
+        self._made: dict[str, tuple[Case, Tribosystem]] = {}
+
+    def forget(self) -> None:
+        """Make all further systems on other meshes."""
+        self._made.clear()
+
+    def at_stage(self, system: Tribosystem, stage: Stage) -> Tribosystem:
+        """Return what `at_stage` returns; collective."""
+        key = _changes(stage)
+        case, staged = self._made.get(key, (None, None))
+        if staged is None or case != stage.case:
+            staged = _varied(system, stage)
+            if self._times[key] > 1 and len(self._made) < MOST_RECURRING:
+                self._made[key] = stage.case, staged
+        return _at_its_time(staged, system, stage)
+
+
+def _changes(stage: Stage) -> str:
+    """Return what differs from stage to stage, in a text."""
+    case = stage.case
+    return repr((case.motion, case.heat, case.punch.loads, case.strip.loads))
+
+
+def loading_of(system: Tribosystem, stage: Stage) -> Loading:
+    """Return the factor of all loads over a stage, linear in the half-cycles.
+
+    Raises:
+        CaseError: a load is given where supports and not the contact carry the loads, or the hardness does not carry
+            it.
+    """
+    ends = stage.load_factor
+    if stage.load is not None:
+        nominal = _nominal(system, f"program.steps.{stage.step}.load")
+        ends = stage.load[0] / nominal, stage.load[1] / nominal
+    mean = max(ends) * system.rigid.mean_pressure
+    if system.layers.hardness <= mean:
+        message = f"expected more than the mean pressure of {mean:.6g} MPa in program.steps.{stage.step}"
+        raise CaseError(InputError("contact.hardness", f"{message}: nothing softer carries the load"))
+    if ends == (1.0, 1.0):
+        return as_given
+    first, last = ends
+
+    def loading(half_cycles: float) -> float:
+        share = (half_cycles - stage.begin) / (stage.end - stage.begin)
+        return first + share * (last - first)
+
+    return loading
+
+
+def _nominal(placed: ContactSetup, key: str) -> float:
+    """Return the normal force of the loads of a case, N."""
+    if placed.normal_force <= 0:
+        raise CaseError(InputError(key, "expected load_factor: supports carry the loads, not the contact alone"))
+    return placed.normal_force
+
+
+def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
+    """Return the case of what acts at the end of a step of a program, held for ever, and the step in words.
+
+    Args:
+        placed: The bodies of the case.
+        step: Its number from 0; by default the last.
+
+    Returns:
+        Without a program the case itself and "".
+
+    Raises:
+        CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
+            contact carry the loads.
+    """
+    found = held_at(placed.case, step)
+    if found is None:
+        return placed.case, ""
+    factor = found.load_factor
+    if found.load is not None:
+        factor = found.load / _nominal(placed, f"{found.key}.load")
+    force = placed.normal_force * factor
+    acts = f"normal force {force:,.6g} N" if force else f"all loads times {factor:.6g}"
+    text = f"step {found.step + 1} of {found.steps} of the program ({found.key}), as it ends, held for ever: {acts}"
+    return _loaded(found.case, factor), text
+
+
+def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
+    """Return the system of what acts at the end of a step of its program, held for ever; collective.
+
+    A system of a case without a program is returned as it is. Operators that the step leaves are shared.
+
+    Args:
+        system: Of a case.
+        step: Number of the step from 0; by default the last.
+
+    Raises:
+        CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
+            contact carry the loads.
+    """
+    case, text = held(system, step)
+    return with_case(system, case) if text else system
+
+
+def _loaded(case: Case, factor: float) -> Case:
+    """Return the case with all its loads times a factor."""
+    if factor == 1:
+        return case
+    bodies: dict[str, Any] = {
+        name: body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
+        for name, body in case.bodies.items()
+    }
+    motion = case.motion
+    if isinstance(motion, Cycle) and motion.load is not None:
+        load = motion.load.model_copy(update={"factor": factor * motion.load.factor})
+        bodies["motion"] = motion.model_copy(update={"load": load})
+    return case.model_copy(update=bodies)
+
+
+def at_loads(system: Tribosystem, factor: float) -> Tribosystem:
+    """Return the system under all its loads times a factor; collective."""
+    if factor == 1:
+        return system
+    case = _loaded(system.case, factor)
+    loaded = tuple(
+        own.under(case, phase.fraction) for own, phase in zip(system.loaded, system.motion.phases, strict=True)
+    )
+    return replace(system, loaded=loaded)

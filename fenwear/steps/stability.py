@@ -1,0 +1,384 @@
+"""The thermo-elastic stability of a state: how fast its disturbances grow.
+
+The speed of sliding beyond which full contact is thermo-elastically unstable.
+
+The limit of explicit steps of wear on full contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+from fenwear.algebra.submatrices import Solve
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, ConvergenceError, InputError
+from fenwear.contact import CondensedContact, SlidingContact
+from fenwear.heat.periodic_heat import CycleHeat
+from fenwear.heat.temperature import HeatState
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.coupled_phases import cycle_heat, touching
+from fenwear.steps.tangent import answered, lies_after, phase_tangent
+from fenwear.system import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
+
+ROUNDING = 1e-12  # of a disturbance: what is left of it that is gone
+NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
+MAX_ITERATIONS = 60  # of friction and the temperatures that it depends on
+CLOSE = 1e-10  # change of these temperatures over their range that ends them
+LONGER = "Run longer, or use `steady`"
+APART = 0.1  # what a nearly stationary state may be away from itself a cycle later, or from its own temperatures
+
+
+class StationaryState(Protocol):
+    """A state whose disturbances grow or decay, such as a `SteadyState`."""
+
+    @property
+    def phase_pressure(self) -> Array:
+        """The pressure of each phase (phases, n), MPa."""
+
+    @property
+    def conductances(self) -> Array | None:
+        """By which its temperatures have come about (phases, n), N/(mm s K); None without heat."""
+
+
+def growth_rate(
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None = None, *, implicit: bool = True
+) -> float:
+    """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
+
+    Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
+    state is that of the given pressures and of the temperatures that repeat under them. The cycle's map
+    of temperature and worn depth is linearised there, friction, wear and conductance with it, for the
+    same nodes in contact, and its eigenvalue largest in size taken: ln |lambda| over
+    the duration of a cycle. A rigid motion of the worn shape changes nothing, nor does the shape where
+    nothing touches; these disturbances (lambda = 1) do not count.
+
+    Args:
+        system: The assembled problem.
+        state: Result of `steady`, or the pressure of each phase (phases, n), MPa, positive where nodes touch.
+        conductances: By which its temperatures have come about (phases, n); by default those of the state, or of the
+            nodes that these pressures close by more than rounding.
+        implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
+
+    Raises:
+        CaseError: a coefficient is negative or not finite there, or the pressures are of other phases or nodes.
+        ConvergenceError: friction and the temperatures that it depends on do not converge, or numbers overflow.
+    """
+    rates = _rates(system, state, conductances, implicit=implicit)
+    return float(rates[0]) if len(rates) else 0.0  # as where all that is worn stays, and fills what it opens
+
+
+def decay_rates(system: Tribosystem, state: Array | StationaryState, conductances: Array | None = None) -> Array:
+    """Return the rates at which all disturbances of a state grow, 1/s, the largest first; collective.
+
+    Real parts; those that neither grow nor decay, such as rigid motions of the shape, and those that are gone after a
+    cycle are left out. Arguments and errors as of `growth_rate`, which is the first of them.
+    """
+    rates = _rates(system, state, conductances)
+    return rates[rates > np.log(ROUNDING) / system.motion.period]
+
+
+def _rates(
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None, *, implicit: bool = True
+) -> Array:
+    """Return the rates of the disturbances that a cycle changes, 1/s, the largest first; collective."""
+    pressure, conductances = _parts(system, state, conductances)
+    system = with_reduced_heat(system)  # before rank 0 leads
+    values = system.team.lead(partial(_factors, system, pressure, conductances, implicit=implicit))
+    sizes = np.abs(values[np.abs(values - 1.0) > NEUTRAL])
+    return np.sort(np.log(np.maximum(sizes, 1e-300)) / system.motion.period)[::-1]
+
+
+def _parts(
+    system: Tribosystem, state: Array | StationaryState, conductances: Array | None
+) -> tuple[Array, Array | None]:
+    """Return the pressures and conductances of a state.
+
+    Raises:
+        CaseError: no state of the system grows or decays, or the pressures are of other phases or nodes.
+    """
+    pressure, own = (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
+    if system.passing_laws:
+        raise CaseError(
+            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
+        )
+    shape = (len(system.motion.phases), len(system.pair.weights))
+    if pressure.shape != shape:
+        message = f"expected pressures of {shape[0]} phases at {shape[1]} nodes, as `SteadyState.phase_pressure`"
+        raise CaseError(InputError("state", f"{message}, got {pressure.shape}"))
+    return pressure, own if conductances is None else conductances
+
+
+def _factors(
+    system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool
+) -> NDArray[np.complex128]:
+    """Return what a cycle multiplies each disturbance of a state by: the eigenvalues of its map."""
+    pressure = touching(pressure)
+    heat, states = repeating_temperatures(system, pressure, conductances)
+    n = pressure.shape[1]
+    dim = heat.dim + system.creep.size
+    if system.layers.debris.present:
+        dim += len(system.pair.strip.weights) if system.layers.strip_carries else n
+    cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
+    for phase in range(len(pressure)):
+        conductance = None if conductances is None else conductances[phase]
+        state = states[phase] if states else None
+        tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit, worn=rest)
+        cycle, rest = tangent @ cycle, lies_after(system, phase, pressure[phase], heat, state, rest)
+    if not np.isfinite(cycle).all():
+        raise ConvergenceError(
+            "growth of disturbances in a cycle is beyond all numbers: wear, heat or load is too large"
+        )
+    return np.asarray(np.linalg.eigvals(cycle), dtype=complex)
+
+
+def explicit_growth(system: Tribosystem) -> float | None:
+    """Return the rate at which explicit steps of wear let disturbances of full contact grow, 1/s; collective.
+
+    The feedback of the friction heat reduces the loss of pressure by an opened gap, half-cycle for half-cycle, so that
+    explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit ones let
+    disturbances grow, too, and where it is unknown: without heat, or with laws that pass.
+    """
+    if not system.exchange.conducts or system.passing_laws:
+        return None
+    even = np.full((len(system.motion.phases), len(system.pair.weights)), system.rigid.mean_pressure)
+    try:
+        rate = growth_rate(system, even, implicit=False)
+        return rate if rate > 0 >= growth_rate(system, even) else None
+    except (CaseError, ConvergenceError):
+        return None
+
+
+def stationary_growth(
+    system: Tribosystem, pressure: Array, surfaces: tuple[Array, Array], phase: int, change: float
+) -> tuple[float | None, str]:
+    """Return the growth rate of a run's last state, or None with the reason why it has none; collective.
+
+    A state that itself changes about as fast as its disturbances grow has no growth rate, nor has one whose
+    temperatures are not yet those that repeat at its pressures.
+
+    Args:
+        system: The assembled problem.
+        pressure: Of each phase in the last cycle (phases, n), MPa.
+        surfaces: Temperatures of the punch's and the strip's surface at the end of the run (n,), K.
+        phase: The one that would come next.
+        change: Largest change of pressure in the last cycle over the pressure scale.
+    """
+    if not change < 1:  # the same number on all ranks
+        return (
+            None,
+            f"pressures change by their scale from cycle to cycle. {LONGER}",
+        )
+    system = with_reduced_heat(system)
+    return system.team.lead(partial(_stationary_growth, system, pressure, surfaces, phase, change))
+
+
+def _stationary_growth(
+    system: Tribosystem, pressure: Array, surfaces: tuple[Array, Array], phase: int, change: float
+) -> tuple[float | None, str]:
+    try:
+        rate = growth_rate(system, pressure)
+        heat, states = repeating_temperatures(system, pressure)
+    except (CaseError, ConvergenceError) as error:
+        return None, str(error)
+    if states:
+        found = np.array(heat.exchange.contact_temperatures(states[phase], phase - 1))
+        away = float(np.abs(found - surfaces).max())
+        scale = float(np.abs(found - heat.exchange.heat.initial).max())
+        if away > APART * scale:
+            return None, f"temperatures are still {away:.2g} K from those that repeat at these pressures. {LONGER}"
+    drift = change / system.motion.period
+    if drift > APART * abs(rate):
+        return None, (
+            f"pressures still drift by {100 * drift:.2g} % per second, more than a tenth of the "
+            f"{100 * abs(rate):.2g} % by which disturbances {'grow' if rate > 0 else 'decay'}. {LONGER}"
+        )
+    return rate, ""
+
+
+def repeating_temperatures(
+    system: Tribosystem, pressure: Array, conductances: Array | None = None
+) -> tuple[CycleHeat, list[HeatState]]:
+    """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
+
+    None where no law and no conductance depends on the state: then any temperatures do.
+
+    Raises:
+        ConvergenceError: there are none, or friction and the temperatures that it depends on do not converge.
+    """
+    heat = cycle_heat(system)
+    if not heat.dim or (system.constant_coefficients and not heat.exchange.by_pressure):
+        return heat, []
+    if conductances is None:
+        conductances = heat.conductances(touching(pressure))
+    surfaces: list[tuple[Array, Array] | None] = [None] * len(pressure)
+    before = None
+    for _ in range(MAX_ITERATIONS):
+        if not system.friction.constant:
+            conditions = [system.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
+            friction = [system.friction.values(c) for c in conditions]
+            mu = np.array([heating_friction(system, own, phase) for phase, own in enumerate(friction)])
+            heat = CycleHeat(heat.exchange.with_friction(mu))
+        exchange = heat.exchange
+        try:
+            end = heat.jump(heat.initial(), np.inf, conductances)
+        except scipy.linalg.LinAlgError:
+            raise ConvergenceError("no temperatures repeat: the bodies lose heat nowhere") from None
+        states = [exchange.at(end.state(pressure))]
+        for phase in range(len(pressure) - 1):
+            states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
+        surfaces = [exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
+        found = np.array(surfaces)
+        if system.friction.constant:
+            return heat, states
+        if before is not None and np.abs(found - before).max() <= CLOSE * max(1.0, float(np.ptp(found))):
+            return heat, states
+        before = found
+    raise ConvergenceError(
+        f"friction and the temperatures that it depends on did not converge in {MAX_ITERATIONS} iterations at "
+        "these pressures. No state exists whose growth rate can be computed"
+    )
+
+
+def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Sequence[HeatState]) -> WornDepths | None:
+    """Return what laws remember, and debris, at rest at pressures and temperatures of the phases; None without.
+
+    Raises:
+        ConvergenceError: debris has no thickness at which as much is lost as comes.
+    """
+    layers = system.layers
+    if not layers.memory.names and not layers.debris.present:
+        return None
+    warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
+    if states:
+        warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
+    conditions = [
+        system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
+    ]
+    rest = system.rested(conditions)
+    if not layers.debris.present:
+        return rest
+    thickness = layers.lies(rest)
+    for _ in range(MAX_ITERATIONS):
+        lying = layers.with_thickness(rest, thickness)
+        pairs = zip(conditions, system.pairs, strict=True)
+        now = [replace(one, debris=layers.facing(pair, lying)) for one, pair in pairs]
+        passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
+        thickness = passing.resting_where_it_lies(pressure)
+        if not layers.varies and not system.asks("debris"):
+            break
+        if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):
+            break
+    else:
+        raise ConvergenceError("the thickness of debris at which gain and loss balance did not converge")
+    return layers.with_thickness(rest, thickness)
+
+
+def critical_speed(system: Tribosystem, direction: int) -> float:
+    """Return the sliding speed above which full contact is thermo-elastically unstable; collective.
+
+    Of disturbances that grow without moving along the contact, and without wear: there the steady
+    temperature of a pressure makes just this pressure, p = -V X Theta p, with X the elastic stiffness
+    of the contact and Theta the thermal gap of the friction heat at unit speed (for a half-plane on
+    an insulator: Burton, V = 2 (1 - nu) k m / (mu E alpha)). Infinite where no speed is critical.
+    In mm/s; in rad/s where the strip turns.
+
+    Args:
+        system: The assembled problem, with heat.
+        direction: Sliding direction d.
+
+    Raises:
+        CaseError: the case has no heat, or a body no heat sink.
+    """
+    n, rigid, friction_ratio = len(system.pair.weights), system.rigid, system.friction_ratio(direction)
+    compliance, balance = system.interface.compliance(friction_ratio).matrix(), rigid.equilibrium(friction_ratio)
+    everywhere, none = np.ones(n, dtype=bool), np.zeros((len(balance), n))
+    pressed = answered(system.interface, compliance, balance, everywhere, np.eye(n), none)
+    speed = system.motion.mean_speed
+    for _ in range(50):  # the strip's temperature depends on its speed
+        exchange = steady_exchange(system, [direction * speed])
+        uniform = np.full(n, system.rigid.mean_pressure)
+        states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
+        thermal = exchange.gap_change(states) / speed
+        before, speed = speed, system.team.lead(partial(_unstable_speed, pressed, thermal))
+        if np.isinf(speed):
+            break
+        if abs(speed - before) < 1e-6 * speed:
+            break
+    return speed
+
+
+def _unstable_speed(pressed: Array, thermal: NDArray[Any]) -> float:
+    """Return the lowest V of p = -V X Theta p, -X the pressures of unit gaps; infinite where there is none."""
+    values = np.linalg.eigvals(pressed @ thermal)
+    growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
+    return float(1 / growing.max()) if len(growing) else float("inf")
+
+
+PRODUCTS = 200  # after which the fastest modes are what is left: of two brake shoes 1.3 % above the fastest
+
+
+def stability_number(system: Tribosystem) -> float:
+    """Return the wear step over its explicit limit: above 1 an explicit run oscillates and diverges; collective.
+
+    On closed contact an opened gap lowers the pressure by P, the leading block of the inverse of
+    [[S, H], [E, 0]], and the pressure of a phase opens the gap by its wear by W: beta~ S b p^(b-1) of both
+    bodies at the mean pressure, the strip's put on its nodes and read there. An explicit step multiplies an
+    error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
+    the phase that wears most.
+    """
+    ratios, largest = system.friction_ratios(), 0.0
+    for phase, opened in system.team.lead(partial(_most_worn, system)):
+        interface = system.interfaces[phase]
+        contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
+        worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
+        largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
+    return largest / 2
+
+
+def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
+    """Return of each direction the phase that wears most, if any does, and its S b p^(b-1), on the strip's nodes."""
+    n = len(system.rigid.rigid_normal)
+    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
+    wear = system.phases_wear
+    slopes = sum((body.slope(uniform) for body in wear.bodies), np.zeros_like(uniform))
+    directions, most = np.array(system.motion.directions), slopes.max(axis=1)
+    phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
+    opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]
+    return [(k, slope) for k, slope in zip(phases, opened, strict=True) if slope.data.any()]
+
+
+def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
+    """Return the largest eigenvalue of W P: the gap (n,) worn open by the pressure lost to a gap."""
+    n = worn.shape[0]
+
+    def apply(gap: Array) -> Array:
+        right = np.zeros(size)
+        right[:n] = gap.ravel()
+        return np.asarray(worn @ solve(right)[:n])
+
+    start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
+    operator = LinearOperator((n, n), matvec=apply, dtype=float)
+    try:
+        found = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
+    except ArpackNoConvergence:  # modes that lie together, as those of two shoes that are alike, are not told apart
+        return _growth(apply, start)
+    return float(np.abs(found).max())
+
+
+def _growth(apply: Callable[[Array], Array], vector: Array) -> float:
+    """Return by how much a vector grows with each product in the end, of whichever modes it is made."""
+    size = 0.0
+    for _ in range(PRODUCTS):
+        vector = apply(vector)
+        size = float(np.linalg.norm(vector))
+        vector = np.asarray(vector / size, dtype=float)
+    return size

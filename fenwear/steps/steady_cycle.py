@@ -1,0 +1,93 @@
+"""The half-cycles of a steady state, as quantities see those of a run: pressures, temperatures, and what they add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.common.arrays import Array
+from fenwear.heat.heat_exchange import CROSSING, TERMS
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.block import BlockHeat
+from fenwear.steps.run_totals import Totals, phase_totals, stacked
+from fenwear.steps.steady import SteadyState
+from fenwear.system import Tribosystem
+
+
+@dataclass(frozen=True)
+class SteadyCycle:
+    """The k half-cycles of a steady state, of n contact nodes.
+
+    Attributes:
+        system: Its system.
+        pressure: In the middle position of each half-cycle (k, n), MPa.
+        phase_pressure: In every phase (m, n), MPa.
+        adds: Additions of each half-cycle to the totals, k of them.
+        rate: Depths worn in the cycle.
+        velocity: Rigid-body wear in the cycle of each mode, mm and rad.
+        heat: Temperatures at the ends of the half-cycles; None without heat.
+        moves: Whether what half-cycles add is known: forces, work and wear.
+    """
+
+    system: Tribosystem
+    pressure: Array
+    phase_pressure: Array
+    adds: Totals
+    rate: WornDepths
+    velocity: Mapping[str, float]
+    heat: BlockHeat | None
+    moves: bool = True
+
+    def __len__(self) -> int:
+        return len(self.pressure)
+
+    @property
+    def half_cycle(self) -> NDArray[np.int64]:
+        """Number of each half-cycle in the cycle (k,), from 1."""
+        return np.arange(1, len(self) + 1)
+
+    @property
+    def contact_width(self) -> Array:
+        """Width of the nodes in contact (k,), mm; in solids and rings their area, mm²."""
+        return np.where(self.pressure > 0, self.system.pair.weights, 0.0).sum(axis=1)
+
+    @property
+    def load(self) -> Array:
+        """Normal force (k,), N; 0 where supports and not the contact carry the loads."""
+        return np.full(len(self), self.system.normal_force)
+
+
+def cycle_of_state(state: SteadyState) -> SteadyCycle:
+    """Return the half-cycles of a cyclic steady state."""
+    sides = [] if state.heat is None else [state.heat.punch, state.heat.strip]
+    heat = heat_of(np.stack(sides, axis=1) if sides else np.zeros(0))
+    return _cycle(state.system, state.phase_pressure, state.velocity, heat)
+
+
+def _cycle(
+    system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], heat: BlockHeat | None
+) -> SteadyCycle:
+    positions = system.motion.positions
+    latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
+    each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(phase_pressure)]
+    states = [system.conditions(k, p, latest, None, None) for k, p in each]
+    if system.layers.memory.names:
+        rest = system.rested(states)
+        states = [system.conditions(k, p, latest, rest, None) for k, p in each]
+    adds = phase_totals(system, phase_pressure, states)
+    of_half_cycles = [reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)]
+    middle, rate = phase_pressure[positions // 2 :: positions], system.wear.phases(states).worn(phase_pressure)
+    return SteadyCycle(system, middle, phase_pressure, stacked(of_half_cycles), rate, velocity, heat)
+
+
+def heat_of(temperature: Array) -> BlockHeat | None:
+    """Return temperatures at the ends of half-cycles (k, 2, n) as those of a block, without a balance; None of none."""
+    count = len(temperature)
+    if not count:
+        return None
+    terms, unknown = np.zeros((count, len(TERMS) + len(CROSSING))), np.full(count, np.nan)
+    return BlockHeat(temperature[:, 0], temperature[:, 1], terms, np.zeros(count, dtype=np.int64), unknown)

@@ -1,0 +1,414 @@
+"""Cycles of contact with stick: time step by time step, with slip, friction's work and wear of every node.
+
+Where a run with stick is, on another contact grid: tractions, slips and states stay at their nodes.
+
+Displacements of the surfaces are those of the tractions there, as the next time step has them: nodes that stick
+continue to stick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.common.arrays import Array
+from fenwear.common.errors import ConvergenceError
+from fenwear.laws.law_states import Held
+from fenwear.laws.local_laws import LocalLaws, LocalWear
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.stick_heat import StickHeat, coupled_step
+from fenwear.steps.stick_increment import advance
+from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_losses import CoatedBodies, StepConditions, StepLosses, StepSlips
+from fenwear.steps.stick_position import LoadEffect, Position
+from fenwear.steps.stick_program import Program, TimeStep
+from fenwear.steps.stick_records import TimeStepRecords, record
+from fenwear.steps.stick_state import NO_SHIFT, Imposed, PartialSlipState, StickState
+from fenwear.surfaces.placement import HERE, Placement, in_model
+from fenwear.surfaces.sliding_field import Screw
+from fenwear.system import on_nodes
+
+T = TypeVar("T")
+MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
+
+
+class PartialSlipProblem:
+    """Two bodies, what is done to them, and their wear.
+
+    Args:
+        interface: The bodies.
+        program: Of a cycle.
+        wear: By local slip.
+        friction: mu (n,).
+        heat: Of friction; None without.
+        watch: Called before every time step: may raise InterruptedRunError.
+        expanded: Gaps by loads with a constant thermal expansion, at an offset of the strip.
+        laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
+        coatings: Of both bodies, whose `wear` is then that of the coating, by the ratio of coefficients unless another
+            one is given.
+    """
+
+    def __init__(
+        self,
+        interface: OppositeBodies,
+        program: Program,
+        wear: LocalWear,
+        friction: Array,
+        watch: Callable[[], object] = lambda: None,
+        heat: StickHeat | None = None,
+        expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded,
+        laws: LocalLaws | None = None,
+        coatings: CoatedBodies | None = None,
+    ) -> None:
+        pair = interface.middle.pair
+        self.expanded, self.laws = expanded, laws
+        self.coatings = coatings or CoatedBodies.bare(len(pair.weights), len(pair.strip.weights))
+        self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
+        self.weights, self.watch, self.heat = pair.weights, watch, heat
+        self.conditions = StepConditions(interface, program, laws, heat, wear.strip.wears)
+        self.losses = StepLosses(self.conditions, wear, self.coatings)
+        self._pressed: PartialSlipState | None = None  # unworn, under the case's loads, where the first cycle begins
+
+    def watching(self, watch: Callable[[], object]) -> PartialSlipProblem:
+        """Return the same with what is called before every time step."""
+        found = self._with(watch=watch)
+        found._pressed = self._pressed
+        return found
+
+    def _with(self, **changed: Any) -> PartialSlipProblem:
+        """Return the same with other arguments."""
+        names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws", "coatings")
+        return PartialSlipProblem(**{**{name: getattr(self, name) for name in names}, **changed})
+
+    def led(self, function: Callable[[], T]) -> T:
+        """Call the function that continues from condensed bodies, on rank 0 for all; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return self.interface.team.lead(function)
+
+    def kept_at(self, heat: StickHeat, temperature: Array) -> PartialSlipProblem:
+        """Return the same at a temperature (dim,) that stays as it is."""
+
+        def expanded(loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
+            return heat.expanded(loaded, temperature, offset)
+
+        return self._with(heat=None, expanded=expanded)
+
+    def worn_like(self, records: TimeStepRecords, first: int) -> PartialSlipProblem:
+        """Return the same whose coatings have the ratios of what a cycle's steps would wear of bases and of them."""
+        if self.losses.one_ratio:
+            return self
+        worn, bases = (self.losses.worn_of(records, first, of_bases=of_bases) for of_bases in (False, True))
+        return self._with(coatings=self.coatings.by(worn, bases))
+
+    def elastic(self) -> PartialSlipProblem:
+        """Return the same whose surfaces are as hard as they like."""
+        interface = copy(self.interface)
+        interface.layers = replace(interface.layers, hardness=np.inf)
+        return self._with(interface=interface)
+
+    def with_heat(self, heat: StickHeat | None) -> PartialSlipProblem:
+        """Return the same with the heat of friction."""
+        return self._with(heat=heat)
+
+    def driven(self, program: Program) -> PartialSlipProblem:
+        """Return the same in other time steps, without heat."""
+        found = self._with(program=program, heat=None)
+        if self.program.same_way(program):
+            found._pressed = self._pressed
+        return found
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest way of the strip's supports, or a fraction of the contact where a force is imposed, mm."""
+        ways = [abs(step.displacement) for step in self.program.steps if step.displacement is not None]
+        return max(ways, default=0.0) or 1e-3 * self.interface.middle.pair.punch.extent()
+
+    def unworn(self) -> WornDepths:
+        """Return the worn depths at the start, none, and what lies between then."""
+        found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
+        return replace(found, crept=self.interface.creep.beginning())
+
+    def shaped(self, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
+        """Return a state on another shape, whose bodies have crept as it says; sticking nodes stay in place."""
+        creep, contact = self.interface.creep, at.contact
+        if creep.creeps and contact.crept is not worn.crept:
+            contact = creep.at(contact, worn.crept)
+        return replace(at, worn=worn, held=None, contact=contact)
+
+    def forgotten(self, at: PartialSlipState) -> PartialSlipState:
+        """Return a state at the start of a cycle whose time steps have not been computed yet."""
+        steps, (n, m) = len(self.program.steps), at.contact.trial.shape
+        none = np.full((steps, n, m), np.nan)
+        return replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=none, slips=none)
+
+    def beginning(self, shape: WornDepths | None = None, load: float = 1.0) -> PartialSlipState:
+        """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
+
+        Args:
+            shape: Depths worn before; by default none.
+            load: Factor of all loads.
+
+        Raises:
+            ConvergenceError: a step did not converge.
+        """
+        return self.led(partial(self._begun, shape, load))
+
+    def _begun(self, shape: WornDepths | None, load: float) -> PartialSlipState:
+        unworn = self.unworn()
+        as_made = load == 1.0 and (shape is None or shape.same(unworn))
+        at = self._pressed if as_made else None
+        if at is None:
+            at = self._pressed_to(shape or unworn, load)
+            if as_made:
+                self._pressed = at
+        at = self.forgotten(at)
+        if self.heat is None:
+            return at
+        return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(at.contact.pressure))
+
+    def _pressed_to(self, worn: WornDepths, load: float) -> PartialSlipState:
+        """Return the state in which the first cycle begins, at a shape and a factor of all loads."""
+        interface, program = self.interface, self.program
+        given = interface.loaded(None if program.steps[-1].fraction is None else 0.0).times(load)
+        loaded = self.expanded(given, 0.0)
+        opening = self.opening(interface.middle, worn)
+        state, before = untouched(interface), Imposed(loaded.times(0), opening)
+        for k in range(1, program.pressing + 1):
+            imposed = replace(
+                before,
+                loaded=loaded.times(k / program.pressing),
+                opening=self.opening(interface.middle, worn),
+                closure=interface.layers.closure_at(interface.middle.pair, worn),
+            )
+            if interface.creep.creeps:  # creep comes with the loads
+                state = interface.creep.at(state, k / program.pressing * worn.crept)
+            state, before = advance(interface, state, before, imposed, self.friction), imposed
+            worn = interface.layers.flown(worn, state.flowed)
+        if program.steps[0].force is not None:
+            before = replace(before, displacement=None, force=state.force)
+        none, still = np.zeros((0, 0)), np.zeros(len(self.weights))
+        at = PartialSlipState(state, replace(before, closure=None), worn, none, none, none, still, still, load=load)
+        for step in program.lead_in:
+            at = self._stepped(self.forgotten(at), step)
+        return at
+
+    def opening(self, position: Position, worn: WornDepths) -> Array:
+        """Return the gap of the unloaded, worn bodies (n,), mm."""
+        moved = self.interface.moved
+        rest = worn if moved is None else worn - moved
+        between = self.interface.layers.opening(position.pair, worn)
+        return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
+
+    def imposed(self, step: TimeStep, at: PartialSlipState) -> tuple[Position, Imposed]:
+        """Return the place of the strip in the time step after a state, and what is imposed at its end; collective."""
+        interface, worn, load = self.interface, at.worn, at.load
+        position = interface.position(step.offset)
+        given = interface.loaded(step.fraction if step.fraction is not None else 0.0).times(load)
+        opening, loaded = self.opening(position, worn), self.expanded(given, step.offset)
+        duration = 0.0 if step.fraction is None else step.duration  # before the cycle begins nothing creeps
+        beside = self._beside(position, step, at.imposed)
+        closure = interface.layers.closure_at(position.pair, worn)
+        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside, closure)
+
+    def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array:
+        """Return what the strip's supports are moved by beside the displacement at the end of a step (n, d), mm.
+
+        Near its place every point of the strip keeps the one opposite: it is moved by the screw that leads from there
+        to its place, and a cycle brings it back. Going far, others come: it is moved on by what slides past them.
+        """
+        if step.way is None:
+            return NO_SHIFT
+        x, field, now = position.pair.punch.x, self.interface.field, step.displacement or 0.0
+        if not position.far:
+            moved = Screw(HERE, step.way.last).field.velocity(x) - now * field.velocity(x)
+            return np.asarray(in_model(moved, x.shape[1]))
+        on = step.way.field.velocity(x) - (now - (before.displacement or 0.0)) * field.velocity(x)
+        return np.asarray(before.beside + in_model(on, x.shape[1]))
+
+    def step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
+        """Return the state after a time step, and its record; the shape stays; collective."""
+        return self.led(partial(self._step, at, step))
+
+    def _step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
+        after = self._stepped(at, step)
+        wear, held = self._passed(at, after, step)
+        return replace(after, held=held), record(self.interface, self.heat, at, after, step, wear)
+
+    def _passed(self, at: PartialSlipState, after: PartialSlipState, step: TimeStep) -> tuple[LocalWear, Held | None]:
+        """Return by what law a time step wears, and what laws remember at its end."""
+        laws, layers, slipped = self.laws, self.interface.layers, np.linalg.norm(after.contact.slip, axis=1)
+        if laws is None:
+            return self.wear, None
+        steps = StepSlips(after.contact.pressure[None], slipped[None], np.array([step.duration]), np.zeros((1, 2, 0)))
+        evolution = self.losses.evolution_of(steps, at)
+        if evolution is None:
+            return laws.wear_at(self.conditions.of_steps(steps, at)[0]), None
+        (conditions,), end, _ = evolution.through(at.held or layers.held(at.worn))
+        return laws.wear_at(conditions), evolution.memory.bounded(end)
+
+    def _stepped(self, at: PartialSlipState, step: TimeStep) -> PartialSlipState:
+        if self.laws is None or not self.laws.changes():
+            return self._advanced(at, step, self.friction)
+        laws, layers, position = self.laws, self.interface.layers, self.interface.position(step.offset)
+        pressure = at.contact.pressure if at.near is None else at.near[0]
+        for _ in range(MOST_FRICTIONS):
+            conditions = laws.conditions(
+                position.pair,
+                pressure,
+                **self.conditions.at_start(at),
+                states=layers.known(position.pair, at.worn, at.held),
+                debris=layers.facing(position.pair, at.worn),
+                touching=at.contact.pressure > 0,  # in the step before: nodes that open and close in turn end nowhere
+            )
+            after = self._advanced(at, step, laws.friction.values(conditions))
+            change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure
+            if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
+                return after
+        raise ConvergenceError(
+            "friction and the pressure that it depends on did not converge in a time step. Use a weaker dependence "
+            "on p, or a smoother table"
+        )
+
+    def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:
+        """Return the state after a time step with friction mu (n,)."""
+        self.watch()
+        position, imposed = self.imposed(step, at)
+        if self.heat is None or not len(at.temperature):  # before the first cycle nothing heats
+            state = advance(self.interface, at.contact, at.imposed, imposed, friction, position, at.near)
+            return self._after(at, state, imposed, step)
+
+        def solved(loaded: LoadEffect, near: tuple[Array, Array] | None) -> StickState:
+            end = replace(imposed, loaded=loaded)
+            return advance(self.interface, at.contact, at.imposed, end, friction, position, near)
+
+        flux = float((friction * at.contact.pressure).max()) * self.reach / step.duration
+        found = coupled_step(self.heat, solved, imposed.loaded, at, step, flux)
+        after = self._after(at, found.state, replace(imposed, loaded=found.loaded), step)
+        return replace(
+            after,
+            temperature=found.temperature,
+            heating=found.heating,
+            conductance=found.conductance,
+            coupling=found.iterations,
+        )
+
+    def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
+        worn = self.interface.layers.flown(at.worn, state.flowed)
+        return at.then(state, replace(imposed, closure=None), worn, step.duration)  # it follows from the depths
+
+    def half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
+        """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
+        return self.led(partial(self._half_cycle, at))
+
+    def _half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
+        steps, parts, begin = self.program.steps, [], at
+        number = steps[at.next_step].half_cycle
+        while steps[at.next_step].half_cycle == number:
+            at, record = self.step(at, steps[at.next_step])
+            parts.append(record)
+            if at.next_step == 0:
+                break
+        records = TimeStepRecords.joined(parts)
+        if self.heat is not None:
+            self.heat.check_bounds(begin.temperature, at.temperature, records.heat)
+        return at, records
+
+    def cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, list[TimeStepRecords]]:
+        """Return the state a cycle later and the records of its half-cycles; the shape stays; collective."""
+        return self.led(partial(self._cycle, at))
+
+    def _cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, list[TimeStepRecords]]:
+        found = []
+        for _ in range(self.program.half_cycles):
+            at, records = self.half_cycle(at)
+            found.append(records)
+        return at, found
+
+
+def on_other_grid(
+    at: PartialSlipState,
+    before: PartialSlipProblem,
+    after: PartialSlipProblem,
+    nodes: NDArray[np.int64],
+    worn: WornDepths,
+) -> PartialSlipState:
+    """Return where a run is on another grid; for rank 0 that leads.
+
+    Args:
+        at: Where it is, between half-cycles.
+        before, after: The bodies on both grids, and what is done to them.
+        nodes: The old node of each new one (n_new,), -1 for none.
+        worn: Depths there.
+    """
+    interface, contact, step = after.interface, at.contact, after.program.steps[at.next_step - 1]
+    position = interface.position(step.offset)
+    loaded = after.expanded(interface.loaded(step.fraction).times(at.load), step.offset)
+    opening, pressure = after.opening(position, worn), _at(contact.pressure, nodes)
+    traction = _along(contact.traction, nodes)
+    f = np.concatenate([pressure, traction.T.ravel()])
+    force, back = position.forces(f)
+    moved = interface.punch.apply(force), -interface.strip.apply(back)
+    old = before.interface.position(before.program.steps[at.next_step - 1].offset).pair.punch.x
+    beside = _affine(old, np.broadcast_to(contact.beside, old.shape), position.pair.punch.x)
+    state = replace(
+        contact,
+        pressure=pressure,
+        traction=traction,
+        gap=on_nodes(contact.gap, nodes, opening),
+        slip=_along(contact.slip, nodes),
+        approach=_at(contact.approach, nodes),
+        on_punch=loaded.on_punch + moved[0],
+        on_strip=loaded.on_strip + at.imposed.strain * interface.bulk + moved[1],
+        trial=_along(contact.trial, nodes),
+        crept=worn.crept,
+        elastic=interface.creep.of_contact(position, f, moved, loaded),
+        beside=beside,
+        flowed=_at(contact.flowed, nodes),
+    )
+    return replace(
+        at,
+        contact=state,
+        imposed=replace(at.imposed, loaded=loaded, opening=opening, beside=beside),
+        worn=worn,
+        pressures=_known(at.pressures, _at(at.pressures, nodes)),
+        trials=_known(at.trials, _along(at.trials, nodes)),
+        slips=_known(at.slips, _along(at.slips, nodes)),
+        slid=_at(at.slid, nodes),
+        speed=_at(at.speed, nodes),
+        held=None,
+    )
+
+
+def _at(values: Array, nodes: NDArray[np.int64]) -> Array:
+    """Return values (..., n) at other nodes, where none was zero."""
+    return on_nodes(values, nodes, np.zeros(len(nodes)))
+
+
+def _along(values: Array, nodes: NDArray[np.int64]) -> Array:
+    """Return vectors (..., n, m) at other nodes, where none was zero."""
+    return np.swapaxes(_at(np.swapaxes(values, -1, -2), nodes), -1, -2)
+
+
+def _known(before: Array, values: Array) -> Array:
+    """Return values of time steps, NaN of those that are not known."""
+    missing = np.isnan(before).reshape(len(before), -1).any(axis=1)
+    return np.where(missing.reshape(-1, *(1,) * (values.ndim - 1)), np.nan, values)
+
+
+def _affine(x: Array, values: Array, there: Array) -> Array:
+    """Return vectors (n, d) that a rigid motion gives points (n, d) at other points."""
+
+    def terms(points: Array) -> Array:
+        return np.column_stack([np.ones(len(points)), points])
+
+    found, *_ = np.linalg.lstsq(terms(x), values, rcond=None)
+    return np.asarray(terms(there) @ found)

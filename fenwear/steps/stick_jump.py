@@ -1,0 +1,349 @@
+"""Cycle jumps in partial slip: many cycles in one implicit-explicit step.
+
+A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
+bodies, so that dy/dn = F(y) over the number n of cycles. Where the strip passes it takes many cycles to forget: there
+the contact runs in at y over as many cycles as the jump has, or until one ends as it begins.
+With M(y) the wear of a cycle whose nodes slip as in the last one (`stick_frozen`), and R = F - M what cycles do beside
+it, a jump is that of `fenwear.steps.jump_method`, as in gross sliding, where nothing is beside M.
+
+R is known from the cycle at the begin and one halfway, to which a first step with R as it is at the begin leads. A
+second step starts there; the cycle at its end begins the next jump. Its error has two
+parts: of M a third of the difference to one step over the whole jump, and of R Simpson's rule against the line, each as
+the last stage damps it.
+
+Layers change with the depths: y has its state, too. Of coated bodies y has the wear of their coatings if these lasted,
+by the ratio of the wear of base and coating in the jump's first cycle: that grows evenly through their end
+(`fenwear.laws.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere. No depth decreases. A cycle whose
+error is too large goes in parts, of which each is such a jump: N is below 1. Loads that change are those of each
+cycle's own time.
+
+With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
+is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from fenwear.common.arrays import Array
+from fenwear.common.errors import ConvergenceError
+from fenwear.contact import ContactState
+from fenwear.laws.wear import WornDepths
+from fenwear.steps.jump_method import FINE, HALVES, Attempt, Estimate, JumpLaw, Lengths, Moment, Sizes, attempt
+from fenwear.steps.stick_creep import opened_by_creep
+from fenwear.steps.stick_cycle import PartialSlipProblem
+from fenwear.steps.stick_frozen import Frozen
+from fenwear.steps.stick_heat import HeatHistory
+from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords
+from fenwear.steps.stick_state import NO_HEAT, PartialSlipState
+
+MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
+TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
+REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
+MOST_RUN_IN, CLOSED = 20, 1e-3  # cycles until one closes; its change of tractions, over all of them
+SHORTEST = 1 / 256  # of a cycle: the shortest part of one
+
+
+def jumped(
+    problem: PartialSlipProblem,
+    now: FrettingCycle,
+    cycles: int,
+    tolerance: float,
+    load: Callable[[float], float] = lambda _: 1.0,
+    fits: Callable[[FrettingCycle], bool] = lambda _: True,
+) -> FrettingCycle:
+    """Return the cycle after the next jump that is accurate enough: of many cycles, or of one in parts.
+
+    Args:
+        problem: The bodies and what is done to them.
+        now: The cycle to continue from.
+        cycles: Number in all.
+        tolerance: Largest estimated error of one jump.
+        load: Factor of all loads after so many cycles.
+        fits: Whether the nodes suffice for the cycle after it: it is halved where they do not.
+
+    Raises:
+        ConvergenceError: the shortest part of a cycle did not converge.
+    """
+    begin, length, error, lengths = now, now.length, 0.0, Lengths(tolerance, SHORTEST)
+
+    def left(length: float) -> float:
+        return cycles - begin.number if now is begin and length >= 1 else begin.number + 1 - now.number
+
+    def made(tried: float) -> tuple[FrettingCycle, Estimate]:
+        nonlocal now
+        if tried < 1 and now is begin and problem.interface.moves:  # parts of a cycle begin with what has run in by it
+            again = _cycle_after(problem, begin, begin.end, begin.worn, begin.number, 1)
+            now = replace(again, worn=begin.worn, finer=begin.finer)
+        return _attempt(problem, now, tried, load, begin)
+
+    while True:
+        then, estimate, _, length = lengths.accepted(length, left, made, fits)
+        error = max(error, estimate.largest)
+        if then.number > begin.number + 1 - SHORTEST / 2:
+            return replace(then, number=round(then.number), length=length, error=error)
+        now = then
+
+
+def first_cycle(
+    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: float, warm: Array = NO_HEAT
+) -> FrettingCycle:
+    """Return the cycle at a shape from which jumps continue, with its temperatures at its start (dim,).
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    led, heat = _led_to(problem, at, worn, 1), problem.heat
+    if heat is not None:
+        led = replace(led, temperature=warm if len(warm) else heat.initial())
+    return _recorded(problem, led, at.slid, worn, number)
+
+
+def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, cycles: int) -> PartialSlipState:
+    """Return the state at a shape from which the last of so many cycles there begins.
+
+    Slip and distance are those of a cycle whose middle is `at`. Where the strip passes, the contact runs in from cycle
+    to cycle until they close. Elsewhere it forgets within one, or half a one where nothing else changes in a cycle.
+    """
+    program, own, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
+    at = problem.shaped(at, own.layers.flown_as(worn, at.worn))
+    if own.moves:
+        for _ in range(min(cycles - 1, MOST_RUN_IN)):
+            before = at
+            at, _ = problem.cycle(at)
+            half = (at.slid - before.slid) / 2
+            last = at.contact.traction
+            if np.abs(last - before.contact.traction).sum() <= CLOSED * np.abs(last).sum():
+                break
+        return replace(at, slid=slid - half)
+    # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
+    constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
+    if program.half_cycles == 2 and constant and problem.heat is None:
+        at, _ = problem.half_cycle(at)
+        return replace(at, slid=2 * slid - at.slid)
+    at, _ = problem.cycle(at)
+    return replace(at, slid=slid - (at.slid - slid) / 2)
+
+
+def _cycle_after(
+    problem: PartialSlipProblem,
+    before: FrettingCycle,
+    at: PartialSlipState,
+    worn: WornDepths,
+    number: float,
+    cycles: int,
+) -> FrettingCycle:
+    """Return the cycle at a shape, with the temperatures that the cycles since one before lead to.
+
+    Args:
+        problem: The bodies and what is done to them.
+        before: The last whole cycle.
+        at: Where the time steps are, so many cycles earlier.
+        worn: Depths.
+        number: Its own.
+        cycles: Run there, of which it is the last.
+
+    Raises:
+        ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
+    """
+    led, heat, slid = _led_to(problem, at, worn, cycles), problem.heat, at.slid
+    if heat is None:
+        return _recorded(problem, led, slid, worn, number)
+    since, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
+    if since <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
+        return _recorded(problem, replace(led, temperature=before.warm + since * rate), slid, worn, number)
+    warm = heat.through(_course(before, steps)).after(before.warm, since)
+    for _ in range(MOST_HEATINGS):
+        found = _recorded(problem, replace(led, temperature=warm), slid, worn, number)
+        over = heat.through(_course(found, steps))
+        again = over.after(before.warm, since)
+        warmest = float(np.abs(heat.surfaces(again)).max())
+        if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
+            wrong = heat.exchange.contact_changes(over.error(before.warm, again, rate, since))
+            return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
+        warm = again
+    raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
+
+
+def _recorded(
+    problem: PartialSlipProblem, at: PartialSlipState, slid: Array, worn: WornDepths, number: float
+) -> FrettingCycle:
+    """Return the cycle at a shape from a state; its nodes have slid so far (n,), mm, in its middle."""
+    layers, creep = problem.interface.layers, problem.interface.creep
+    begin = problem.shaped(at, layers.flown_as(worn, at.worn))
+    first, warm = begin.next_step, begin.temperature
+    at, parts = problem.cycle(begin)
+    rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
+    rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
+    bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
+    end = replace(at, slid=slid)
+    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, end, warm=warm)
+
+
+def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
+    """Return the heat of a cycle's time steps."""
+    records = cycle.records
+    numbers = [(cycle.first_step + k) % steps for k in range(len(records))]
+    return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
+
+
+@dataclass(frozen=True)
+class _Moment(Moment):
+    """The end of a stage, and where it began and how many cycles it was long.
+
+    Of coated bodies its depths are the wear of their coatings if these lasted.
+    """
+
+    begin: WornDepths
+    length: float = 0.0
+
+
+class _Jump(JumpLaw[_Moment]):
+    """Data of the law for a jump from a cycle; temperatures continue from those of the last whole cycle."""
+
+    def __init__(
+        self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], whole: FrettingCycle
+    ) -> None:
+        self.problem, self._now, self._load, self._whole = problem, now, load, whole
+        self._layers, self._coatings = problem.interface.layers, problem.coatings
+        self._frozen, y = Frozen(problem, now), self._coatings.measured(now.worn)
+        self.begin = _Moment(y, self._frozen.contact, 0.0, y)
+        self._first = self._beside(now, self.begin)
+        self._bend = self._first.times(0.0)  # R is their line
+        self._middle = self.then = now  # the cycles halfway and at the end
+
+    def depths(self, worn: WornDepths) -> WornDepths:
+        """Return the depths of a moment, no thickness below zero."""
+        return self._layers.settled(self._on_the_way(worn))
+
+    def moment(self, worn: WornDepths) -> _Moment:
+        """Return the begin at other depths."""
+        return replace(self.begin, worn=self._coatings.measured(worn))
+
+    def _on_the_way(self, worn: WornDepths) -> WornDepths:
+        """Return the depths at the begin of a stage: they may overshoot, and so may debris."""
+        return self._layers.bounded(self._coatings.depths(worn))
+
+    def stage(
+        self,
+        before: _Moment,
+        cycles: float,
+        time: float,
+        near: ContactState,
+        digits: float,  # noqa: ARG002
+    ) -> _Moment:
+        """Return z = before + cycles (M(z) + R(time)); to all digits."""
+        begin = before.worn + self._at(time).times(cycles)
+        worn, contact = self._frozen.stage(self._on_the_way(begin), cycles, near)
+        return _Moment(self._coatings.measured(worn), contact, time, begin, cycles)
+
+    def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
+        """Return before + cycles (M + R), at the rate of a stage."""
+        rate = (stage.worn - stage.begin).times(1 / stage.length) + self._at(stage.time)
+        return replace(stage, worn=before.worn + rate.times(cycles))
+
+    def settled(self, end: _Moment) -> _Moment:
+        """Return the end of a step, without depths below those at the begin of the jump."""
+        (punch, strip), first = (end.worn.punch, end.worn.strip), self.begin.worn
+        worn = replace(end.worn, punch=np.maximum(punch, first.punch), strip=np.maximum(strip, first.strip))
+        return replace(end, worn=worn)
+
+    def halfway(self, half: _Moment, cycles: float) -> _Moment:
+        """Return the state halfway with R as it is found there, in place of that at the begin all the way."""
+        self._middle = self._cycle(half, cycles / 2)
+        self._bend = (self._beside(self._middle, half) - self._first).times(2 / cycles)
+        return self.settled(replace(half, worn=half.worn + self._bend.times(cycles**2 / 8)))
+
+    def ended(self, end: _Moment, cycles: float) -> None:
+        """Take the cycle at the end of a jump."""
+        self.then = self._cycle(end, cycles)
+
+    def estimate(self, made: Attempt[_Moment]) -> tuple[Estimate, WornDepths]:
+        """Return the error of a jump, and what R leaves of it, by Simpson's rule."""
+        end, interface = made.end, self.problem.interface
+        curved = self._beside(self.then, end) - self._at(made.cycles)
+        start = replace(end, worn=end.begin - self._at(end.time).times(end.length) + curved.times(made.cycles / 6))
+        missed = end.worn - self.stage(start, end.length, end.time, end.contact, FINE).worn
+        opened = partial(opened_by_creep, interface.middle, interface.creep)
+        begin, whole, last = (self.depths(one.worn) for one in (made.begin, made.whole, end))
+        parts = (whole - last).times(HALVES), self._on_the_way(end.worn) - self._on_the_way(end.worn - missed)
+        sizes = Sizes(self._layers, interface.middle.pair, opened, REST)
+        of_heat = max(self._middle.error, self.then.error)
+        return sizes.estimate((begin, last), made, parts, of_heat), missed
+
+    def _at(self, time: float) -> WornDepths:
+        """Return R after so many cycles of the jump."""
+        return self._first + self._bend.times(time)
+
+    def _beside(self, cycle: FrettingCycle, at: _Moment) -> WornDepths:
+        """Return R of a cycle at the end of a stage.
+
+        Raises:
+            ConvergenceError: it is beyond all numbers.
+        """
+        found = self._coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn)
+        if not all(
+            np.isfinite(part).all() for part in (found.punch, found.strip, found.between, found.carried, found.crept)
+        ):
+            raise ConvergenceError(TOO_LARGE)
+        return found - self._coatings.with_slopes(self._frozen.rate(at.contact, cycle.worn), cycle.worn)
+
+    def _cycle(self, end: _Moment, done: float) -> FrettingCycle:
+        """Return the cycle so many later, at the end of a step.
+
+        It continues from the last one of the jump; but where not a whole cycle lies between them, from the last whole
+        one, as all its parts do.
+        """
+        now, start, whole, last = self._now, _slid_on(self._now, done, self._load), self._whole, self._middle
+        worn = _balanced(self.problem, now.worn, self.depths(end.worn))
+        number = now.number + done
+        cycles = max(1, int(number - whole.number)) - max(int(last.number - whole.number), int(last is not whole))
+        after = last if cycles else whole
+        at = replace(after.end, slid=start.slid, load=start.load)
+        return _cycle_after(self.problem, whole, at, worn, number, max(cycles, 1))
+
+
+def _attempt(
+    problem: PartialSlipProblem,
+    now: FrettingCycle,
+    cycles: float,
+    load: Callable[[float], float],
+    begin_of_heat: FrettingCycle,
+) -> tuple[FrettingCycle, Estimate]:
+    """Return the cycle after a jump, and its error; temperatures continue from those of the last whole cycle."""
+    law = _Jump(problem.worn_like(now.records, now.first_step), now, load, begin_of_heat)
+    made = attempt(law, law.begin, cycles)
+    estimate, missed = law.estimate(made)
+    finer = None
+    if now.finer is not None:
+        finer = law.depths(made.finer(law, law.begin if now.finer is now.worn else law.moment(now.finer)).worn - missed)
+    return replace(law.then, finer=finer), estimate
+
+
+def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
+    """Return depths whose ejected debris is what was worn and does not lie there, to rounding.
+
+    Else it would not be where depths are kept from falling, or coatings end. Ejected debris opens nothing: what is
+    missing of it is spread evenly.
+    """
+    layers, pair = problem.interface.layers, problem.interface.middle.pair
+    if not layers.debris.present:
+        return after
+    change = after - before
+    worn = pair.weights @ change.punch + pair.strip.weights @ change.strip
+    if layers.strip_carries:
+        weights, changed, state = pair.strip.weights, change.carried, after.carried.copy()
+    else:
+        weights, changed, state = pair.weights, change.between, after.between.copy()
+    state[1] += (worn - float(weights @ changed[:2].sum(axis=0))) / weights.sum()
+    return layers.with_debris(after, state)
+
+
+def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
+    """Return the end of a cycle under the load of so many later, as far as the slip of its nodes determines it."""
+    slid = now.end.slid + cycles * now.records.slip_magnitude.sum(axis=0)
+    return replace(now.end, load=load(now.number + cycles), slid=slid)

@@ -1,0 +1,77 @@
+"""Where the counter-body is: a rigid motion from the place in which it was meshed.
+
+Space has the axes x, y and z; a plane or axisymmetric model lies in x and z, at y = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fenwear.common.arrays import Array
+
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+def in_space(vectors: Array) -> Array:
+    """Return vectors (n, d) with all three components (n, 3)."""
+    if vectors.shape[1] == 3:
+        return vectors
+    return np.stack([vectors[:, 0], np.zeros(len(vectors)), vectors[:, 1]], axis=1)
+
+
+def in_model(vectors: Array, dim: int) -> Array:
+    """Return the components (n, d) that a model of d dimensions has of vectors (n, 3)."""
+    return vectors if dim == 3 else vectors[:, [0, 2]]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A turn about an axis and then a shift.
+
+    Attributes:
+        shift: mm.
+        turn: Rotation vector, rad.
+        centre: A point on the axis of the turn, mm.
+    """
+
+    shift: Vector = ZERO
+    turn: Vector = ZERO
+    centre: Vector = ZERO
+
+    def __str__(self) -> str:
+        """Say where the body is."""
+        shift, turn = (next((c for c in v if c), 0.0) for v in (self.shift, self.turn))
+        return f"turned by {turn:g} rad" if turn else f"moved by {shift:g} mm"
+
+    def points(self, x: Array) -> Array:
+        """Return where points (n, d) of the body are, mm."""
+        if self.turn == ZERO:
+            return x + in_model(np.array([self.shift]), x.shape[1])
+        moved = self._rotation.apply(in_space(x) - self.centre) + self.centre + self.shift
+        return in_model(moved, x.shape[1])
+
+    def points_back(self, x: Array) -> Array:
+        """Return what points (n, d) in space are in the body's own frame, mm."""
+        if self.turn == ZERO:
+            return x - in_model(np.array([self.shift]), x.shape[1])
+        moved = self._rotation.inv().apply(in_space(x) - self.centre - self.shift) + self.centre
+        return in_model(moved, x.shape[1])
+
+    def vectors(self, v: Array) -> Array:
+        """Return vectors (n, d) that turn with the body."""
+        return v if self.turn == ZERO else in_model(self._rotation.apply(in_space(v)), v.shape[1])
+
+    def back(self, v: Array) -> Array:
+        """Return vectors (n, d) in the body's own frame."""
+        return v if self.turn == ZERO else in_model(self._rotation.inv().apply(in_space(v)), v.shape[1])
+
+    @property
+    def _rotation(self) -> Rotation:
+        return Rotation.from_rotvec(self.turn)
+
+
+HERE = Placement()

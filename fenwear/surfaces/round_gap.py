@@ -1,0 +1,107 @@
+"""The gap of round surfaces: that of their circles, cylinders and spheres, not of the facets that follow them.
+
+Facets of both surfaces leave their circles here and there, by what differs from node to node where meshes do not match:
+pressures of stiff or closely fitting bodies would go to and fro by it, and no wear of the punch would even it out under
+a strip that moves. With the surfaces x_p and x_s of the facets opposite each other, and the distance g of the circles,
+
+    g_i = integral of psi_i g / w_i,    e_n = the normal of the strip's circle at the node,
+
+by the psi_i of the transfer (`transfer`), which take displacements along, too. Where meshes have followed the wear what
+the circles add to the facets is that of the meshes as they were made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.round_surfaces import Round
+from fenwear.common.arrays import Array
+from fenwear.surfaces.common_normal import unit
+from fenwear.surfaces.overlap import Patch
+from fenwear.surfaces.placement import Placement
+from fenwear.surfaces.transfer import dual_means
+
+
+@dataclass(frozen=True)
+class RoundShape:
+    """Depth of round surfaces below their facets, at the punch's pressure nodes; zero where the strip is not round.
+
+    Attributes:
+        turned: To be added to the normal of the facets (n, d).
+        moved: To be added to the way from the strip's facets to the punch's (n, d), mm.
+    """
+
+    turned: Array
+    moved: Array
+
+
+def round_shape(
+    parts: Sequence[Patch],
+    punch: ContactSurface,
+    strip: ContactSurface,
+    placement: Placement,
+    transfer: csr_array,
+    material: csr_array,
+) -> RoundShape:
+    """Return what round surfaces are besides their facets.
+
+    Args:
+        parts: The patches of the contact.
+        punch, strip: The surfaces.
+        placement: Of the strip.
+        transfer, material: As of `pair.ContactPair`: what takes the strip's trace and its pressure nodes to the punch.
+    """
+    own, other = punch.made or punch, strip.made or strip
+    none: Array = np.zeros_like(punch.x)
+    of_strip = [_placed(one, placement) for one in strip.rounds[0]]
+    if not of_strip:
+        return RoundShape(none, none)
+    opposite = _opposite(parts, len(punch.weights), strip)
+    round_ = opposite >= 0
+    if not round_.any():
+        return RoundShape(none, none)
+    of_punch, on_punch = punch.rounds
+    gaps = []
+    for part in parts:
+        first, second, common = part.first, part.second, part.common
+        nodes = first.facets[common.facet1]
+        x = np.einsum("qk,qkc->qc", first.shape_functions(common.points1), own.trace[nodes])
+        for k, one in enumerate(of_punch):
+            there = on_punch[nodes[:, 0]] == k
+            x[there] = one.onto(x[there])
+        gap: Array = np.zeros(len(x))
+        below = strip.rounds[1][second.facets[common.facet2][:, 0]]
+        for k, one in enumerate(of_strip):
+            there = below == k
+            gap[there] = one.sign * (np.linalg.norm(one.ways(x[there]), axis=1) - one.radius)
+        gaps.append(gap)
+    means, normal = dual_means(parts, gaps), np.ones_like(own.x)
+    for k, one in enumerate(of_strip):
+        normal[opposite == k] = one.sign * unit(one.ways(own.x[opposite == k]))
+    of_facets = unit(material @ placement.vectors(other.outward))
+    apart = own.spread.T @ own.trace - transfer @ placement.points(other.trace)
+    missing = means - np.einsum("ic,ic->i", normal, apart)
+    return RoundShape(
+        np.where(round_[:, None], normal - of_facets, none), np.where(round_[:, None], missing[:, None] * normal, none)
+    )
+
+
+def _placed(one: Round, placement: Placement) -> Round:
+    """Return a circle where its body is."""
+    return Round(placement.points(one.middle[None])[0], placement.vectors(one.axis[None])[0], one.radius, one.sign)
+
+
+def _opposite(parts: Sequence[Patch], count: int, strip: ContactSurface) -> Array:
+    """Return what of the strip is opposite each of the punch's nodes (n,), -1 where that is not round."""
+    most = len(strip.rounds[0])
+    found = np.full(count, most)
+    for part in parts:
+        common, nodes = part.common, part.first.pressure_facets[part.common.facet1]
+        below = np.broadcast_to(strip.rounds[1][part.second.facets[common.facet2][:, :1]], nodes.shape)
+        np.minimum.at(found, nodes[nodes >= 0], below[nodes >= 0])
+    return np.where(found == most, -1, found)

@@ -1,0 +1,499 @@
+"""Punch and strip, condensed and joined in every phase of the motion, with the heat of the motion prepared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_array, hstack
+
+from fenwear.bodies.condensation import CondensedBody
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.response import Request, identity
+from fenwear.bodies.surface_operators import Relocatable, SurfaceOperator, operators_for
+from fenwear.case.body_names import told_by_name
+from fenwear.case.program import speeds_of
+from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
+from fenwear.common.parallel import all_together
+from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
+from fenwear.heat.heat_exchange import HeatExchange
+from fenwear.heat.passage import Passage
+from fenwear.heat.prepare import prepare_exchange, prepare_steady
+from fenwear.laws import Layers
+from fenwear.laws.layers import SOFT
+from fenwear.laws.wear import WornDepths
+from fenwear.surfaces import Interface, RigidEquilibrium
+from fenwear.surfaces.sliding_field import node_rates
+from fenwear.system.both_bodies import Bodies
+from fenwear.system.contact_grids import check_felt
+from fenwear.system.contact_setup import MIDDLE, ContactSetup
+from fenwear.system.memory_estimate import Resources, setup_resources
+from fenwear.system.surface_creep import Creep, creep_of
+
+T = TypeVar("T")
+Preparation = Literal["as set", "reduced", "none"]  # of the heat
+CARRIED = 1e-6  # of the loads: what the contact carries by rounding
+SAME = 1e-12  # of the largest load: what of another is rounding
+ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Both bodies condensed onto the contact.
+
+    Attributes:
+        punch: Onto the contact nodes.
+        strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        strip_moves: Which of the two.
+        passed: Motion of the strip's surface along its normal by each kelvin of this rank's nodes, at the trace nodes
+            of its passage (q, owned), mm/K, where it conducts and passes under the punch.
+    """
+
+    punch: SurfaceOperator
+    strip: SurfaceOperator
+    strip_moves: bool
+    passed: Array | None = None
+
+    def join(self, rigid: RigidEquilibrium, layer: Array | float) -> Interface:
+        """Return both joined at the place of a pair, with a linear layer."""
+        strip, moves = self.facing(rigid)
+        return Interface(rigid, self.punch, strip, moves, layer=layer)
+
+    def facing(self, rigid: RigidEquilibrium) -> tuple[SurfaceOperator, bool]:
+        """Return how the strip answers at the place of a pair, and whether it moves as a whole: not on a grid."""
+        pair, strip = rigid.pair, self.strip
+        if self.strip_moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
+            return strip.at(pair.placement.points_back(pair.punch.x)), False
+        return strip, self.strip_moves
+
+    def under_loads(self, bodies: Bodies) -> Condensed:
+        """Return the same under the loads of these bodies; collective."""
+        return replace(self, punch=self.punch.under(bodies.punch), strip=self.strip.under(bodies.strip))
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tribosystem(ContactSetup):
+    """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
+
+    Attributes:
+        condensed: Both bodies' answers to forces on the contact.
+        interface: The condensed interface in the middle position, under the mean loads.
+        interfaces: The same in each phase.
+        exchange: The bodies' temperatures over the phases; isothermal without heat, or where it was not asked for.
+        law_state: Parts that the law of contact has prepared.
+        creep: Creep of bodies and layer.
+    """
+
+    condensed: Condensed
+    interface: Interface
+    interfaces: tuple[Interface, ...]
+    creep: Creep
+    exchange: HeatExchange
+    law_state: Any = None
+
+    @property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
+        return float(self.contact_law.elastic_length(self))
+
+    @cached_property
+    def layers(self) -> Layers:
+        """Layers between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
+        found = super().layers
+        return found if found.hardness == np.inf else replace(found, softness=SOFT * self.interface.elastic_length)
+
+    @property
+    def replicated(self) -> bool:
+        """Whether every rank could continue alone: no temperatures of all nodes, no contact on all displacements."""
+        return bool(self.contact_law.replicated(self))
+
+    def led(self, function: Callable[[], T]) -> T:
+        """Call a function of prepared bodies, on rank 0 for all where possible, else on every rank; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return self.team.lead(function) if self.replicated else function()
+
+    def contact(self, directions: Sequence[int]) -> ContactSolver:
+        """Return the contact in the middle position under the mean loads.
+
+        Args:
+            directions: Sliding direction d of each phase that is solved for.
+        """
+        phases = [SlidingContact(self.interface, self.friction_ratio(d)) for d in directions]
+        return self._contact(phases)
+
+    def phase_contact(self, phases: Sequence[int]) -> ContactSolver:
+        """Return the contact of phases of the motion, given by their numbers."""
+        ratios = self.friction_ratios()
+        sliding = [SlidingContact(self.interfaces[k], ratios[k]) for k in phases]
+        return self._contact(sliding)
+
+    def passed_contact(self, phase: int, *, capped: bool = True) -> ContactSolver:
+        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can."""
+        return self._contact(
+            [SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])],
+            self.layers.hardness if capped else np.inf,
+        )
+
+    def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
+        """Return the gap of the unloaded, worn bodies in a phase (n,), mm.
+
+        Args:
+            phase: Its number.
+            worn: Depths at its start, what lies between and what has crept.
+            passing: Whether creep continues over the phase, in a march; else it is left out.
+        """
+        found = super().gap(phase, worn)
+        return found + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else found
+
+    def unworn(self) -> WornDepths:
+        """Return the worn depths at the start, none, what lies between then, and that nothing has crept."""
+        return replace(super().unworn(), crept=self.creep.beginning())
+
+    def _contact(
+        self,
+        phases: list[SlidingContact],
+        most: float = np.inf,
+    ) -> ContactSolver:
+        return CondensedContact(phases, self.remedies, self.team, most)
+
+    @told_by_name
+    def check_touching(self) -> None:
+        """Make sure that the surfaces touch in some phase; collective.
+
+        Raises:
+            CaseError: they never meet: no pressure, no wear, nothing to follow.
+            ConvergenceError: the contact of a phase did not converge.
+        """
+        self.contact_law.check_touching(self)
+
+    def check_carried(self, force: float) -> None:
+        """Raise where supports carry all of the loads.
+
+        Args:
+            force: Of the contact, N/mm in the plane, N else.
+        """
+        bodies = (self.bodies.punch, self.bodies.strip)
+        given = max(float(np.abs(body.given).max(initial=0.0)) for body in bodies)
+        if self.rigid.mode_names or any(body.moved for body in bodies) or force * bodies[0].thickness > CARRIED * given:
+            return
+        raise CaseError(
+            InputError(
+                "punch.supports",
+                f"they carry all of the load of {given:.4g} N: none of it reaches the contact. Expected a punch that "
+                "is free to come down, or a support that is moved `by` an approach in place of the load",
+            )
+        )
+
+
+def resources_of(placed: ContactSetup) -> Resources:
+    """Return what condensing the bodies and joining them will ask for; collective."""
+    moves, fixed, flat = _frame(placed)
+    nodes, dim = len(placed.pair.weights), placed.pair.punch.dim
+    on_strip = len(placed.pair.strip.trace) if moves else nodes
+    axes = 1 if fixed else dim, 1 if not moves or (fixed and flat) else dim
+    asked = (nodes, nodes * axes[0]), (on_strip, on_strip * axes[1])
+    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
+    return setup_resources(placed.bodies, nodes, asked, interfaces * dim + 2 * len(placed.pairs) + 1)
+
+
+def elastic(placed: ContactSetup, *, fresh: bool = False) -> Tribosystem:
+    """Condense both bodies and join them in every phase; collective.
+
+    Factors both stiffnesses, unless the bodies are kept on disk.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+
+    Raises:
+        CaseError: there is not memory enough.
+    """
+    return joined(placed, condense_bodies(placed, fresh=fresh))
+
+
+def condense_bodies(placed: ContactSetup, *, fresh: bool = False) -> Condensed:
+    """Condense both bodies onto what the phases of the motion ask for; collective.
+
+    They are kept on disk, but with properties of temperatures that no other run has.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+
+    Raises:
+        CaseError: there is not memory enough.
+    """
+    resources_of(placed).check()
+    bodies, middle = placed.bodies, placed.pair
+    made = [
+        body.thermal_coupling(conduction.space)
+        for body, conduction in zip((bodies.punch, bodies.strip), bodies.heat, strict=False)
+    ]
+    couplings: Sequence[PETSc.Mat | None] = made or (None, None)
+    # In one frame, forces and displacements along its normals are all that is ever asked for.
+    moves, fixed, flat = _frame(placed)
+    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
+    if moves:
+        trace = middle.strip.trace
+        along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
+        onto_strip = Request(bodies.strip, identity(len(trace)), along, couplings[1])
+    else:
+        opposite = csr_array(middle.transfer.T)
+        onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1])
+    if placed.passage is not None:
+        onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
+    punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
+    check_felt(middle, bodies.punch, bodies.strip)
+    for coupling in made:
+        coupling.destroy()
+    if placed.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
+        return Condensed(punch, strip, moves)
+    n = len(middle.weights)
+    return Condensed(punch, strip.first(n), moves, strip.by_temperature[n:])
+
+
+def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> Request:
+    """Return the request with the strip's trace nodes of the passage, along its normal, after the others."""
+    nodes = passage.nodes
+    outward = strip.extension @ strip.outward
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    picked = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(strip.trace), len(nodes)))
+    patterns = csr_array(hstack([request.patterns, picked]))
+    return replace(request, patterns=patterns, directions=np.vstack([request.along[:, :, 0], outward[nodes]]))
+
+
+def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
+    """Join the condensed bodies in every phase; what phases share is made once; collective."""
+    interface = condensed.join(placed.rigid, placed.layers.winkler)
+    under = _under_all(condensed, placed)
+    found: list[Interface] = []
+    for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
+        earlier = next((j for j in range(k) if placed.rigids[j] is rigid and placed.loaded[j] is bodies), None)
+        if rigid is placed.rigid:
+            found.append(interface)
+        elif earlier is not None:
+            found.append(found[earlier])
+        else:
+            own = under[id(bodies)]
+            alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
+            layer = placed.layers.winkler
+            found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
+    parts = {name: getattr(placed, name) for name in ContactSetup.__dataclass_fields__}
+    interfaces = tuple(found)
+
+    def on_material(phase: int) -> Interface:
+        own, bodies = interfaces[phase], under[id(placed.loaded[phase])]
+        return own if own.strip is bodies.strip else Interface(own.rigid, bodies.punch, bodies.strip, strip_moves=True)
+
+    creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
+    return Tribosystem(
+        **parts,
+        condensed=condensed,
+        interface=interface,
+        interfaces=interfaces,
+        exchange=exchange or placed.isothermal,
+        creep=creep,
+    )
+
+
+def _under_all(condensed: Condensed, placed: ContactSetup) -> dict[int, Condensed]:
+    """Return the condensed bodies under the loads of each phase, by the id of its bodies; collective.
+
+    Displacements are linear in the loads: solved are those that the others are made of.
+    """
+    others = list({id(one): one for one in placed.loaded if one is not placed.bodies}.values())
+    found = {id(placed.bodies): condensed}
+    if not others:
+        return found
+    loads = np.array([np.concatenate([one.punch.load, one.strip.load]) for one in (placed.bodies, *others)])
+    chosen, shares = _spanning(placed.comm, loads)
+    base = [condensed if k == 0 else condensed.under_loads(others[k - 1]) for k in chosen]
+    for own, bodies in zip(shares.T[1:], others, strict=True):
+        if isinstance(condensed.punch, CondensedBody) and isinstance(condensed.strip, CondensedBody):
+            on_punch, on_strip = (
+                np.asarray(np.tensordot(own, [body.by_load for body in bodies_of], 1), dtype=np.float64)
+                for bodies_of in ([one.punch for one in base], [one.strip for one in base])
+            )
+            found[id(bodies)] = replace(
+                condensed,
+                punch=replace(condensed.punch, by_load=on_punch),
+                strip=replace(condensed.strip, by_load=on_strip),
+            )
+        else:
+            found[id(bodies)] = condensed.under_loads(bodies)
+    return found
+
+
+def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
+    """Return loads that span all others, and their shares in each (chosen, all); collective.
+
+    The first is among them. One after the other that which differs most from those before is taken, and its direction
+    out of all (Gram and Schmidt, with pivoting).
+
+    Args:
+        comm: The ranks.
+        loads: At this rank's own degrees of freedom (all, owned).
+    """
+    left = loads.copy()
+    sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
+    chosen: list[int] = []
+    scale, parts = sizes.max(initial=0.0), []
+    while len(chosen) < len(loads):
+        best = 0 if not chosen and sizes[0] > SAME * scale else int(np.argmax(sizes))
+        if chosen and sizes[best] <= SAME * scale:
+            break
+        chosen.append(best)
+        along = left[best] / max(sizes[best], 1e-300)
+        parts.append(comm.allreduce(left @ along))
+        left -= np.outer(parts[-1], along)
+        sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
+    whole = np.array(parts)
+    return chosen, np.linalg.lstsq(whole[:, chosen], whole, rcond=None)[0]
+
+
+def answers_for(before: ContactSetup, placed: ContactSetup) -> bool:
+    """Return whether bodies condensed for one motion answer for another one, too."""
+    frame = _frame(placed)
+    if _frame(before) != frame:
+        return False
+    first, second = (np.zeros(0) if one.passage is None else one.passage.nodes for one in (before, placed))
+    return np.array_equal(first, second)
+
+
+def _frame(placed: ContactSetup) -> tuple[bool, bool, bool]:
+    """Return whether the strip moves as a whole, whether the frame stays, and whether the strip is flat."""
+    middle = placed.pair
+    moves = any(pair.transfer is not middle.transfer for pair in placed.pairs)
+    fixed = all(_close(pair.normal, middle.normal) for pair in placed.pairs)
+    return moves, fixed, not moves or _close(middle.normal_on_strip, middle.normal_on_strip[:1])
+
+
+def _close(first: Array, second: Array) -> bool:
+    return bool(np.abs(first - second).max() < ROUNDING)
+
+
+def with_exchange(
+    system: Tribosystem, *, reduced: bool | None = None, keep: bool = False, fresh: bool = False
+) -> Tribosystem:
+    """Return the system with the heat of its motion prepared; collective.
+
+    Args:
+        system: With condensed bodies.
+        reduced: Whether temperatures are reduced to a small basis, as whole cycles need; by default as
+            the settings say.
+        keep: Whether what is reduced is kept on disk, and taken from there where it is.
+        fresh: Reduce whatever is kept.
+    """
+    if system.heat is None:
+        return system
+    all_together(system.comm)
+    reduced = system.heat.operator == "reduced" if reduced is None else reduced
+    exchange = prepare_exchange(
+        system.heat,
+        system.bodies.heat,
+        system.pair,
+        expansions(system),
+        system.sliding.field,
+        system.motion,
+        heating_frictions(system),
+        system.bodies.punch.thickness,
+        reduced=reduced,
+        passage=system.passage,
+        others=speeds_of(system.case),
+        keep=keep,
+        fresh=fresh,
+    )
+    return replace(system, exchange=exchange.through(system.layer_conductance()))
+
+
+def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = False) -> Tribosystem:
+    """Return the system with its heat on a small basis, whatever the settings say; see `with_exchange`; collective."""
+    if system.heat is None or (system.exchange.conducts and system.exchange.reduced):
+        return system
+    return with_exchange(system, reduced=True, keep=keep, fresh=fresh)
+
+
+def preparation(system: Tribosystem) -> Preparation:
+    """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
+    if system.heat is None:
+        return "as set"
+    if not system.exchange.conducts:
+        return "none"
+    return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
+
+
+def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:
+    """Return the exchange whose phases are steady states at these velocities of the strip; collective.
+
+    Raises:
+        CaseError: there is no heat, or a body has no heat sink.
+    """
+    if system.heat is None:
+        raise CaseError(InputError("heat", "missing, but required here"))
+    exchange = prepare_steady(
+        system.heat,
+        system.bodies.heat,
+        system.pair,
+        expansions(system, in_middle=True),
+        system.sliding.field,
+        velocities,
+        heating_friction(system, mean_friction(system)),
+        system.bodies.punch.thickness,
+    )
+    return exchange.through(system.layer_conductance())
+
+
+def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:
+    """Return what each kelvin of this rank's nodes moves each surface along the normal, mm/K.
+
+    Args:
+        system: With condensed bodies.
+        in_middle: Whether the strip is in its middle position, even where it passes under the punch.
+
+    Returns:
+        At the contact nodes (n, owned) each, or of a strip that passes under the punch at its passage's (q, owned).
+    """
+    condensed = system.condensed
+    punch, strip = condensed.punch.by_temperature, condensed.strip.by_temperature
+    if condensed.passed is not None and not in_middle:
+        strip = condensed.passed
+    if punch is None or strip is None:
+        raise CaseError(InputError("heat", "missing, but required here"))
+    return punch, strip
+
+
+def friction_power(system: ContactSetup) -> float:
+    """Return the mean power of friction at the mean pressure and speed, per thickness, mW/mm."""
+    slid = np.array([phase.distance for phase in system.motion.phases]) @ heating_frictions(system)
+    return float(system.pair.weights @ slid) * system.rigid.mean_pressure / system.motion.period
+
+
+def mean_friction(system: ContactSetup) -> Array:
+    """Return mu at the mean pressure and speed (n,)."""
+    return system.friction.values(system.conditions(MIDDLE))
+
+
+def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Array:
+    """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
+
+    Args:
+        system: The placed bodies.
+        mu: (n,).
+        phase: Its number; MIDDLE for the field of the whole motion.
+    """
+    return mu * (system.sliding_ratio[phase] if phase >= 0 else node_rates(system.sliding.field, system.pair))
+
+
+def heating_frictions(system: ContactSetup) -> Array:
+    """Return the same in each phase (phases, n), at the mean pressure and speed."""
+    mu = mean_friction(system)
+    return np.array([heating_friction(system, mu, phase) for phase in range(len(system.motion.phases))])

@@ -56,6 +56,7 @@ KEPT = 1e-3  # rise of the force over itself whose stick zone is the same
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
 INSIDE = 0.12  # of a side of squares: by which a flat punch of them is as stiff as a smaller round one, F = 2 E* a d
 LEFT, NEAR, BEYOND, FITTED = 0.25, 1.0, 4.0, 12  # nodes: what is left of an edge, and where slip is read; of them many
+AWAY = ((6, 9), (3, 5))  # nodes beside a zone that place its end, the first two that there are
 DOUBLED, HALVED = 40, 60  # times that bounds are doubled and halved to share a depth between coated bodies
 
 
@@ -350,13 +351,16 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     None, too, where a layer has a closure that is not linear.
 
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
-    edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
+    edge c follow from two nodes some way off. The nearest ones carry what the discrete edge makes of them: the second
+    and third place the end of a zone that ends at a corner of quadratic elements 0.15 of a node's distance too far out.
     """
     position = problem.interface.creep.grown(problem.interface.middle, np.inf)
     x, n, zone = position.pair.x, len(problem.weights), np.arange(first, last + 1)
-    places = (last if side > 0 else first) + side * np.array([2, 3])
-    if places.min() < 0 or places.max() >= n:
+    pairs = ((last if side > 0 else first) + side * np.array(AWAY)).tolist()
+    inside = [pair for pair in pairs if min(pair) >= 0 and max(pair) < n]
+    if not inside:
         return None
+    places = np.array(inside[0])
     if problem.interface.layers.closure is not None or problem.interface.layers.softens:
         return None
     r, k = position.modes.shape[1], len(zone)

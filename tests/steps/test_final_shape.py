@@ -75,8 +75,8 @@ def test_the_end_is_as_exact_as_it_says() -> None:
         assert found.deepest[0] < depth < found.deepest[1]
         assert found.volume[0] < area < found.volume[1]
         assert abs(found.size - 2 * c) < found.within
-        assert found.depth.max() == pytest.approx(depth, rel=0.02)
-        assert worn.weights @ found.depth == pytest.approx(area, rel=0.04)
+        assert found.depth.max() == pytest.approx(depth, rel=0.015)
+        assert worn.weights @ found.depth == pytest.approx(area, rel=0.015)
         assert worn.weights @ found.pressure == pytest.approx(load, rel=1e-3)
 
 
@@ -95,10 +95,13 @@ def approached(elements: int, amplitude: float, **stick: float) -> PartialSlipPr
     return partial_slip_problem(make_case(tables))
 
 
-@pytest.mark.parametrize("elements", [36, 48])
-def test_the_end_under_a_prescribed_approach(elements: int) -> None:
-    """Wear takes load off; with a prescribed motion the stick zone is kept, and located within its elements."""
-    worn = approached(elements, 1.35e-3)
+@pytest.mark.parametrize(("elements", "off"), [(48, 0.02), (72, 0.01), (96, 0.005)])
+def test_the_end_under_a_prescribed_approach(elements: int, off: float) -> None:
+    """Wear takes load off; with a prescribed motion the stick zone is kept, and located within its elements.
+
+    At c = 0.8 a three to six elements slip at each side: errors fall faster than with their length.
+    """
+    worn = approached(elements, 1.21e-3)
     first = TimeStepRecords.joined(worn.cycle(worn.beginning())[1])
     load, force = float(worn.weights @ first.pressure[-1]), float(np.abs(first.force).max())
     c = np.sqrt(1 - force / (0.2 * load)) * 0.17 * np.sqrt(load / line_load(0.17))
@@ -107,8 +110,8 @@ def test_the_end_under_a_prescribed_approach(elements: int) -> None:
     assert found.deepest is not None
     assert found.deepest[0] < depth < found.deepest[1] < 1.25 * found.deepest[0]
     assert found.size == pytest.approx(2 * c, rel=2e-3)
-    assert found.depth.max() == pytest.approx(depth, rel=0.045)
-    assert worn.weights @ found.depth == pytest.approx(area, rel=0.08)
+    assert found.depth.max() == pytest.approx(depth, rel=off)
+    assert worn.weights @ found.depth == pytest.approx(area, rel=off)
 
 
 def test_a_force_shrinks_the_zone_under_a_prescribed_approach() -> None:

@@ -216,20 +216,24 @@ OPEN = [cell for cell in CELLS if not closed(*cell)]
 
 # A calibration is several runs and a run with heat many small steps: they are walked at length.
 LONG = {"calibrate", "sensitivity", "life"}
-# A fit asks for the runs that sensitivities ask for, which every row walks, on jumps that it keeps, and a life for
-# those of its samples. Rows with a state of their own that jumps keep are fitted, too; with stick, whose states are
-# those of rows that slide, the plain one and that of laws with memory.
+# Studies ask for runs, which every row walks: rows with a state of their own that jumps keep are studied, too; with
+# stick, whose states are those of rows that slide, the plain one and that of laws with memory.
 OWN_STATE = ("in the plane", "heat, to and fro", "heat on a closed track", "laws with memory", "in rings", "in solids")
+STUDIED = {"gross-sliding": OWN_STATE, "coulomb": ("in the plane", "laws with memory")}
+# A checkpoint holds the state: a row whose state has no part that other rows lack is not resumed.
+LAYERS = ("all that lies between", "a coating", "debris on the strip", "meshes that follow", "a cycle as a table")
+RESUMED = {"gross-sliding": (*OWN_STATE, *LAYERS), "coulomb": ("in the plane", "heat, to and fro", *LAYERS[:3])}
 
 
 def repeats(feature: str, law: str, way: str) -> bool:
     """Return whether other cells walk all that an open one would."""
+    kind = LAWS[law]
     if way == "march":
         return not closed(feature, law, "jump")  # which marches, too, farther, and checks the same
-    if way == "life" and LAWS[law] == "gross-sliding":
-        return False
-    fitted = OWN_STATE if LAWS[law] == "gross-sliding" else ("in the plane", "laws with memory")
-    return way in ("calibrate", "life") and feature not in fitted
+    if way == "resume":
+        return feature not in RESUMED[kind]
+    studied = way in ("calibrate", "life", "sweep") or (way == "sensitivity" and kind == "coulomb")
+    return studied and feature not in STUDIED[kind]
 
 
 # Set-ups and states of heat are spread over ranks; what lies between and the laws rank 0 asks, with stick more often.

@@ -37,10 +37,12 @@ def test_number(name: str, tmp_path: Path) -> None:
 
 
 def test_every_experiment_has_a_number_and_a_page() -> None:
-    """None is left out, and each has its page."""
+    """None is left out, and each has its page with its command."""
     assert sorted(NUMBERS) == sorted(one.name for one in experiments())
     pages = Path(__file__).parents[2] / "docs" / "validation"
     assert sorted(NUMBERS) == sorted(page.stem for page in pages.glob("*.md") if page.stem != "index")
+    for name in NUMBERS:
+        assert f"$ fenwear validate --short --only {name} -o results/{name}\n" in (pages / f"{name}.md").read_text("utf-8")
 
 
 def test_comparison_error_and_its_uncertainty() -> None:

@@ -42,7 +42,8 @@ def test_every_experiment_has_a_number_and_a_page() -> None:
     pages = Path(__file__).parents[2] / "docs" / "validation"
     assert sorted(NUMBERS) == sorted(page.stem for page in pages.glob("*.md") if page.stem != "index")
     for name in NUMBERS:
-        assert f"$ fenwear validate --short --only {name} -o results/{name}\n" in (pages / f"{name}.md").read_text("utf-8")
+        page = (pages / f"{name}.md").read_text("utf-8")
+        assert f"$ fenwear validate --short --only {name} -o results/{name}\n" in page
 
 
 def test_comparison_error_and_its_uncertainty() -> None:

@@ -245,7 +245,7 @@ class PhaseStep:
         """
         mu = FollowingFriction(self.system.friction, self._conditions(at.near, None, at, at.near > 0))
         contact = self._following(mu, at, gap)
-        if self.system.edges is None:
+        if self.system.edges is None and not self.system.asks("depth"):
             passing = self._taken(mu.at(contact.pressure[0]), at.worn, ended=True)
         else:
             passing = self._update(contact.pressure[0], at, ended=True)
@@ -290,13 +290,18 @@ class PhaseStep:
     def _update(
         self, pressure: Array, at: _Begin, *, ended: bool = False, touching: Mask | None = None
     ) -> LayerEvolution:
-        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
+        """Take friction and wear at this pressure, at the temperature at the start of the phase and the middle depths.
 
         Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
         that touch, by default those that carry this pressure.
         """
         surfaces = self.system.exchange.contact_temperatures(at.temperature, self.phase - 1)
-        return self._taken(self._conditions(pressure, surfaces, at, touching), at.worn, ended=ended)
+        passing = self._taken(self._conditions(pressure, surfaces, at, touching), at.worn, ended=ended)
+        if not self.system.asks("depth"):
+            return passing
+        middle = at.worn + passing.worn(pressure[None], at.worn).times(0.5)
+        halfway = replace(at, worn=replace(at.worn, punch=middle.punch, strip=middle.strip))
+        return self._taken(self._conditions(pressure, surfaces, halfway, touching), at.worn, ended=ended)
 
     def _conditions(
         self, pressure: Array, surfaces: tuple[Array, Array] | None, at: _Begin, touching: Mask | None

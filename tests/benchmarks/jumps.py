@@ -54,9 +54,10 @@ def ends(feature: str, law: str, **how: Any) -> tuple[Array, Array, int]:
     stick = STICK if LAWS[law] == "coulomb" else ("stick={}",)
     system = assemble(load_case(base, [*settings, f"contact.law='{LAWS[law]}'", *stick]))
     strokes, before = system.motion.half_cycles, solved["steps"]
-    last = list(evolve(system, HALF_CYCLES // strokes * strokes, **how))[-1]
+    blocks = list(evolve(system, HALF_CYCLES // strokes * strokes, **how))
     cycles = (solved["steps"] - before) / (strokes if system.sticks else 1)
-    return last.end.worn.punch, last.pressure[-strokes:], round(cycles)
+    pressure = np.concatenate([block.pressure for block in blocks[-strokes:]])  # meshes that follow end a block
+    return blocks[-1].end.worn.punch, pressure[-strokes:], round(cycles)
 
 
 def apart(one: Array, other: Array) -> float:

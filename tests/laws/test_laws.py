@@ -179,6 +179,15 @@ def test_coating_worn_through(assembled: Assemble) -> None:
     assert max(counts) < steps / 10
 
 
+@pytest.mark.parametrize("implicit", [False, True])
+def test_a_coefficient_grows_with_the_depth_within_a_half_cycle(assembled: Assemble, implicit: bool) -> None:
+    """k = k_0 (1 + w / w_0): half-cycles of pressures p_i wear 1 + w / w_0 = exp(k_0 s / w_0 sum of p_i)."""
+    system = assembled("example2", *PLAIN, "wear.punch.coefficient={expression='1e-6 * (1 + depth / 0.2)'}")
+    *_, marched = march(system, 40, implicit=implicit)
+    exact = 0.2 * np.expm1(1e-6 * 100 / 0.2 * marched.pressure.sum(axis=0))
+    np.testing.assert_allclose(marched.wear[-1], exact, rtol=5e-4)
+
+
 def test_running_in(assembled: Assemble) -> None:
     """k(s) = k_0 (1 + 9 exp(-s / s_0)): worn area = F / t times the integral of k; jumps as near as their tolerance."""
     law = "{expression='1e-8 * (1 + 9 * exp(-s / 20000))'}"

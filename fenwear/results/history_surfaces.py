@@ -189,7 +189,7 @@ def on_mesh(dimensions: tuple[str, ...], dim: int) -> dict[str, str]:
 
 
 EDGE = 0.01  # of the largest depth: where a scar ends
-RIDGE = 1e-6  # of the squares that a slope is fitted by, where neighbours lie in one direction
+RIDGE = 1e-3  # of the squares that a slope is fitted by, where neighbours lie in one direction, nearly
 CONFORMING = 1e-4  # of the contact's size: gap of unworn surfaces that lie on each other
 
 
@@ -247,7 +247,7 @@ def extents(
     fraction = np.where(crossed, a / np.where(crossed, a - b, 1.0), 0.0)
     outwards = inside[:, first]
     reached = np.where(outwards, fraction, 1.0 - fraction)  # from the node inside
-    reached = np.minimum(reached, _until_unworn(depth, coordinates, edges, level, crossed))
+    reached = np.minimum(reached, _until_unworn(depth, coordinates, edges, level, crossed, reached))
     fraction = np.where(outwards, reached, 1.0 - reached)
     found = []
     for s in coordinates.T:
@@ -260,20 +260,23 @@ def extents(
     return np.stack(found, axis=1)
 
 
-def _until_unworn(depth: Array, coordinates: Array, edges: NDArray[np.int64], level: Array, crossed: Mask) -> Array:
+def _until_unworn(
+    depth: Array, coordinates: Array, edges: NDArray[np.int64], level: Array, crossed: Mask, reached: Array
+) -> Array:
     """Return at which part of edges that leave a scar for what is unworn its slope inside comes to the level (k, m).
 
     Counted from the node inside; infinite where that gives no bound. The slope at a node is that of least squares to
-    those of its neighbours that are worn.
+    those of its neighbours that are worn. Towards nodes that are worn less than the level it turns evenly into where
+    the edge `reached` the level: no depth of rounding decides.
     """
     found: Array = np.full(crossed.shape, np.inf)
     first, second = edges.T
     outwards = depth[:, first] > level
     near, far = np.where(outwards, first, second), np.where(outwards, second, first)
-    row, edge = np.nonzero(crossed & (np.take_along_axis(depth, far, axis=1) == 0))
-    if not len(row):  # nothing unworn beside it, as where surfaces conform
+    row, edge = np.nonzero(crossed)
+    if not len(row):  # nothing worn less beside it, as where surfaces conform
         return found
-    near, far = near[row, edge], far[row, edge]
+    near, far, reached = near[row, edge], far[row, edge], reached[row, edge]
     beside = _neighbours(edges, len(coordinates))[near]  # (e, most), the node itself where there are fewer
     ways, rises = (
         coordinates[beside] - coordinates[near][:, None],
@@ -286,7 +289,9 @@ def _until_unworn(depth: Array, coordinates: Array, edges: NDArray[np.int64], le
     slope = np.linalg.solve(normal + ridge * np.eye(coordinates.shape[1]), right[..., None])[..., 0]
     falls = -np.einsum("ei,ei->e", slope, coordinates[far] - coordinates[near])
     runs_out = falls > 0
-    found[row[runs_out], edge[runs_out]] = (depth[row, near] - level[row, 0])[runs_out] / falls[runs_out]
+    until = (depth[row, near] - level[row, 0]) / np.where(runs_out, falls, 1.0)
+    until += (reached - until) * depth[row, far] / level[row, 0]
+    found[row[runs_out], edge[runs_out]] = until[runs_out]
     return found
 
 

@@ -137,13 +137,19 @@ FEATURES: dict[str, Callable[[Random, Scales], Changes]] = {
 }
 
 
-def drawn(dice: Random, scales: Scales) -> tuple[tuple[str, ...], Changes]:
-    """Return the names of up to three features, and what they change."""
+OF_BODIES = ("creep", "creep of the strip", "profile")  # which bodies are made with
+OF_PHYSICS = tuple(name for name in FEATURES if name not in OF_BODIES)
+
+
+def drawn(
+    dice: Random, scales: Scales, among: tuple[str, ...], counts: tuple[int, ...]
+) -> tuple[tuple[str, ...], Changes]:
+    """Return the names of some features, and what they change."""
     left = {*(["conductance"] if not scales.heat else []), *(["creep of the strip"] if scales.one_way else []),
             *(["profile", "hardness"] if scales.solid else []),
             *(["law", "coating"] if scales.power != 1.0 else [])}  # fmt: skip
-    names = [name for name in FEATURES if name not in left]
-    chosen = tuple(dice.sample(names, dice.choice([0, 1, 2, 3])))
+    names = [name for name in among if name not in left]
+    chosen = tuple(dice.sample(names, min(dice.choice(counts), len(names))))
     changes: Changes = {}
     for name in chosen:
         changes |= FEATURES[name](dice, scales)

@@ -98,6 +98,8 @@ def mirrored(tables: Tables) -> tuple[Tables, Tables]:
             {**kept, "kind": "table", "times": times, "displacements": [f"{v!r} mm" for v in (-a, a, -a)]}
             for a in (size, -size)
         )
+    elif motion["kind"] == "table":
+        other["motion"] = {**motion, "displacements": [f"{-number(v)!r} mm" for v in motion["displacements"]]}
     else:
         ways = ("rightward", "leftward") if motion["kind"] == "one-way" else ("counterclockwise", "clockwise")
         now = motion.get("direction", ways[0])
@@ -143,7 +145,7 @@ def apart(
     worst = ("", 0.0)
     for key, values in one.data_vars.items():
         name, unit = str(key), values.attrs.get("units", "1")
-        if values.dtype.kind != "f" or COUNTED.search(name) or "half_cycle" not in values.dims:
+        if values.dtype.kind != "f" or COUNTED.search(name) or (values.dims and "half_cycle" not in values.dims):
             continue
         here, there = values.values, other[key].values / sizes.of(unit)
         if here.shape != there.shape:

@@ -47,6 +47,21 @@ def test_a_cap_that_grows_over_coarse_nodes() -> None:
     assert np.median(np.abs(off)) < 0.2
 
 
+def test_no_rounding_decides() -> None:
+    """Over nodes moved by 1e-6, and beside nodes worn by next to nothing or by nothing, the extents are the same.
+
+    Two rows that are worn alone, at both sides of a middle that sticks, have neighbours in one direction.
+    """
+    x, edges = grid(8)
+    moved = x + 1e-6 * np.cos(7 * np.arange(x.size)).reshape(x.shape)
+    rows = np.where(np.abs(x[:, 1]) == 0.75, np.maximum(1 - (x[:, 0] / 1.31) ** 2, 0), 0)
+    cap = np.maximum(0.81 - (x**2).sum(axis=1), 0)
+    for depth in (rows, cap):
+        exact = extents(depth[None], x, edges, 0.05)
+        np.testing.assert_allclose(extents(depth[None], moved, edges, 0.05), exact, rtol=1e-3)
+        np.testing.assert_allclose(extents(np.maximum(depth, 1e-9)[None], x, edges, 0.05), exact, rtol=1e-6)
+
+
 def test_extents_at_another_share() -> None:
     """At 5 % of the depth of a parabola; a middle that is not worn counts into the width."""
     x = np.linspace(-1, 1, 401)

@@ -182,7 +182,7 @@ def eliminate(matrix: Array) -> Solve:
 
 
 def _equilibrated(matrix: Array) -> Solve:
-    """Return the same by a matrix whose rows and columns are scaled to 1.
+    """Return the solver of a matrix, by rows and columns that are scaled to 1.
 
     Where steps wear far more than bodies deform, as with rigid ones, a pivot of the balance of forces is small against
     the wear of a node, and no rounding.
@@ -220,7 +220,7 @@ class Blocks:
         return np.asarray(sum(own[:n, :n] + own[:n, n:] @ own[n:, :n] for own in self.matrices) / len(self.matrices))
 
     def added(self, diagonal: Array) -> Blocks:
-        """Return the same with numbers (m, n) added to their own nodes."""
+        """Return the blocks with numbers (m, n) added to the diagonal of each phase."""
         found, every = self.matrices.copy(), np.arange(self.nodes)
         found[:, every, every] += diagonal
         return Blocks(found, self.nodes)

@@ -82,7 +82,7 @@ class CondensedBody:
         return self.response[every, :, every].transpose(0, 2, 1)
 
     def under(self, elastic: ElasticBody) -> CondensedBody:
-        """Return the same under the loads of a body that differs by them alone; collective."""
+        """Return the condensed body under other loads, those of `elastic`; collective."""
         return replace(self, by_load=self.patterns.T @ _under_loads([elastic])[0])
 
 

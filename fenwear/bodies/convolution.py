@@ -96,7 +96,7 @@ class Convolution:
         return replace(self, table=factor * self.table, smooth=smooth)
 
     def on_box(self, low: Sequence[int], counts: Sequence[int], nodes: NDArray[np.int64]) -> Convolution:
-        """Return the same on the nodes of a box of the grid.
+        """Return the convolution on the nodes of a box of the grid.
 
         Args:
             low: Its least place along each axis.

@@ -92,13 +92,13 @@ class FineBody(GridOperator):
         return replace(self.half.convolution, smooth=[(self.weights, self.correction.response)])
 
     def at(self, x: Array) -> FineBody:
-        """Return the same with its nodes at other places of the body (q, d), mm."""
+        """Return the operator with nodes at other places of the body (q, d), mm."""
         half = self.half.at(x)
         weights = at_nodes(self.correction, self.grid, half.places, x[:, self.grid.axes], half.spacing)
         return replace(self, half=half, weights=weights)
 
     def under(self, elastic: ElasticBody) -> FineBody:
-        """Return the same under the loads of a body that differs by them alone; collective."""
+        """Return the operator under other loads, those of `elastic`; collective."""
         return replace(self, loaded=by_loads(elastic, self.correction, self.half.directions[0]))
 
 

@@ -98,12 +98,12 @@ class HalfSpace(GridOperator):
         return Convolution(places, np.asarray(table))
 
     def at(self, x: Array) -> HalfSpace:
-        """Return the same with its nodes at other places (q, d), mm: it does not know where they are."""
+        """Return the half-space itself, which is alike at all places (q, d), mm."""
         flat = x[:, list(self.axes[:-1])]
         return replace(self, places=np.rint((flat - flat.min(axis=0)) / self.spacing).astype(np.int64))
 
     def under(self, elastic: ElasticBody) -> HalfSpace:
-        """Return the same: loads displace nothing."""
+        """Return the half-space itself, which loads do not displace."""
         del elastic
         return self
 
@@ -233,7 +233,7 @@ def _in_space(x: Array, sides: Sequence[float], shear: float, poisson: float) ->
 
 
 def _in_space_on_grid(shape: Sequence[int], sides: Sequence[float], shear: float, poisson: float) -> Array:
-    """Return the same at all nodes of a grid from 0 on (m, n, d, d): each corner of its cells serves four of them."""
+    """Return the compliances at all nodes of a grid from 0 on (m, n, d, d): a corner of its cells serves four nodes."""
     across, along = (side * (np.arange(count + 1) - 0.5) for side, count in zip(sides, shape, strict=True))
     at = _at_corners(*np.broadcast_arrays(across[:, None], along))
     square = at[:, 1:, 1:] - at[:, 1:, :-1] - at[:, :-1, 1:] + at[:, :-1, :-1]

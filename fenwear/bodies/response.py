@@ -75,7 +75,7 @@ class Request:
         return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
 
     def on_mesh(self) -> Request:
-        """Return the same with patterns on the trace nodes of the mesh, where the contact surface is a grid."""
+        """Return the request with patterns on the trace nodes of the mesh, where the contact surface is a grid."""
         reading = self.elastic.reading
         return self if reading is None else replace(self, patterns=csr_array(reading.T @ self.patterns))
 

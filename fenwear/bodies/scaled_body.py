@@ -61,12 +61,12 @@ class Scaled:
         return self.factor * self.operator.diagonal()
 
     def under(self, elastic: ElasticBody) -> Scaled:
-        """Return the same under the loads of a body that differs by them alone; collective."""
+        """Return the scaled operator under other loads, those of `elastic`; collective."""
         return type(self)(self.operator.under(elastic), self.factor, self.moved)
 
 
 class ScaledOnGrid(GridOperator, Scaled):
-    """The same of an operator that is a convolution on a grid."""
+    """A scaled operator that is a convolution on a grid."""
 
     operator: Any
 

@@ -248,7 +248,7 @@ class Supports:
     def _modes_of(
         self, number: int, own: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
     ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
-        """Return the same of one part: of its degrees of freedom (owned,) and normals of its contact nodes (k, d)."""
+        """Return the free modes of a part with these degrees of freedom (owned,) and contact normals (k, d)."""
         names, forbidden = _balanced(self.kind, normal)
         columns = [*names, *forbidden]
         turns = [self._turn(axis) for axis in guided]

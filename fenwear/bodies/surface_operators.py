@@ -70,7 +70,7 @@ class SurfaceOperator(Protocol):
         """Return the displacements at each pattern from unit forces at itself (q, a, d)."""
 
     def under(self, elastic: ElasticBody) -> Self:
-        """Return the same under the loads of a body that differs by them alone; collective."""
+        """Return the operator under other loads, those of `elastic`; collective."""
 
 
 @runtime_checkable
@@ -78,7 +78,7 @@ class Relocatable(Protocol):
     """An operator that answers at any places of its surface: a strip on a grid that passes under the punch."""
 
     def at(self, x: Array) -> SurfaceOperator:
-        """Return the same with its nodes at other places of the body (q, d), mm."""
+        """Return the operator with nodes at other places of the body (q, d), mm."""
 
 
 Make = Callable[[Request], SurfaceOperator]

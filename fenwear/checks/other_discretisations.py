@@ -44,7 +44,7 @@ class Again:
         return self.system.case
 
     def otherwise(self, **tables: Mapping[str, Any]) -> Again:
-        """Return the same with other values in some tables of its case; collective.
+        """Return the discretisation with other values in some tables of its case; collective.
 
         Raises:
             CaseError: they do not go.

@@ -53,7 +53,7 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
 
 
 def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contribution]:
-    """Return the same of a steady state: relative, of pressures too, which the thermal gap makes at most as much of."""
+    """Return the contributions to a steady state, relative; pressures have at most those of the thermal gap."""
     exchange = with_reduced_heat(system).exchange
     if exchange.fineness is None:
         return {}

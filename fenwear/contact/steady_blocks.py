@@ -112,7 +112,7 @@ class ShapeEquations(ShapeRows):
         return found
 
     def matrix(self) -> Array:
-        """Return the same as one matrix (size, size)."""
+        """Return the equations as one matrix (size, size)."""
         (m, n, r), found = self.shape, np.zeros((self.size, self.size))
         omega, last = slice(m * n, (m + 1) * n), (m + 1) * n
         if self.coupling is not None:
@@ -160,7 +160,7 @@ class ShapeEquations(ShapeRows):
         return found
 
     def with_heat(self, coupling: Array | None) -> ShapeEquations:
-        """Return the same with another coupling, and with the factors of this."""
+        """Return the equations with another coupling, and with the factors of this one."""
         other = replace(self, coupling=coupling)
         for name in ("phases", "mean"):
             if name in self.__dict__:
@@ -168,7 +168,7 @@ class ShapeEquations(ShapeRows):
         return other
 
     def given_way(self, layer: Array) -> ShapeEquations:
-        """Return the same with what unit pressures open at their own nodes in their own phase (m, n)."""
+        """Return the equations with the gap (m, n) that unit pressures open at their own nodes in their own phase."""
         found = [own.copy() for own in self.compliances]
         for own, slope in zip(found, layer, strict=True):
             own[np.diag_indices_from(own)] += slope
@@ -184,7 +184,7 @@ class ShapeEquations(ShapeRows):
         return self.whole(wear, held) if self.size <= WHOLE else ByShape(self, wear, held)
 
     def whole(self, wear: Sequence[csr_array], held: Array) -> Dense:
-        """Return the same as one matrix."""
+        """Return the equations of implicit wear as one matrix."""
         (m, n, _), matrix = self.shape, self.matrix()
         omega = np.arange(m * n, (m + 1) * n)
         for k, own in enumerate(wear):

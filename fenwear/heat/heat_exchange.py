@@ -220,7 +220,7 @@ class HeatExchange:
         return after, terms
 
     def conduct(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
-        """Return the same, whether or not it is within its bounds: for the parts of a half-cycle."""
+        """Return the state after a part of a half-cycle, within its bounds or not, and the balance."""
         values, terms, surfaces = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
         return HeatState(self.bases, values, surfaces=surfaces), terms * self.thickness
 
@@ -301,7 +301,7 @@ class HeatExchange:
     def _conduct_few(
         self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
     ) -> tuple[Array, Array, tuple[Array, Array] | None]:
-        """Return the same on small bases and of few nodes, whose stages are matrices."""
+        """Return the result of `conduct` on small bases and of few nodes, whose stages are matrices."""
         heated = (self.friction[phase] * pressure.T).T
         slid = sum(self._stages) * sum(plan.speed * plan.seconds for plan in self.plans[phase])
         made = self._made(slid * heated, np.zeros_like(pressure))
@@ -584,7 +584,7 @@ class Isothermal(HeatExchange):
         return True
 
     def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:  # noqa: ARG002
-        """Return the same: nothing conducts."""
+        """Return the exchange itself, as nothing conducts."""
         return self
 
     def own(self, state: HeatState | None) -> HeatState:  # noqa: ARG002

@@ -131,7 +131,7 @@ def history_kernel(
     past: Callable[[Array], tuple[Array, Array]],
     fastest: float,
 ) -> Array:
-    """Return the same of a source that moves to and fro, with heat w(s) a time s ago (2 m - 1, 2 n - 1), mm.
+    """Return the kernel of a source that moves to and fro, with heat w(s) a time s ago (2 m - 1, 2 n - 1), mm.
 
     It is K times the temperature of an even unit flux now.
 

@@ -95,7 +95,7 @@ class Cycle:
 
     @cached_property
     def through(self) -> list[Array]:
-        """The same after each phase (m, dim, dim): of few phases and nodes, which ask for it."""
+        """The map from the start to the end of each phase (m, dim, dim), for few phases and nodes."""
         return list(accumulate((one.propagator for one in self.maps), lambda through, one: one @ through))
 
     def states(self, state: Array, pressure: Array) -> list[Array]:

@@ -57,7 +57,7 @@ class Basis:
         return Team.of(self.body.body.mesh.comm).each(self, "from_other", other, coordinates)  # type: ignore[no-any-return]
 
     def from_other(self, other: Basis, coordinates: Array) -> Array:
-        """Return the same; collective."""
+        """Return the coordinates of a state on another basis; collective."""
         return self.coordinates(other.temperature(coordinates))
 
 

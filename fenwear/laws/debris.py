@@ -65,7 +65,7 @@ class DebrisCycle:
         return (self._stays * worn).sum(axis=0) - lost, (self._leaves * worn).sum(axis=0) + lost
 
     def rate(self, thickness: Array, worn: Array, cycles: float) -> tuple[Array, Array]:
-        """Return the same for each cycle of an implicit step of so many; with none its rate at the start."""
+        """Return thickness added and depth ejected (n,) in each cycle of an implicit step; of 0 cycles at its start."""
         fed = (self.fed * worn).sum(axis=0)
         added = (fed - self.loss * thickness) / (1 + cycles * self.loss)
         return added, worn.sum(axis=0) - added

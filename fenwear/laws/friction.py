@@ -219,7 +219,7 @@ class ContactConditions:
         return self.pressure.shape
 
     def pressed(self, pressure: Array, debris: Array | None = None) -> Self:
-        """Return the same under another pressure (n,), MPa, with debris (n,), mm, by default as it is, and all else."""
+        """Return the conditions under another pressure (n,), MPa, with debris (n,), mm, by default the present one."""
         changes = {"p": pressure, "pm": pressure} if self.cycle is None else {"p": pressure}
         if debris is None:
             return self._but((changes, changes), pressure=pressure)
@@ -227,11 +227,11 @@ class ContactConditions:
         return self._but((changes, changes), pressure=pressure, debris=debris)
 
     def remembering(self, states: tuple[Mapping[str, Array], Mapping[str, Array]]) -> Self:
-        """Return the same where laws remember these states, as those of punch and strip know them."""
+        """Return the conditions with states of laws, as the laws of punch and strip know them."""
         return self._but(states, states=states)
 
     def _but(self, variables: tuple[Mapping[str, Array], Mapping[str, Array]], **changes: object) -> Self:
-        """Return the same with some attributes changed, and with them these variables, as punch and strip have them."""
+        """Return the conditions with other attributes, and with these variables, as punch and strip have them."""
         found = object.__new__(type(self))
         found.__dict__.update(self.__dict__)
         found.__dict__.pop("derived", None)
@@ -382,7 +382,7 @@ class Friction:
         return self.along(direction * self.field.direction(pair.opposite, pair.normal), mu, pair, direction)
 
     def along(self, sliding: Array, mu: Array, pair: ContactPair, direction: int) -> Array:
-        """Return the same where the sliding has the direction d e_v (n, 3)."""
+        """Return the friction ratio where the sliding has the direction d e_v (n, 3)."""
         if self.contact.transverse_friction == 0:
             return mu[:, None] * sliding
         across = direction * np.cross(in_space(pair.normal), sliding)

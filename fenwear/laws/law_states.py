@@ -268,12 +268,12 @@ class Evolution:
     near: Held | None = None
 
     def at(self, pressure: Array) -> Evolution:
-        """Return the same at other pressures of the phases (m, n), MPa."""
+        """Return the evolution at other pressures of the phases (m, n), MPa."""
         pairs = zip(self.conditions, pressure, strict=True)
         return replace(self, conditions=[replace(one, pressure=np.asarray(own)) for one, own in pairs])
 
     def some(self, phases: Sequence[int]) -> Evolution:
-        """Return the same of some of the phases, by their places among these."""
+        """Return the evolution over some of the phases, by their places among these."""
         chosen = list(phases)
         conditions, pairs = [self.conditions[k] for k in chosen], [self.pairs[k] for k in chosen]
 

@@ -105,7 +105,7 @@ class LayerEvolution:
         return np.asarray(self.wear.pairs[0].wear_interpolation @ lies) if self.layers.strip_carries else lies
 
     def resting_where_it_lies(self, pressure: Array) -> Array:
-        """Return the same at the nodes where it lies: the contact's, or those of a strip that carries it (n_strip,)."""
+        """Return the thickness at rest where debris lies: at contact nodes, or on a strip that carries it."""
         fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
         return np.asarray(fed / self.debris.loss)
 

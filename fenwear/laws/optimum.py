@@ -152,7 +152,7 @@ class WearRates:
         return max(law.cap for law in self.laws)
 
     def uncapped(self) -> WearRates:
-        """Return the same without the highest cap, so that there is a pressure for any rate."""
+        """Return the rates without the highest cap, so that any rate has a pressure."""
         laws = (replace(law, cap=np.inf) if law.cap == self.cap else law for law in self.laws)
         return replace(self, laws=tuple(laws))
 

@@ -111,7 +111,7 @@ class SlidingWays:
         return SlidingTensor(np.einsum("mi,mic->ic", weights, self._squares).reshape(-1, 3, 3))
 
     def tensor_of_strip(self, pressure: Array | None = None) -> SlidingTensor:
-        """Return the same at the strip's contact nodes, of its own material that moves under the punch."""
+        """Return the tensor at the strip's contact nodes, of the strip's material that moves under the punch."""
         weights = self.lengths if pressure is None else self.lengths * pressure
         values = np.zeros((len(self.middle.strip.weights), 9))
         for k, facing in enumerate(self.pairs):

@@ -237,7 +237,7 @@ class PhasesWear:
         return min(self.punch.law.cap, self.strip.law.cap)
 
     def softened(self, share: float) -> PhasesWear:
-        """Return the same where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
+        """Return the wear where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
         punch, strip = (replace(one, law=replace(one.law, beyond=share)) for one in (self.punch, self.strip))
         return replace(self, punch=punch, strip=strip)
 

@@ -417,7 +417,7 @@ def _means(found: FlashTemperatures, flash: Array) -> Array:
 
 
 def text(found: FlashTemperatures, name: str) -> str:
-    """Return the same for readers."""
+    """Return the flash temperatures as a table for readers."""
     of = numbers(found)
     along = {key: [of[body][key] for body in BODIES] for key in of["punch"]}
 

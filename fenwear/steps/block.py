@@ -190,7 +190,7 @@ class Block:
 
     @property
     def worn_area_increment_strip(self) -> Array:
-        """The same of the strip (k,), mm²."""
+        """The area worn off the strip in each half-cycle (k,), mm²."""
         return self.adds.of("volume_strip") * (1 / self.system.bodies.punch.thickness)
 
     @property
@@ -230,7 +230,7 @@ class StepRecords(Protocol):
 
     @property
     def before(self) -> Array:
-        """The same a cycle ago (k, n), MPa; NaN where there was none."""
+        """The pressure a cycle ago (k, n), MPa; NaN where there was none."""
 
     @property
     def gap(self) -> Array:

@@ -257,7 +257,7 @@ class Coupled:
         *,
         lagged: bool,
     ) -> Solved:
-        """Return the same, where nodes of these pressures conduct."""
+        """Return the solution where nodes of these pressures conduct."""
         heat, constant, shape, contact = self.heat, self.system.constant_coefficients, start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
         # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.

@@ -120,7 +120,7 @@ def pressure_scale(system: Tribosystem, pressure: Array) -> float:
 
 
 def pressure_scales(system: Tribosystem, pressure: Array) -> Array:
-    """Return the same of k half-cycles (k,), each of all its phases: pressures (k, m, n), MPa."""
+    """Return the pressure scales (k,), MPa, of k half-cycles, each of all its phases: pressures (k, m, n), MPa."""
     weights = system.pair.weights
     force = (np.abs(pressure) * weights).sum(axis=(1, 2))
     carried = (pressure**2 * weights).sum(axis=(1, 2))

@@ -124,7 +124,7 @@ class PhaseMeter:
         self._rows = np.concatenate([self._by_pressure, self._by_friction * mu, *worn]) if linear else None
 
     def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
-        """Return the same at other coefficients."""
+        """Return the meter at other coefficients."""
         found = object.__new__(PhaseMeter)
         found.__dict__.update(self.__dict__, _mu=mu, _wear=wear, _rows=None)
         return found

@@ -211,7 +211,7 @@ class Quantity:
         return own
 
     def within(self, contact: str) -> Quantity:
-        """Return the same of one named contact."""
+        """Return the quantity of one named contact."""
         match = _UNTIL.fullmatch(self.text) or _PLAIN.fullmatch(self.text)
         written = match["name"] if match else self.name
         text = re.sub(rf"\b{written}\b( of [\w-]+)?", lambda at: f"{at[0]} in {contact}", self.text, count=1)

@@ -79,7 +79,7 @@ class Interface:
 
     @cached_property
     def _axes_on_strip(self) -> Array:
-        """The same in the strip's own, unmoved frame."""
+        """The axes of the displacements (n, a, d) in the strip's unmoved frame."""
         return self.pair.placement.back(self.axes.reshape(-1, self.axes.shape[2])).reshape(self.axes.shape)
 
     @property
@@ -169,7 +169,7 @@ class Interface:
         return self.asked(EVERY, EVERY)
 
     def asked(self, rows: Nodes, columns: Nodes) -> Array:
-        """Return the same as `entries`, from the bodies: for who keeps what it makes of them."""
+        """Return the entries of rows and columns (k, a, m, d), computed from the bodies and not kept."""
         own = np.arange(len(self.pair.weights))[rows]
         on_punch = _along(self.axes[own], self.punch.entries(rows, columns))
         on_strip = self._on_strip(own, rows, columns)
@@ -285,7 +285,7 @@ class Compliance:
 
     @cached_property
     def on_grid(self) -> GridCompliance | None:
-        """The same as a convolution; None where the surfaces are on no common grid, or pass each other."""
+        """The compliance as a convolution; None where the surfaces are on no common grid, or pass each other."""
         own = self.interface
         few = self.components > 1 and self._n < GRIDDED
         if few or own.strip_moves or own.in_memory or own.pair.placement.turn != ZERO:

@@ -61,7 +61,7 @@ class GridCompliance:
 
     @cached_property
     def boxes(self) -> Boxes[FrameBox]:
-        """The same on boxes of the grid, along all axes of a frame."""
+        """The compliance on boxes of the grid, along all axes of a frame."""
         return Boxes(self.of.places, self.of.counts, lambda box: FrameBox(self, box))
 
     def apply(self, x: Array) -> Array:

@@ -236,7 +236,7 @@ class Screw:
 
     @property
     def undirected(self) -> Screw:
-        """The same way, from whichever end it begins."""
+        """The way, from whichever end it begins."""
         return Screw(*sorted((self.first, self.last), key=lambda place: (place.turn, place.shift)))
 
     def parts(self, count: int) -> list[Screw]:

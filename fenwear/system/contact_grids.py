@@ -213,7 +213,7 @@ def _reached(case: Case, grid: RegularGrid, sliding: Sliding) -> RegularGrid:
 
 
 def _mortar(body: ElasticBody, grid: RegularGrid) -> csr_array:
-    """Return the same by integrals, as forces of a condensed body need it: even ones are even on the mesh, too."""
+    """Return the interpolation by integrals, as forces of a condensed body need it: even forces stay even."""
     every = np.arange(len(grid.flat))
     cell = "interval" if grid.flat.shape[1] == 1 else "quadrilateral"
     first = ChartedSurface(grid.flat, grid.facets, cell, 1, every)

@@ -40,7 +40,7 @@ class Sliding:
     to_and_fro: bool = False
 
     def measured_on(self, middle: ContactPair) -> Sliding:
-        """Return the same, with the steps of a table counted by the mean of what the contact nodes slide, mm."""
+        """Return the sliding with steps of a table counted by the mean distance that contact nodes slide, mm."""
         if not self.motion.steps:
             return self
         areas = middle.weights / middle.weights.sum()

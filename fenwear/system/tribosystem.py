@@ -73,7 +73,7 @@ class Condensed:
         return strip, self.strip_moves
 
     def under_loads(self, bodies: Bodies) -> Condensed:
-        """Return the same under the loads of these bodies; collective."""
+        """Return the condensed contact under the loads of these bodies; collective."""
         return replace(self, punch=self.punch.under(bodies.punch), strip=self.strip.under(bodies.strip))
 
 
@@ -494,6 +494,6 @@ def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Ar
 
 
 def heating_frictions(system: ContactSetup) -> Array:
-    """Return the same in each phase (phases, n), at the mean pressure and speed."""
+    """Return the friction ratios that heat in each phase (phases, n), at the mean pressure and speed."""
     mu = mean_friction(system)
     return np.array([heating_friction(system, mu, phase) for phase in range(len(system.motion.phases))])

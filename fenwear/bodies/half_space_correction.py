@@ -276,7 +276,7 @@ def _outer(elastic: ElasticBody, grid: RegularGrid) -> tuple[NDArray[np.int32], 
 
 
 def below(elastic: ElasticBody, grid: RegularGrid, facets: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return those of some facets that lie below a grid, with some of themselves."""
+    """Return the facets that lie below a grid at least in part."""
     x = elastic.body.mesh.geometry.x[compat.facet_nodes(elastic.body.mesh, facets)][:, :, grid.axes]
     low, high = np.array(grid.corner), np.array(grid.corner) + grid.sides
     grain = 1e-9 * grid.sides

@@ -48,7 +48,7 @@ class RawMesh:
     points: dict[str, Array]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all of it as arrays, to be kept."""
+        """Return the mesh as arrays, to be kept."""
         named = {
             "groups": self.groups,
             "points": {name: x.tolist() for name, x in self.points.items()},

@@ -35,7 +35,7 @@ class ReadyGeometry:
         return re.split(r"[.:;](?: |$)", self.about)[0]
 
     def text(self) -> str:
-        """Return it in words, a line for each parameter."""
+        """Return the geometry in words, a line for each parameter."""
         lines = (f"    {name} = {value}   {meaning}".rstrip() for name, value, meaning in self.parameters)
         names = f"regions and surfaces: {', '.join(self.groups)}"
         return "\n".join((f"{self.name}: {self.about}", names, "geometry.parameters, in mm and degrees:", *lines))

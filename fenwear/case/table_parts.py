@@ -169,7 +169,7 @@ class Part(BaseModel):
         return self
 
     def present(self, *keys: str) -> list[str]:
-        """Return those of the keys that are given."""
+        """Return the given keys among these."""
         return [key for key in keys if getattr(self, key) is not None]
 
 

@@ -1,4 +1,4 @@
-"""Where a contact surface ends: clipped where the bodies continue smoothly, beside chamfers, and worn through.
+"""Ends of a contact surface: clipped where the bodies continue smoothly, beside chamfers, and worn through.
 
 Beyond its ends a contact surface has an edge, as a flat punch, or the bodies continue smoothly, as a ball of which a
 part is tagged. strip_contact reaches at least as far as punch_contact, so the punch's rim is what a growing contact

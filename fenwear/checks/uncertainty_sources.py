@@ -427,7 +427,7 @@ def _remedy(system: Tribosystem, source: str) -> str:
 
 
 def _finer(case: Case) -> str:
-    """Return which key has nodes lie closer."""
+    """Return the key that reduces the spacing of nodes."""
     grid, degree = case.grid, case.geometry.degree
     if grid is not None and grid.across is not None:
         return f"grid.across = {2 * grid.across}"

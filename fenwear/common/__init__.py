@@ -1,1 +1,1 @@
-"""For all rooms: errors, units, tables of numbers, ranks, progress, signals, set-ups on disk, and the stack below."""
+"""Shared by all rooms: errors, units, tables of numbers, ranks, progress, signals, set-ups on disk, the stack below."""

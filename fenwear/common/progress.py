@@ -1,4 +1,4 @@
-"""Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
+"""Progress of a run: on rank 0, by a bar on a terminal or by lines."""
 
 from __future__ import annotations
 

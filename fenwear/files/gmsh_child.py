@@ -1,4 +1,4 @@
-"""Read a file by gmsh in a process of its own: gmsh ends the process on some broken files.
+"""Reading of a file by gmsh in a process apart: gmsh ends the process on some broken files.
 
     python3 gmsh_child.py FILE RESULT.npz     # of a mesh: its arrays
     python3 gmsh_child.py FILE                # of shapes: only whether they can be read

@@ -337,7 +337,7 @@ class _Choice:
         return [Group(name, 0, {15: np.unique(np.concatenate(points))[:, None]}, source)] if points else []
 
     def counting(self, sets: list[MeshSet | str], dim: int) -> list[MeshSet | str]:
-        """Return those of the sets of a group of facets that count: sides before nodes before elements of bodies."""
+        """Return the sets of a group of facets that count: sides before nodes before elements of bodies."""
         of = [one.of for one in sets if isinstance(one, MeshSet)]
         if "sides" in of:
             return [one for one in sets if isinstance(one, str) or one.of == "sides"]

@@ -343,7 +343,7 @@ def _slopes(number: int) -> Array:
 
 
 def bad_elements(mesh: MeshFile, elements: Ints) -> Ints:
-    """Return those of the elements that are degenerate or twisted at a node; mirrored ones are none of them."""
+    """Return the elements that are degenerate or twisted at a node; mirrored elements are neither."""
     found = [np.zeros(0, np.int64)]
     for block, own, nodes in mesh.by_block(elements):
         if block.kind not in USABLE:

@@ -126,7 +126,7 @@ class Fluxes(Protocol):
     """The fluxes (q_1, q_2) of a step, both surfaces concatenated, linear in what they come from."""
 
     def of(self, bare: Array, heat: Array, ambient: float) -> Array:
-        """Return them (2 n,) or (2 n, k), mW/mm².
+        """Return the fluxes (2 n,) or (2 n, k), mW/mm².
 
         Args:
             bare: The surfaces' temperatures without flux (2 n,) or (2 n, k), K.

@@ -1,4 +1,4 @@
-"""Where the punch is on a strip that passes under it to and fro or through a cycle, in the strip's own frame.
+"""The place of the punch on a strip that passes under it, to and fro or through a cycle, in the strip's frame.
 
 The strip's mesh stays with its material, and the contact moves over it, whichever way the strip shifts and turns. In
 each step the friction's flux enters through the transfer of the places of that step, their mean over what is slid in

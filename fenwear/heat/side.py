@@ -1,4 +1,4 @@
-"""Data of each body, and of the steps of a phase, for the exchange of heat.
+"""Data of each body and of the steps of a phase for the exchange of heat.
 
 The time steps of a motion: which stages each body takes in them, and where on a strip that passes they are.
 

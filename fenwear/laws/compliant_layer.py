@@ -134,7 +134,7 @@ class SharedClosure:
         return np.asarray(self.law.slope(carried) * (self.carried(pressure + nudge) - carried) / nudge)
 
     def nearness(self, pressure: Array, gap: Array) -> Array:
-        """Return that of the asperities (n,)."""
+        """Return the nearness of the asperities (n,)."""
         return self.law.nearness(self.carried(pressure), gap)
 
     def pressure_of(self, nearness: Array) -> Array:

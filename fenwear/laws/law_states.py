@@ -180,11 +180,11 @@ class Held:
         return Held(self.contact - other.contact, self.strip - other.strip)
 
     def times(self, factor: float) -> Held:
-        """Return all of it times a factor."""
+        """Return the states times a factor."""
         return Held(factor * self.contact, factor * self.strip)
 
     def at_contact(self, pair: ContactPair) -> Array:
-        """Return all of it at the contact's nodes (q + q_s, n)."""
+        """Return the states at the contact's nodes (q + q_s, n)."""
         if not len(self.strip):
             return self.contact
         return np.vstack([self.contact, self.strip @ pair.wear_interpolation.T])

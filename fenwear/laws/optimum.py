@@ -136,7 +136,7 @@ class WearRates:
 
     @classmethod
     def together(cls, rates: Sequence[Array], laws: Sequence[PressureLaw]) -> WearRates:
-        """Return those of bodies, in one where their laws are the same."""
+        """Return the rates of bodies, in one where their laws are equal."""
         if len(set(laws)) > 1:
             return cls(tuple(rates), tuple(laws))
         return cls((np.sum(rates, axis=0),), (laws[0],))

@@ -63,7 +63,7 @@ class WornDepths:
         return all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
 
     def times(self, factor: float) -> WornDepths:
-        """Return all of it times a factor."""
+        """Return the depths times a factor."""
         return WornDepths(factor * self.punch, factor * self.strip, *(factor * state for state in self._kept))
 
     @property

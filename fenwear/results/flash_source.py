@@ -65,7 +65,7 @@ class Course:
 
     @classmethod
     def of(cls, motion: Motion) -> Course:
-        """Return that of a motion."""
+        """Return the course of a motion."""
         offsets = motion.offsets(FINE)
         durations = np.array([phase.duration for phase in motion.phases])
         times = np.append(0.0, np.repeat(durations / FINE, FINE).cumsum())
@@ -124,7 +124,7 @@ class Window:
 
     @classmethod
     def around(cls, grid: RegularGrid, pressure: Array) -> Window:
-        """Return that of nodes whose pressures (t, N) are above zero at any instant."""
+        """Return the window of nodes whose pressures (t, N) are above zero at any instant."""
         places = grid.places[pressure.max(axis=0) > 0]
         low, high = places.min(axis=0), places.max(axis=0)
         beside = np.ceil(MARGIN * (high - low + 1)).astype(int)

@@ -64,7 +64,7 @@ class Totals:
         return self + other.times(-1.0)
 
     def times(self, factor: float) -> Totals:
-        """Return all of it times a factor."""
+        """Return the totals times a factor."""
         return Totals(factor * self.sums, factor * self.energy, factor * self.pressure)
 
     def of(self, name: str) -> Array:

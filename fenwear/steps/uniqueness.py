@@ -1,4 +1,4 @@
-"""Whether the contact of a half-cycle with heat has one answer.
+"""Uniqueness of the contact of a half-cycle with heat.
 
 The friction heat of a change dp of pressure opens the gap by Theta dp by the end of its half-cycle, and where nodes
 stay closed, with the loads balanced, an opened gap takes the pressure X away: the heat of a change feeds back G dp = -X

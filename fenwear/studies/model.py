@@ -62,7 +62,7 @@ class Course:
 
     @classmethod
     def of(cls, snapshots: Sequence[Snapshot]) -> Course:
-        """Return that of a run of these snapshots."""
+        """Return the course of a run of these snapshots."""
         made = {half_cycle: renewal for one in snapshots for half_cycle, renewal in one.renewals}
         return cls(tuple(int(one.cycle) for one in snapshots), made)
 

@@ -1,4 +1,4 @@
-"""Where a run ends at a level of a quantity, such as a worn depth: `run.until`.
+"""The end of a run at a level of a quantity, such as a worn depth: `run.until`.
 
 The level is looked for at the end of each cycle, or of each jump. A jump across it is made again to the cycle at which
 a cubic through values and rates at its ends meets the level.

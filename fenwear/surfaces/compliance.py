@@ -340,7 +340,7 @@ class Compliance:
         return np.einsum("iac,ica->ai", own, self._force).ravel()
 
     def matrix(self) -> Array:
-        """Return all of it."""
+        """Return the compliance as one matrix."""
         return self.entries(EVERY, EVERY)
 
 

@@ -90,7 +90,7 @@ class GridCompliance:
         return np.asarray(found.ravel())
 
     def matrix(self) -> Array:
-        """Return all of it (n, n), of the first component."""
+        """Return the compliance of the first component as one matrix (n, n)."""
         return self.columns(EVERY)
 
 
@@ -181,7 +181,7 @@ class Boxes(Generic[T]):
         return self._make(Box.around(self.places, self._shape))
 
     def around(self, touched: NDArray[np.int64]) -> T:
-        """Return that of a box around some nodes."""
+        """Return the value of a box around some nodes."""
         places = self.places[touched]
         wide = np.ptp(places, axis=0) + 1
         largest = np.maximum(WASTE * wide, wide + 4)

@@ -1,4 +1,4 @@
-"""Where two surfaces lie over each other: geometry in a common chart, no mechanics.
+"""Overlap of two surfaces: geometry in a common chart, no mechanics.
 
 A chart takes the points of both surfaces to coordinates s in R^(d - 1): the plane of a flat contact, or of
 a patch of a curved one. In it the facets are intervals, triangles or quadrilaterals with straight edges, and two of

@@ -1,4 +1,4 @@
-"""Where the counter-body is: a rigid motion from the place in which it was meshed.
+"""The place of the counter-body: a rigid motion from the place in which it was meshed.
 
 Space has the axes x, y and z; a plane or axisymmetric model lies in x and z, at y = 0.
 """

@@ -240,7 +240,7 @@ class Screw:
         return Screw(*sorted((self.first, self.last), key=lambda place: (place.turn, place.shift)))
 
     def parts(self, count: int) -> list[Screw]:
-        """Return it in parts of equal time."""
+        """Return the screw in parts of equal time."""
         places = [self.at(k / count) for k in range(count + 1)]
         return [Screw(*ends) for ends in itertools.pairwise(places)]
 

@@ -1,4 +1,4 @@
-"""Who creeps: bodies, and a layer between them; their elastic displacements and what these open."""
+"""Members that creep, bodies and a layer between them: their elastic displacements and what these open."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ class CreepingLayer:
         return self.closure * pressure
 
     def matrix(self, _phase: int, _ratio: Array) -> Array:
-        """Return it by unit pressures (n, n), mm/MPa."""
+        """Return the gap that unit pressures open (n, n), mm/MPa."""
         return np.diag(self.closure)
 
     def opened(self, _phase: int, values: Array) -> Array:

@@ -32,7 +32,7 @@ class PressureLaw:
 
     @classmethod
     def of(cls, law: WearLaw, share: float | None = 1.0) -> PressureLaw:
-        """Return the part of a wear law of the case, under a share of the pressure; None for a share that is no number."""
+        """Return the part that a wear law of the case wears, under a share of the pressure; None if no number."""
         if share is None:
             return cls(law.pressure_exponent, law.pressure_threshold)
         bounds = law.pressure_threshold, law.cap

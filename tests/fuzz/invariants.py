@@ -906,7 +906,9 @@ def main() -> None:
         asked.update((made.kind, *made.features, *asks))
         if verdict.kind not in ("ok", "several"):
             sys.stdout.write(f"{verdict.seed} {verdict.kind}: {verdict.text}\n")
-            sys.stdout.flush()
+        if sum(kinds.values()) % SHARED == 0:
+            sys.stdout.write(f"of seeds from {first} on: {dict(kinds)}\n")
+        sys.stdout.flush()
     sys.stdout.write(f"seeds {first} to {first + given.count - 1}: {dict(kinds)}\n{dict(asked)}\n")
     sys.exit(any(kinds[kind] for kind in ("wrong", "traceback", "crash", "hang")))
 

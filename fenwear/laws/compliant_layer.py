@@ -15,8 +15,8 @@ sigma apart, beyond which less than 1e-9 of the asperities touch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -113,15 +113,21 @@ class SharedClosure:
 
     Attributes:
         law: Of the asperities.
-        share: X by the pressure (..., n).
+        share: X by the pressure (..., n) and the speed.
+        speed: Of sliding, mm/s: of all phases (m, n), of one or of all alike (n,); zero where X does not depend on it.
     """
 
     law: Law
-    share: Callable[[Array], Array]
+    share: Callable[[Array, Array], Array]
+    speed: Array
+
+    def at(self, phases: int | Sequence[int]) -> SharedClosure:
+        """Return the closure in phases of the motion."""
+        return replace(self, speed=self.speed[phases]) if self.speed.ndim > 1 else self
 
     def carried(self, pressure: Array) -> Array:
         """Return the pressure of the asperities (...), MPa."""
-        return np.asarray(self.share(pressure) * pressure)
+        return np.asarray(self.share(pressure, self.speed) * pressure)
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -142,7 +148,7 @@ class SharedClosure:
         carried = self.law.pressure_of(nearness)
         found = carried
         for _ in range(ROUNDS):
-            found = carried / np.maximum(self.share(found), LEAST)
+            found = carried / np.maximum(self.share(found, self.speed), LEAST)
         return found
 
 

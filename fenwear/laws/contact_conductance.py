@@ -19,6 +19,7 @@ import numpy as np
 from fenwear.case import Case
 from fenwear.case.contact_table import RoughLayer
 from fenwear.common.arrays import Array
+from fenwear.common.errors import CaseError, InputError
 from fenwear.laws.compliant_layer import SharedClosure
 from fenwear.laws.layers import Layers, Regions, common_modulus, over_materials
 from fenwear.surfaces import ContactPair
@@ -34,9 +35,18 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
         case: With heat.conductance = "layer".
         regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
         pair: The surfaces opposite each other.
+
+    Raises:
+        CaseError: the share that asperities carry follows a speed that changes during the cycle.
     """
     if case.heat is None or case.heat.conductance != "layer":
         return None
+    if isinstance(layers.closure, SharedClosure) and layers.closure.speed.ndim > 1:
+        message = (
+            "expected a number: contact.lubrication depends on v, which changes during the cycle, and 'layer' takes one "
+            "share for all of it"
+        )
+        raise CaseError(InputError("heat.conductance", message))
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None
     modulus = common_modulus(case, regions, pair) if given is None else given
     resistance = over_materials(case, regions, pair, lambda one: 0.5 / float(one.conductivity or np.nan))

@@ -113,6 +113,10 @@ class Layers:
         """Return by how much pressures (..., n) close what lies between, mm, by default without what coatings do."""
         return self.winkler * pressure + (closure or self.gives).closure(pressure)
 
+    def at(self, phases: int | Sequence[int]) -> Layers:
+        """Return the layers in phases of the motion: asperities under a film that follows the speed close by phase."""
+        return replace(self, closure=self.closure.at(phases)) if isinstance(self.closure, SharedClosure) else self
+
     @property
     def varies(self) -> bool:
         """Whether debris is lost by a law that changes with more than the place."""
@@ -346,7 +350,8 @@ def layers_of(
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
         strip_carries: Whether debris lies on the strip's material.
-        alike: Variables of laws (n,) that are the same in all phases: of the speed v and the temperature T.
+        alike: Variables of laws that are the same in all cycles: the speed v in each phase (m, n), or in all of them
+            (n,), and the temperature T (n,).
 
     Raises:
         CaseError: a value is not positive somewhere.
@@ -367,7 +372,9 @@ def layers_of(
         case RoughLayer() as law:
             closure = _rough(law, modulus, _at_nodes(law, place, n))
     if closure is not None and contact.lubrication is not None:
-        closure = SharedClosure(closure, _share_by_pressure(contact.lubrication, {**place, **(alike or {})}))
+        known = {**place, **(alike or {})}
+        share = _share_by_pressure(contact.lubrication, known)
+        closure = SharedClosure(closure, share, known.get("v", np.zeros(n)))
     third = contact.third_body
     if third is not None:
         varies = isinstance(third.life, Dependence) and third.life.varies
@@ -404,8 +411,8 @@ def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[st
     return [place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units.items()]
 
 
-def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> Callable[[Array], Array]:
-    """Return the share of the pressure that asperities carry (..., n) by the pressure (..., n).
+def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> Callable[[Array, Array], Array]:
+    """Return the share of the pressure that asperities carry (..., n) by the pressure (..., n) and the speed.
 
     Raises:
         CaseError: it depends on a speed or temperature that changes, which a layer does not follow.
@@ -418,7 +425,9 @@ def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> 
             "of asperities does not follow it. Remove the layer, or let the share depend on p and the place alone"
         )
         raise CaseError(InputError("contact.layer", message))
-    return lambda pressure: asperity_share(lubrication, {**known, "p": pressure}, pressure.shape, checked=False)
+    return lambda pressure, speed: asperity_share(
+        lubrication, {**known, "p": pressure, "v": speed}, pressure.shape, checked=False
+    )
 
 
 def _rough(law: RoughLayer, modulus: float | Array, values: list[Array]) -> Law:

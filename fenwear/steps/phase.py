@@ -174,9 +174,10 @@ class PhaseStep:
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
         self._onwards: Onwards | None = None  # where the iterations of contact depend on their start
-        if self._follows or system.layers.closure is not None:
+        self._layers = layers = system.layers.at(phase)
+        if self._follows or layers.closure is not None:
             modes = system.rigids[phase].rigid_normal.shape[1]
-            self._onwards = Onwards(len(self._mu), modes, system.layers.closure, system.layers.hardness)
+            self._onwards = Onwards(len(self._mu), modes, layers.closure, layers.hardness)
         self._even = np.full(len(self._mu), system.rigid.mean_pressure)
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
@@ -328,7 +329,7 @@ class PhaseStep:
                 self._thermal.slide(heating_friction(system, mu, self.phase))
         wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
         ends = end if ended else None
-        return LayerEvolution(system.layers, wear, self._lost(conditions), evolution, ends)
+        return LayerEvolution(self._layers, wear, self._lost(conditions), evolution, ends)
 
     def _lost(self, conditions: ContactConditions) -> DebrisCycle:
         """Return what the phase does to debris at conditions: as before where no more than the same edges matter."""

@@ -336,7 +336,7 @@ class SteadyInequality:
         outrun = (x[:n] == 0) & (self.equations.modes @ velocity < 0)
         x[self.omega] = -(self.equations.gaps(pressure)[0] + self.offset[:n])
         if self.closure is not None:
-            x[self.omega] -= self.closure.closure(pressure[0] * self.p_scale) / self.gap_scale
+            x[self.omega] -= self.system.layers.at(0).gives.closure(pressure[0] * self.p_scale) / self.gap_scale
         x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
         return x
 

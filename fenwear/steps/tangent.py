@@ -75,7 +75,7 @@ def phase_tangent(
     state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p
     by_state = by_mu @ traction_s + gap_by_s + before_s
-    slope = system.layers.slope(pressure[None])
+    slope = system.layers.at(phase).slope(pressure[None])
     if slope is not None:
         opened = opened + np.diag(slope[0])
     if implicit:

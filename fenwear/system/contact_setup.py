@@ -289,11 +289,11 @@ class ContactSetup:
 
     @property
     def _alike(self) -> dict[str, Array]:
-        """Variables of laws (n,) that are the same in all phases: the speed, and without heat the temperature."""
+        """Variables of laws that are the same in all cycles: the speed of the phases, without heat the temperature."""
         speeds = np.array([np.broadcast_to(self._speeds[k], self._none.shape) for k in range(len(self.motion.phases))])
         found = {} if self.heat is not None else {"T": self._initial}
         same = np.abs(speeds - speeds[0]).max() <= ROUNDING * np.abs(speeds).max()
-        return {**found, "v": speeds[0]} if same else found
+        return {**found, "v": speeds[0] if same else speeds}
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
         """Return h_c by the pressures (n,), where what lies between gives it (`fenwear.laws.contact_conductance`)."""
@@ -317,7 +317,7 @@ class ContactSetup:
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
         if not conditions and self.layers.varies:
             conditions = [self.conditions(k) for k in chosen]
-        return LayerEvolution.over(self.layers, wear, self.path[chosen], evolution, conditions)
+        return LayerEvolution.over(self.layers.at(chosen), wear, self.path[chosen], evolution, conditions)
 
     def evolution(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from combinations import SMALL as SMALLEST
 from combinations import STICK
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.steps.run_state import beginning
 
 Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
@@ -114,13 +116,40 @@ def test_a_layer_of_asperities_feels_their_pressure(kind: str, assembled: Assemb
 
 
 def test_a_layer_of_asperities_under_a_film(assembled: Assemble) -> None:
-    """The share may follow a speed that stays; one that changes within a cycle is rejected."""
+    """The share follows the speed of each phase; heat of the layer asks for one that stays, and stick for no speed."""
     layer = "contact.layer={kind='power', reference='1 um', pressure='5 MPa'}"
     dry, wet = (assembled("example2", *SMALL, MOTION % 100, layer, *more) for more in ((), (FILM,)))
     pressure = np.full(len(dry.pair.weights), MEAN)
     np.testing.assert_allclose(wet.layers.given(pressure), dry.layers.given(0.4 * pressure), rtol=1e-12)
+    heat = (*SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM, "heat.conductance='layer'")
+    with pytest.raises(CaseError, match=r"heat\.conductance: .* depends on v"):
+        assembled("example2-heat", *heat, "heat.partition=0.9")
     with pytest.raises(CaseError, match=r"contact\.layer: .* depends on v"):
-        assembled("example2", *SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM)
+        assembled("fretting-partial-slip", *SMALLEST, "contact.law='coulomb'", *STICK, layer, FILM)
+
+
+def test_a_layer_under_a_film_that_changes_within_the_cycle(assembled: Assemble) -> None:
+    """Of rigid bodies the approach in each phase is that of X(v) p there, and what has worn; jumps follow the march."""
+    layer = "contact.layer={kind='power', reference='1 um', pressure='5 MPa', exponent=0.5}"
+    given = (*SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM, "wear.punch.coefficient=4e-7")
+    rigid = [f"materials.{material}.young='1e9 MPa'" for material in ("steel", "composite")]
+    system = assembled("example2", *given, *rigid)
+    (block,) = march(system, 1, block=1)
+    phases = system.motion.phases[:3]
+    slid = np.array([system.conditions(k).speed[0] * phase.duration for k, phase in enumerate(phases)])
+    film = 0.1 * (slid / [phase.duration for phase in phases]) ** 0.5
+    share = np.interp(film, [0, 1, 3], [1, 0.4, 0])
+    worn = np.cumsum([0.0, *(4e-7 * share * MEAN * slid)[:2]])
+    approach = [-contact.rigid[0, 0] for contact in block.end.contacts[:3]]
+    expected = 1e-3 * np.sqrt(share * MEAN / 5) + worn
+    np.testing.assert_allclose(np.diff(approach), np.diff(expected), rtol=1e-3)
+    elastic = assembled("example1", *given)
+    (*_, marched), (*_, jumped) = march(elastic, 80, implicit=True), jump(elastic, 80, tolerance=1e-3)
+    np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=0, atol=3e-3 * marched.wear[-1].max())
+    state = steady(elastic)
+    start = replace(beginning(elastic), worn=replace(elastic.unworn(), punch=state.shape))
+    (first,) = march(elastic, 1, block=1, start=start)
+    np.testing.assert_allclose(first.end.contacts[0].pressure[0], state.phase_pressure[0], rtol=1e-9, atol=1e-9)
 
 
 def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> None:

@@ -293,7 +293,7 @@ def test_each_body_for_itself() -> None:
     """One body fine, the other condensed on the same grid: on meshes as fine as the grid pressures are near."""
     found = []
     for punch, strip in (("fine", "fine"), ("condensed", "fine")):
-        each = (f"punch.operator='{punch}'", f"strip.operator='{strip}'", "geometry.parameters.across=8")
+        each = (f"punch.operator='{punch}'", f"strip.operator='{strip}'", "geometry.parameters.across=6")
         wide = ("grid.nodes=13", "geometry.parameters.stroke_elements=4", "grid.size=['0.3 mm', '0.3 mm']")
         system = assemble(load_case("ball-on-flat", [*BALL, *each, *wide]))
         contact = system.phase_contact([0]).solve(system.gap(0, system.unworn()))

@@ -166,13 +166,12 @@ def test_programs_go_on_with_the_grid_and_find_room_for_their_loads(how: str) ->
         assert last.end.totals.of(f"volume_{body}") == pytest.approx(volume, rel=2e-3)
 
 
-@pytest.mark.parametrize("program", [False, True])
-def test_last_bits_of_what_comes_in_stay_last_bits(program: bool) -> None:
+def test_last_bits_of_what_comes_in_stay_last_bits() -> None:
     """Of rough jumps, too: they are other ones on every number of ranks, each of which adds up its own cells."""
-    more = {"program": {"steps": STEPS}} if program else {}
     ends = []
     for force in (60.0, 60.0 * (1 + 1e-14)):
-        case = ball(force, grid={"across": 10}, run={"half_cycles": 20, "integration": "jump"}, **more)
+        run = {"half_cycles": 20, "integration": "jump"}
+        case = ball(force, grid={"across": 10}, run=run, program={"steps": STEPS})
         ends.append(list(evolve(assemble(case)))[-1])
     for of in (lambda block: block.pressure, lambda block: block.end.worn.punch, lambda block: block.end.worn.strip):
         one, other = (of(end) for end in ends)
@@ -327,13 +326,12 @@ def test_with_stick_jumps_go_with_the_march_and_runs_go_on(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sticks", [False, True])
-def test_a_program_goes_on_from_a_grid_that_has_grown(sticks: bool, tmp_path: Path) -> None:
+def test_a_program_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
     """In parts it ends as in one piece, whether it was cut within a step or where its loads step up."""
 
     def case(count: int) -> Case:
-        more = {**(STICKS if sticks else {}), "program": {"steps": [{**one, "amplitude": 0.02} for one in STEPS]}}
-        return growing({"across": 10}, **more, run={"half_cycles": count, "integration": "explicit"})
+        program = {"steps": [{**one, "amplitude": 0.02} for one in STEPS]}
+        return growing({"across": 10}, program=program, run={"half_cycles": count, "integration": "explicit"})
 
     straight, _ = run_case(case(20), output=tmp_path / "whole", log=lambda _: None)
     for count in (6, 9, 20):

@@ -22,7 +22,7 @@ from fenwear.common.errors import FenwearError, InputError
 
 
 @pytest.mark.process
-@pytest.mark.parametrize(("task", "count"), [(cases.try_case, 120), (cases.try_mesh, 20)])
+@pytest.mark.parametrize(("task", "count"), [(cases.try_case, 60), (cases.try_mesh, 10)])
 def test_sample(task: Any, count: int) -> None:
     """Mutated cases and meshes are computed or refused with words; both happens."""
     kinds, defects = cases.fuzz(task, count, first=1_000_000)
@@ -41,12 +41,12 @@ def test_the_fuzzer_finds(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_messages_speak_no_python() -> None:
     """Of many mutated cases, as far as their validation."""
     said = []
-    for seed in range(2_000_000, 2_001_500):
+    for seed in range(2_000_000, 2_000_700):
         try:
             make_case(cases.mutated(seed)[0])
         except CaseError as error:
             said.append(cases.said(error))
-    assert len(said) > 500
+    assert len(said) > 200
     assert not [text for text in said if text.startswith("BAD")]
 
 

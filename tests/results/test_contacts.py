@@ -104,8 +104,9 @@ COARSE = {"across": 2, "along": 3, "around": 12, "hub_elements": 1, "pad_layers"
 def test_both_faces_of_a_disc(back: int, tmp_path: Path) -> None:
     """Equal pads have the same pressures, node by node; a shorter one has the same load, and wears deeper."""
     settings = [f"geometry.parameters.{name}={value}" for name, value in COARSE.items()]
+    shown = ["output.uncertainty=false", f"output.report={str(back == 40).lower()}"]
     case = load_case(
-        "disc-brake-two-pads", [*settings, f"geometry.parameters.back_angle={back}", "run.half_cycles=2000"]
+        "disc-brake-two-pads", [*settings, f"geometry.parameters.back_angle={back}", "run.half_cycles=2000", *shown]
     )
     summary, directory = run_case(case, "disc", tmp_path / "run", lambda _message: None, progress="none")
     front, rear = summary["contacts"]["front"], summary["contacts"]["back"]
@@ -125,6 +126,7 @@ def test_both_faces_of_a_disc(back: int, tmp_path: Path) -> None:
         assert surface.overlaps
         spans = [(surface.map[face].min(axis=0), surface.map[face].max(axis=0)) for face in faces]
         assert max(low[0] for low, _ in spans) > min(high[0] for _, high in spans)  # beside each other
-    text = (directory / "figures" / "captions.txt").read_text()
-    assert text.count("Each contact through the middle of its own wear") == 2
-    assert (directory / "report.html").is_file()
+    if back == 40:
+        text = (directory / "figures" / "captions.txt").read_text()
+        assert text.count("Each contact through the middle of its own wear") == 2
+        assert (directory / "report.html").is_file()

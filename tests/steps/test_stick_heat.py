@@ -88,7 +88,7 @@ def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
 @pytest.mark.slow
 def test_jumps_get_as_warm_as_the_march() -> None:
     """The error of the temperatures falls with the tolerance of the jumps, whose last cycle is the next of a march."""
-    warm, cycles = assembled(FAST, "geometry.parameters.elements_along_contact=10", "stick.steps=4"), 30
+    warm, cycles = assembled(FAST, "geometry.parameters.elements_along_contact=10", "stick.steps=4"), 16
     marched = list(march(warm, 2 * (cycles + 1)))[-1].heat.temperature_punch[-1].max()
     errors = []
     for tolerance in (0.1, 5e-4):

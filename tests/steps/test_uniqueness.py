@@ -177,7 +177,6 @@ def apart(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        (NAME, (*SMALL, "contact.friction=0.17")),
         ("example2-heat", (*PLANE, "contact.friction=0.5")),
         ("brake-pad", SOLID),
     ],

@@ -43,8 +43,8 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
         return None
     if isinstance(layers.closure, SharedClosure) and layers.closure.speed.ndim > 1:
         message = (
-            "expected a number: contact.lubrication depends on v, which changes during the cycle, and 'layer' takes one "
-            "share for all of it"
+            "expected a number: contact.lubrication depends on v, which changes during the cycle. "
+            "'layer' takes one share for all of it"
         )
         raise CaseError(InputError("heat.conductance", message))
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None

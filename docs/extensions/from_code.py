@@ -13,6 +13,7 @@ import typer
 from docutils import nodes
 from executed import code_key
 from pydantic import BaseModel
+from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 from fenwear.bodies.ready_geometries import ready_geometries
@@ -220,15 +221,23 @@ class Experiments(Written):
 
 
 class Measured(Written):
-    """A measured experiment beside its prediction."""
+    """A measured experiment beside its prediction, whose error (%) the page states to 1 %."""
 
-    required_arguments = 1
+    required_arguments = 2
     optional_arguments = 0
 
     def lines(self) -> Iterable[str]:
-        """Return its text, figure and tables."""
-        (one,) = experiments(self.arguments)
-        return _finding(one, self.env)["lines"]
+        """Return its text, figure and tables.
+
+        Raises:
+            ExtensionError: the error is not what the page states.
+        """
+        name, stated = self.arguments
+        (one,) = experiments([name])
+        finding = _finding(one, self.env)
+        if abs(abs(finding["percent"]) - float(stated)) > 1:
+            raise ExtensionError(f"{name}: the error is {finding['percent']:.1f} %, the page states {stated} %")
+        return finding["lines"]
 
 
 def _finding(one: Experiment, env: Any) -> dict[str, Any]:
@@ -240,7 +249,8 @@ def _finding(one: Experiment, env: Any) -> dict[str, Any]:
     finding = one.compute("short")
     folder.mkdir(exist_ok=True)
     (folder / f"{one.name}.png").write_bytes(draw(finding))
-    made = {"key": key, "number": finding.number, "lines": [*markdown(one, finding, f"made/{one.name}.png")]}
+    lines = [*markdown(one, finding, f"made/{one.name}.png")]
+    made = {"key": key, "number": finding.number, "percent": finding.percent, "lines": lines}
     kept.write_text(json.dumps(made), "utf-8")
     return made
 

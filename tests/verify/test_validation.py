@@ -11,39 +11,26 @@ from fenwear import CaseError
 from fenwear_verify.validation import Comparison, experiments
 from fenwear_verify.validation.command import validate
 
-# The number of each experiment, %, on coarse meshes: what the pages say. Errors stand here as they are.
-NUMBERS = {
-    "ball-on-disc": 1,
-    "block-on-ring": 5,
-    "cylinder-liners": 13,
-    "disc-brake": 17,
-    "fretting-cylinder": 6,
-    "hip-in-patients": 83,
-    "hip-simulator": 11,
-    "polyethylene": 12,
-    "sliding-metal": 8,
-}
+PAGES = Path(__file__).parents[2] / "docs" / "validation"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NUMBERS)
-def test_number(name: str, tmp_path: Path) -> None:
-    """An experiment comes out as its page says, with a figure and the whole comparison in validation.json."""
-    found, folder = validate([name], tmp_path / "gallery", lambda _: None, "short")
+def test_files_of_an_experiment(tmp_path: Path) -> None:
+    """The whole comparison stands in validation.json, with a figure; the documentation states the error of each."""
+    found, folder = validate(["cylinder-liners"], tmp_path / "gallery", lambda _: None, "short")
     (one,) = found["experiments"]
-    assert abs(one["percent"]) == pytest.approx(NUMBERS[name], abs=1)
+    assert abs(one["percent"]) == pytest.approx(13, abs=1)
     assert json.loads((folder / "validation.json").read_text())["experiments"][0]["comparisons"] == one["comparisons"]
-    assert (folder / f"{name}.png").stat().st_size > 10_000
+    assert (folder / "cylinder-liners.png").stat().st_size > 10_000
 
 
-def test_every_experiment_has_a_number_and_a_page() -> None:
-    """None is left out, and each has its page with its command."""
-    assert sorted(NUMBERS) == sorted(one.name for one in experiments())
-    pages = Path(__file__).parents[2] / "docs" / "validation"
-    assert sorted(NUMBERS) == sorted(page.stem for page in pages.glob("*.md") if page.stem != "index")
-    for name in NUMBERS:
-        page = (pages / f"{name}.md").read_text("utf-8")
-        assert f"$ fenwear validate --short --only {name} -o results/{name}\n" in page
+def test_every_experiment_has_a_page() -> None:
+    """With its command, and its error for the build of the documentation to hold it against."""
+    pages = {page.stem: page.read_text("utf-8") for page in PAGES.glob("*.md") if page.stem != "index"}
+    assert sorted(pages) == sorted(one.name for one in experiments())
+    for name, text in pages.items():
+        assert f"$ fenwear validate --short --only {name} -o results/{name}\n" in text
+        assert f"{{experiment}} {name} " in text
 
 
 def test_comparison_error_and_its_uncertainty() -> None:

@@ -1,9 +1,10 @@
-"""The names of the two bodies of a problem.
+"""The names of the two bodies of a problem: translated where a case is read and where words are written.
 
-Punch (above) and strip (below, which slides) are their roles: tables and keys of a case, groups of the ready
-geometries, variables of results. A body may have a name besides, `punch.name = "pad"`. Its groups may then start with
-the name or with the role, pad_contact or punch_contact, which mean the same, and whatever is said of it has its name.
-So names are read where a case and where the groups of a geometry are read, and written in messages and results.
+Punch (above) and strip (below, which slides) are their roles in code, in variables of results, and in the short form of
+a case. `contact.between = ["bushing", "shaft"]` and `contact.slides = "shaft"` give them names. Then the tables of a
+case are `bodies.shaft` and `wear.shaft`, and groups of the geometry may start with the name or with the role.
+`by_roles` translates tables at the door, `by_names` back; `Names.with_names` translates keys and words of messages and
+results.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
+from types import MappingProxyType
 from typing import Any, ParamSpec, TypeVar
 
 from pydantic import BaseModel
 
-from fenwear.common.errors import CaseError, FenwearError, InputError
+from fenwear.case.body_tables import Body
+from fenwear.common.errors import CaseError, FenwearError, InputError, did_you_mean
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -27,6 +30,12 @@ NAME = re.compile(r"[^\W\d_][\w-]*")
 _TOLD = re.compile(
     r"(?<![\w/\\-])(?<!parameters\.)(?P<group>[Pp]unch|[Ss]trip)(?=_\w+(?!\w|\.\w)|_\.\.\.)|"
     r"(?<![\w./\\\[-])(?P<word>[Pp]unch|[Ss]trip)(?![\w/\\-]|\.\w|\])"
+)
+
+
+BODY_KEYS = "|".join(Body.model_fields)
+_KEY = re.compile(
+    rf"(?<![\w./\\\[])(?:(?P<wear>wear\.)(?P<law>punch|strip)\b|(?P<role>punch|strip)(?=\.(?:{BODY_KEYS})\b))"
 )
 
 
@@ -43,9 +52,34 @@ class Names:
 
     @classmethod
     def of(cls, tables: Mapping[str, Any]) -> Names:
-        """Return the names in the tables of a case, as they are in a file or as models."""
-        own = [_get(tables.get(role), "name") for role in ROLES]
-        return cls(*(name if isinstance(name, str) else role for name, role in zip(own, ROLES, strict=True)))
+        """Return the names in the tables of a case.
+
+        Raises:
+            CaseError: they are no names, or do not keep the bodies apart.
+        """
+        contact = _table(tables.get("contact"))
+        between, slides = contact.get("between"), contact.get("slides")
+        if not isinstance(between, list | tuple) or [type(name) for name in between] != [str, str]:
+            return cls()  # that a list of another form is wrong, the schema says
+        above, below = between
+        if slides not in (None, "", *between):
+            known = " or ".join(map(repr, between))
+            raise CaseError(InputError("contact.slides", f"expected {known}, got {slides!r}"))
+        names = cls(below, above) if slides == above else cls(above, below)
+        wrong = next((name for name in between if not NAME.fullmatch(name)), None)
+        if wrong is not None:
+            message = f"expected words of letters, digits, - and _, such as 'pad', got {wrong!r}"
+        elif any(f"{one}_".startswith(f"{other}_") for one, other in names.to_keep_apart):
+            message = f"expected names that keep the bodies' groups apart, got {above!r}, {below!r}"
+        else:
+            return names
+        raise CaseError(InputError("contact.between", message))
+
+    @property
+    def to_keep_apart(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of words of which the first must not begin as the second does: of each other's name and role."""
+        first, second = self.punch, self.strip
+        return (first, second), (second, first), (first, "strip"), (second, "punch")
 
     @property
     def by_roles(self) -> dict[str, str]:
@@ -56,22 +90,6 @@ class Names:
     def given(self) -> bool:
         """Whether a body has another name than its role."""
         return (self.punch, self.strip) != ROLES
-
-    @property
-    def problems(self) -> list[str]:
-        """The problems of the names: a key and the expected value, each."""
-        found = []
-        for role, name, other in (("punch", self.punch, "strip"), ("strip", self.strip, "punch")):
-            if not NAME.fullmatch(name):
-                found.append(f"{role}.name: expected a word of letters, digits, - and _, such as 'pad', got {name!r}")
-            elif f"{name}_".startswith(f"{other}_"):
-                found.append(f"{role}.name: expected another name than that of the {other}, got {name!r}")
-        first, second = f"{self.punch}_", f"{self.strip}_"
-        if not found and (first.startswith(second) or second.startswith(first)):
-            found.append(
-                f"strip.name: expected a name that keeps the bodies' groups apart, got {self.punch!r}, {self.strip!r}"
-            )
-        return found
 
     def role_of(self, name: str) -> str:
         """Return the role of the body of a name; a name that is none as it is."""
@@ -91,9 +109,16 @@ class Names:
                 return f"{name}{group.removeprefix(role)}"
         return group
 
+    def key_by_roles(self, path: str) -> str:
+        """Return the path of a key, of the case's names or of roles, with the roles."""
+        table, *rest = path.split(".")
+        if table in ("bodies", "wear") and rest and (role := self.role_of(rest[0])) in ROLES:
+            return ".".join([*(["wear"] if table == "wear" else []), role, *rest[1:]])
+        return path
+
     def with_names(self, text: str) -> str:
-        """Return a text in which the bodies have their names in place of their roles; keys and paths are left."""
-        return _TOLD.sub(self._name, text) if self.given else text
+        """Return a text in which keys and words have the bodies' names in place of their roles; paths are left."""
+        return _TOLD.sub(self._name, _KEY.sub(self._key, text)) if self.given else text
 
     def meant(self, attributes: Mapping[str, Any]) -> dict[str, Any]:
         """Return the attributes of a variable whose long name names the bodies."""
@@ -117,8 +142,18 @@ class Names:
         if not self.given:
             return
         if isinstance(error, CaseError):
-            error.problems = [InputError(self.with_names(p.key), self.with_names(p.message)) for p in error.problems]
+            tables = {role: f"bodies.{name}" for role, name in self.by_roles.items()}
+            named = CaseError(
+                [
+                    InputError(tables.get(p.key, self.with_names(p.key)), self.with_names(p.message))
+                    for p in error.problems
+                ]
+            )
+            error.problems, error.args = named.problems, named.args
         error.args = tuple(self.with_names(value) if isinstance(value, str) else value for value in error.args)
+
+    def _key(self, match: re.Match[str]) -> str:
+        return f"wear.{self.by_roles[match['law']]}" if match["wear"] else f"bodies.{self.by_roles[match['role']]}"
 
     def _name(self, match: re.Match[str]) -> str:
         role = match["group"] or match["word"]
@@ -161,5 +196,51 @@ def renamed(data: Any, change: Callable[[str], str]) -> Any:
     return found
 
 
-def _get(table: Any, key: str) -> Any:
-    return table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
+def by_roles(data: Mapping[str, Any], base: Mapping[str, Any] = MappingProxyType({})) -> dict[str, Any]:
+    """Return the tables of a case, or of a part of it, by the bodies' roles.
+
+    Args:
+        data: In the names of the bodies, or in their roles. A name in the table of a body, as older cases have it, is
+            read, too.
+        base: Tables of the case that they are laid over, whose names hold where they give none.
+
+    Raises:
+        CaseError: the names are none, or there is a table of a body that has none of them.
+    """
+    data = dict(data)
+    older = {role: _table(data.get(role)).get("name", role) for role in ROLES}
+    if tuple(older.values()) != ROLES:
+        for role in ROLES:
+            data[role] = {key: value for key, value in _table(data.get(role)).items() if key != "name"}
+        data["contact"] = {"between": [*older.values()], "slides": older["strip"], **_table(data.get("contact"))}
+    names = Names.of({"contact": {**_table(base.get("contact")), **_table(data.get("contact"))}})
+    bodies = data.pop("bodies", {})
+    if not isinstance(bodies, Mapping):
+        raise CaseError(InputError("bodies", f"expected a table of each body, got {bodies!r}"))
+    for name, body in bodies.items():
+        role = names.role_of(name)
+        if role not in ROLES:
+            known = [*names.by_roles.values()] if names.given else []
+            message = f"expected one of contact.between, {' or '.join(map(repr, known))}{did_you_mean(name, known)}"
+            missing = InputError("contact.between", "missing; expected both names, such as ['bushing', 'shaft']")
+            raise CaseError(InputError(f"bodies.{name}", message) if known else missing)
+        if role in data:
+            raise CaseError(InputError(role, f"expected in bodies.{name} alone"))
+        data[role] = body
+    if isinstance(data.get("wear"), Mapping):
+        data["wear"] = {names.role_of(name): law for name, law in data["wear"].items()}
+    return dict(renamed(data, names.by_role)) if names.given else data
+
+
+def by_names(data: dict[str, Any], names: Names) -> dict[str, Any]:
+    """Return the tables of a case, which are by roles, in the names of its bodies."""
+    if not names.given:
+        return data
+    bodies = {name: data[role] for role, name in names.by_roles.items()}
+    wear = {names.by_roles[role]: law for role, law in data["wear"].items()}
+    rest = {key: value for key, value in data.items() if key not in ROLES}
+    return dict(renamed({**rest, "bodies": bodies, "wear": wear}, names.by_name))
+
+
+def _table(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}

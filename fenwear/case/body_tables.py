@@ -379,11 +379,6 @@ class Topography(Part):
 class Body(Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
-    name: str | None = Field(
-        default=None,
-        description="name of the body in messages, results and reports, such as 'pad'; its groups in the geometry may "
-        "start with it, pad_contact; by default punch or strip",
-    )
     regions: dict[str, str] = Field(default={}, description="name of the material of each region")
     supports: tuple[Support, ...] = Field(default=(), description="places where displacement is held")
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")

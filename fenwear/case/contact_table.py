@@ -204,6 +204,12 @@ class Contact(Part):
         "in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically "
         "and the case supports it, else gross-sliding",
     )
+    between: tuple[str, str] | None = Field(
+        default=None,
+        description="names of both bodies, such as ['bushing', 'shaft'], in place of punch and strip; their tables are "
+        "bodies.NAME and wear.NAME",
+    )
+    slides: str = Field(default="", description="name of the body that slides; by default the second of between")
     friction: constant_or_dependence(Annotated[Number, Field(ge=0)], "") = Field(  # type: ignore[valid-type]
         default=0.0, description="coefficient of friction mu"
     )

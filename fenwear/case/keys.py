@@ -6,6 +6,7 @@ Editors complete keys by the JSON schema, explain them, and mark what is wrong.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import NoneType
@@ -15,6 +16,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fenwear.case.body_names import ROLES
 from fenwear.case.body_tables import Body
 from fenwear.case.schema import Case, part_models
 from fenwear.case.table_parts import UNIT, Unit, unit_of
@@ -68,6 +70,7 @@ READ_FIRST = {
             "a built-in case, or a .toml beside this file: its keys hold unless the case sets them",
         ),
         Key("unset", "", "list", "", 'keys of the base to remove: ["heat.inflow", "wear.punch"]'),
+        Key("bodies", "", "table", "", "tables of both bodies by their names in contact.between"),
         Key("program.file", "", "text", "", "in place of steps: a CSV file beside this file, a step in each line"),
         Key("motion.file", "", "text", "", "in place of columns and rows: a CSV file beside this file", "cycle"),
         Key("BODY.profile.file", "", "text", "", "in place of points: a CSV file beside this file, one in each line"),
@@ -108,9 +111,9 @@ def find_keys(path: str) -> list[Key]:
 
 
 def _matches(pattern: str, path: str) -> bool:
-    steps, given = pattern.split("."), path.split(".")
+    steps, given = pattern.split("."), re.sub(r"^bodies\.[\w-]+", "punch", path).split(".")
     return len(steps) == len(given) and all(
-        s in (g, "NAME") or (s == "N" and g.isdigit()) or (s == "BODY" and g in ("punch", "strip"))
+        s in (g, "NAME") or (s == "N" and g.isdigit()) or (s == "BODY" and (g in ROLES or given[0] == "wear"))
         for s, g in zip(steps, given, strict=True)
     )
 
@@ -184,9 +187,15 @@ def json_schema() -> dict[str, Any]:
     schema = _explained(_for_parts(Case.model_json_schema(mode="validation")))
     unset = {"type": "array", "items": {"type": "string"}, "description": READ_FIRST["unset"].meaning}
     schema["properties"] = {"base": _text("base"), "unset": unset, **schema["properties"]}
+    bodies = {"type": "object", "description": READ_FIRST["bodies"].meaning, "additionalProperties": _REF["Body"]}
+    schema["properties"]["bodies"] = bodies
+    schema["$defs"]["Wear"]["additionalProperties"] = _REF["WearLaw"]
     for table, path in (("Program", "program.file"), ("Profile", "BODY.profile.file"), ("Cycle", "motion.file")):
         schema["$defs"][table]["properties"]["file"] = _text(path)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+_REF = {name: {"$ref": f"#/$defs/{name}"} for name in ("Body", "WearLaw")}
 
 
 def _text(path: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import pydantic
 
-from fenwear.case.body_names import ROLES
+from fenwear.case.body_names import ROLES, Names, by_roles
 from fenwear.case.heat_table import Heat
 from fenwear.case.keys import all_keys, find_keys
 from fenwear.case.motion_table import read_cycle
@@ -93,7 +93,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if base is None:
         if unset is not None:
             raise CaseError(InputError(UNSET, "expected with a base, whose keys it removes"))
-        return data, folder
+        return by_roles(data), folder
     if not isinstance(base, str):
         raise CaseError(InputError("base", f"expected the name of a case, got {shown(base)}"))
     if base in base_of or len(base_of) > 8:
@@ -101,6 +101,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if folder is not None and base.endswith(".toml"):
         base = str(folder / base)
     below, base_folder = _read_tables(base, (*base_of, base))
+    data = by_roles(data, below)
     if "program" in data and isinstance(below.get("run"), dict) and "half_cycles" not in data.get("run", {}):
         below["run"].pop("half_cycles", None)  # the program tells how far the run goes
     _take_away(below, [] if unset is None else unset)
@@ -174,8 +175,9 @@ def _take_away(data: dict[str, Any], unset: Any) -> None:
     paths = [unset] if isinstance(unset, str) else unset
     if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
         raise CaseError(InputError(UNSET, f"expected a list of keys, such as ['heat.inflow'], got {shown(unset)}"))
+    names = Names.of(data)
     for path in paths:
-        *tables, last = (name.strip() for name in path.split("."))
+        *tables, last = (name.strip() for name in names.key_by_roles(path).split("."))
         place: Any = data
         for name in tables:
             place = _inside(place, name)
@@ -223,7 +225,13 @@ def make_case(
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
-    given = Given(dict(meshes), dict(stresses))
+    data = by_roles(data)
+    with Names.of(data).told_in_errors():
+        return _made(data, folder, Given(dict(meshes), dict(stresses)))
+
+
+def _made(data: Mapping[str, Any], folder: Path | None, given: Given) -> Case:
+    """Return the case of tables by roles."""
     data = _on_meshes(data, given)
     data = _with_files(data, folder)
     run = data.get("run", {})
@@ -239,7 +247,7 @@ def make_case(
     if open_end:
         case = case.model_copy(update={"run": case.run.model_copy(update={"half_cycles": half_cycles_of(case)})})
     check_length(case)
-    return case.on(given).at(folder, written(data, case.resolved()))
+    return case.on(given).at(folder, written(data, case.tables_by_roles()))
 
 
 def _on_meshes(data: Mapping[str, Any], given: Given) -> Mapping[str, Any]:
@@ -269,7 +277,7 @@ def _read_text(path: Path) -> str:
 def _apply(data: dict[str, Any], setting: str) -> None:
     """Set one `key.path=value` in the nested tables of `data`."""
     key, equals, text = setting.partition("=")
-    names = [name.strip() for name in key.split(".")]
+    names = [name.strip() for name in Names.of(data).key_by_roles(key).split(".")]
     if names == [UNSET]:
         _take_away(data, _value(text))
         return
@@ -308,7 +316,7 @@ def changed_case(case: Case, *settings: str) -> Case:
     Raises:
         CaseError: an override does not fit.
     """
-    data = case.resolved()
+    data = case.tables_by_roles()
     for setting in settings:
         _apply(data, setting)
     changed = make_case(data, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)

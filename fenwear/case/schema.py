@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.body_names import Names, renamed
+from fenwear.case.body_names import Names, by_names
 from fenwear.case.body_tables import Body, CourseLoad, Geometry, Grid, Load, Model
 from fenwear.case.contact_table import Contact
 from fenwear.case.exclusions import AGAINST_STICK, case_problems
@@ -94,19 +94,10 @@ class Case(Part):
     _given: Given = NOTHING_GIVEN
     _diffusion: dict[str, float] | None = None  # of a stage: that of its program
 
-    @model_validator(mode="before")
-    @classmethod
-    def _groups_by_role(cls, data: Any) -> Any:
-        """Return the tables with groups of the geometry by the bodies' roles; see `body_names`."""
-        if not isinstance(data, Mapping):
-            return data
-        names = Names.of(data)
-        return renamed(data, names.by_role) if names.given and not names.problems else data
-
     @model_validator(mode="after")
     def _tables_fit_together(self) -> Self:
         if problems := case_problems(self):
-            raise ValueError(self.names.with_names("\n".join(problems)))
+            raise ValueError("\n".join(problems))
         return self
 
     def loads_of(self, body: str) -> tuple[Load | CourseLoad, ...]:
@@ -128,7 +119,7 @@ class Case(Part):
     @property
     def names(self) -> Names:
         """Names of the bodies."""
-        return Names(self.punch.name or "punch", self.strip.name or "strip")
+        return Names.of({"contact": {"between": self.contact.between, "slides": self.contact.slides}})
 
     @property
     def bodies(self) -> dict[str, Body]:
@@ -288,7 +279,11 @@ class Case(Part):
         return placed
 
     def resolved(self) -> dict[str, Any]:
-        """Return every key with its value and unit: what case.toml holds."""
+        """Return every key with its value and unit, in the names of the bodies: what case.toml holds."""
+        return by_names(self.tables_by_roles(), self.names)
+
+    def tables_by_roles(self) -> dict[str, Any]:
+        """Return every key with its value and unit, by the bodies' roles."""
         data = self.model_dump(mode="json", exclude_none=True)
         if self._folder is not None and (self._folder / self.geometry.file).is_file():
             data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
@@ -299,7 +294,7 @@ class Case(Part):
             data["wear"][body] = law.resolved(data["wear"][body])
         if self.geometry.follow_wear is None:
             data["geometry"]["follow_wear"] = "never"
-        return dict(renamed(data, self.names.by_name)) if self.names.given else data
+        return data
 
     def to_toml(self) -> str:
         """Return the resolved case as a case file that reads back as the same case, without keys that say nothing."""

@@ -179,7 +179,7 @@ def _table_of(key: str) -> str:
 
 def _mixed_units(case: Case, but: Container[str]) -> Iterator[str]:
     """Tell of numbers without a unit beside others with one in the same table."""
-    values = dict(_leaves(case.resolved(), ""))
+    values = dict(_leaves(case.tables_by_roles(), ""))
     for key in sorted(case.written.bare):
         if key in but or _is_temperature(key):
             continue

@@ -21,7 +21,6 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fenwear.case.body_names import Names, renamed
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.units import convert
 from fenwear.report.key_numbers import names_in
@@ -76,7 +75,7 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Style = STANDA
     if not files:
         return {}
     fields = load(files[-1])
-    drawn = {"geometry": geometry_figure(fields, renamed(case, Names.of(case).by_role), look)}  # fields name groups so
+    drawn = {"geometry": geometry_figure(fields, case, look)}
     if "punch_stress_xx" in fields:
         drawn["surface_stress"] = stress_figure(fields, look)
     return wrapped(drawn)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fenwear.case.body_names import Names
+from fenwear.case.body_names import Names, by_roles
 from fenwear.common.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, Line, shown
@@ -91,14 +91,14 @@ def names_in(directory: Path) -> Names:
 
 
 def read_case(directory: Path) -> dict[str, Any]:
-    """Return the tables of the resolved case of a run.
+    """Return the tables of the resolved case of a run, by the bodies' roles.
 
     Raises:
         CaseError: it cannot be read.
     """
     path = directory / CASE
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        return by_roles(tomllib.loads(path.read_text("utf-8")))
     except OSError as error:
         message = f"{error.strerror}; expected the folder of a run"
         raise CaseError(InputError(str(path), message)) from None

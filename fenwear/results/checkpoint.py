@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.case import Case
+from fenwear.case.body_names import by_roles
 from fenwear.common.arrays import Array
 from fenwear.common.compat import geometry_dofmap
 from fenwear.common.errors import CaseError, InputError
@@ -225,10 +226,10 @@ def _checked(directory: Path, case: Case) -> Arrays:
     """
     arrays = _arrays(directory)
     try:
-        saved, _ = _flat(tomllib.loads(str(arrays[CASE]))), json.loads(str(arrays[EXTREMES]))
+        saved, _ = _flat(by_roles(tomllib.loads(str(arrays[CASE])))), json.loads(str(arrays[EXTREMES]))
     except (KeyError, ValueError):
         raise damaged(directory) from None
-    present = _flat(tomllib.loads(case.to_toml()))
+    present = _flat(by_roles(tomllib.loads(case.to_toml())))
     keys = sorted({*saved, *present})
     problems = [
         InputError(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")

@@ -19,6 +19,7 @@ import csv
 import io
 import itertools
 import math
+import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, load_case, make_case
+from fenwear.case.body_names import Names, by_roles
 from fenwear.common.arrays import Array
 from fenwear.common.csv_table import profile_text
 from fenwear.common.errors import CaseError, InputError
@@ -44,7 +46,7 @@ from fenwear.system import place_case
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"
-SURFACES = {"profile_punch.csv": ("x", "node"), "profile_strip.csv": ("x_strip", "node_strip")}
+SURFACES = {"punch": ("x", "node"), "strip": ("x_strip", "node_strip")}
 STEPS = "step"
 RAISED = {"": 1, "_strip": -1}  # wear lowers the strip; the punch's surface, which looks down, it raises
 ENDS = ("first", "last")
@@ -72,10 +74,11 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
     tables = {COURSE: _course(history)}
     if resolves(history):
         tables[LOOPS] = _loops(history, rows)
-    for name, dimensions in SURFACES.items():
+    names = Names.of(by_roles(tomllib.loads(history.attrs["case"])))
+    for body, dimensions in SURFACES.items():
         for dimension in dimensions:
             if dimension in history.sizes:
-                tables[name] = _profile(history, dimension, rows)
+                tables[f"profile_{names.by_roles[body]}.csv"] = _profile(history, dimension, rows)
     target = directory / FOLDER if folder is None else folder
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)
@@ -201,7 +204,7 @@ def profile_of(surface: ContactSurface, depth: Array) -> dict[str, Any]:
 
 def with_shape(case: Case, profile: dict[str, Any]) -> Case:
     """Return a case whose punch is made with the table of a profile."""
-    tables = case.resolved()
+    tables = case.tables_by_roles()
     tables["punch"]["profile"] = profile
     tables["punch"].pop("topography", None)  # which the points have in them
     return make_case(tables, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)

@@ -223,6 +223,6 @@ TURNS = ROWS % "'punch_angle_y (deg)'], rows=[[0, 0, -500, 0], [0.5, 0.3, -500, 
 )
 def test_loads_that_no_contact_can_carry(name: str, settings: list[str], told: str) -> None:
     """Told by the rows between which they act, the body and the part."""
-    names = ["punch.name=block"] if name == "example1" else []
+    names = ["contact.between=['block', 'strip']"] if name == "example1" else []
     with pytest.raises(CaseError, match=told):
         place_case(load_case(name, [*settings, *names]))

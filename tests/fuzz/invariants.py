@@ -309,15 +309,17 @@ def stick(bodies: random.Random, dice: random.Random) -> Problem:
     """A cylinder that sticks and slips on a flat: both wear."""
     changes = {
         "geometry.degree": 1,
-        "geometry.parameters.elements_along_contact": 24,
+        "geometry.parameters.elements_along_contact": 20,
         "geometry.parameters.growth": 1.0,
         "motion.amplitude": dice.uniform(0.001, 0.004),
         "contact.friction": dice.uniform(0.4, 0.9),
         "wear.punch.coefficient": _coefficient(dice),
         "wear.strip.coefficient": _coefficient(dice),
         "punch.loads.0.force": [0.0, -dice.uniform(80, 150)],
+        "stick.steps": 6,
+        "stick.step_tolerance": 1.0,
         "run.integration": "explicit",
-        "run.half_cycles": 8,
+        "run.half_cycles": 4,
     }
     return Problem("stick", base("fretting-partial-slip", changes), ("restart", "jumps"), 600.0, 0.18)
 

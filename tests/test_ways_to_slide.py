@@ -12,7 +12,7 @@ import ufl
 from dolfinx.mesh import CellType, create_mesh, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, assemble, load_case, make_case, march, own_mesh, steady
+from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march, own_mesh, steady, to_dataset
 from fenwear.bodies.distributed_mesh import BodyMesh
 from fenwear.results import registry
 
@@ -102,6 +102,23 @@ def test_heat_of_sliding_out_of_the_plane() -> None:
 
 
 def test_rings_cannot_stick() -> None:
-    """Around their axis, where they slide, they do not give way: said with what does."""
-    with pytest.raises(CaseError, match=r"model\.kind.*fretting-sphere"):
+    """Around their axis, where they slide, they do not give way: said with what does, and nothing of plane models."""
+    with pytest.raises(CaseError, match=r"model\.kind.*fretting-sphere") as said:
         load_case("ring-on-ring", ["contact.law=coulomb"])
+    assert "motion.axis" not in str(said.value)
+
+
+def test_a_solid_sticks_in_torsion(assembled: Callable[..., Tribosystem]) -> None:
+    """What is offered in place of rings: two half-spaces that stick turn by T = 8/3 G a^3 (R. D. Mindlin, 1949)."""
+    small = "{radius=10, contact_width=0.4, stroke=0, across=4, margin_elements=1, ball_layers=2, flat_layers=2}"
+    system = assembled(
+        *("fretting-sphere", f"geometry.parameters={small}", "geometry.degree=1", "grid.nodes=33"),
+        *("punch.operator=half-space", "strip.operator=half-space", "stick.steps=4", "stick.step_tolerance=1"),
+        "motion={kind='oscillation', axis=[0, 0, 1], amplitude='5e-5 rad', period='1 s'}",
+    )
+    (block,) = march(system, 1, block=1)
+    history, weights = to_dataset(block), system.pair.weights
+    arm = weights * np.hypot(*system.pair.punch.x[:, :2].T)
+    torque = np.hypot(history.traction.values[0, -1], history.traction_across.values[0, -1]) @ arm
+    radius, modulus = (3 * 50 * 10 / (4 * 1.1538e5)) ** (1 / 3), 2.1e5 / 2.6
+    assert torque == pytest.approx(8 / 3 * modulus * radius**3 * 5e-5, rel=0.01)

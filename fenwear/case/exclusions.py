@@ -125,8 +125,8 @@ AGAINST_STICK = (
     ),
     Check(
         lambda c: c.model.kind == "axisymmetric",
-        "model.kind: rings slide around their axis, and their displacements in (r, z) allow no stick there. "
-        "Expected a plane model or a solid, such as fretting-sphere with motion.kind = 'oscillation',",
+        "model.kind: rings slide around their axis, and no displacement along r or z gives way to torsion. "
+        "Expected a solid, such as fretting-sphere with motion.kind = 'oscillation', or a plane model,",
     ),
     Check(
         lambda c: c.heat and c.heat.operator == "full",
@@ -138,7 +138,7 @@ AGAINST_STICK = (
     ),
     Check(one_way, "motion.kind: expected a motion to and fro, or a cycle,"),
     Check(
-        lambda c: not c.passes and not isinstance(c.motion, Cycle),
+        lambda c: c.model.kind == "plane" and not c.passes and not isinstance(c.motion, Cycle),
         "motion.axis: expected 'x', since a plane model has no displacements along y,",
     ),
     Check(

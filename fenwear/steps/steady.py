@@ -51,7 +51,7 @@ from fenwear.system import (
 )
 
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
-ZERO = 1e-12  # of the largest: a velocity that is rounding
+ZERO = 1e-12  # of the largest: a velocity, or a pressure of a node that never touches, that is rounding
 JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
 BESIDE = 0.05  # of the cycles: how far the last two ends are apart between which they are interpolated
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
@@ -340,8 +340,10 @@ def _result(problem: SteadyInequality, solved: Solved, coupled: Coupled) -> Stea
     passing = system.passing(problem.wear, conditions=problem.conditions)
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
-    if (contact.pressure[:, ~touched] > 0).any():  # its shape goes away from all others
+    beyond = np.where(touched, 0.0, contact.pressure)
+    if beyond.max() > ZERO * peak:  # their shape goes away from all others
         raise ConvergenceError(NO_ONE_MOTION)
+    contact = replace(contact, pressure=contact.pressure - beyond)
     moved = _rigid_part(system, omega - system.pair.initial_gap, touched) + system.pair.initial_gap
     closest = np.where(touched, omega, omega - contact.gap.min(axis=0)) - moved
     depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale

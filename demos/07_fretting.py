@@ -60,9 +60,10 @@ print(f"fenwear: half-width {1e3 * closed / 2:.1f} µm, largest pressure {start.
 
 # %%
 begin = time.perf_counter()
-blocks = {}
-for block in jump(system, 2 * CYCLES[-1], tolerance=0.05, stops=frozenset(2 * n for n in CYCLES)):
-    blocks[int(block.half_cycle[-1]) // 2] = block
+blocks, reached = {}, None
+for cycles in CYCLES:
+    *_, blocks[cycles] = jump(system, 2 * cycles, tolerance=0.05, start=reached)
+    reached = blocks[cycles].end
 print(f"{CYCLES[-1]:,} cycles in {time.perf_counter() - begin:.1f} s")
 
 strip = system.pair.strip

@@ -21,6 +21,8 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Body, Heat, Support
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.fourier_law import ConductionLaw
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.system import build_bodies, elastic, make_sliding, place, with_exchange, with_reduced_heat
 
 DEMO = Path(__file__).parents[1] / "demos" / "own_materials.py"
@@ -124,7 +126,7 @@ def test_heat_of_bodies_made_in_python() -> None:
     )
     found = []
     for system in (scalar, equal, tilted):
-        (block,) = march(system, 20, block=20)
+        (block,) = march_within(system, RunLimits(20, block=20))
         assert block.heat is not None
         assert block.heat.balance_error.max() < 1e-9
         found.append((block.heat.temperature_punch[-2:].mean(axis=0), block.pressure[-1]))

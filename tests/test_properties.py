@@ -15,10 +15,12 @@ from hypothesis import given, note, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from fenwear import Tribosystem, assemble, load_case, march, steady, vary
+from fenwear import Tribosystem, assemble, load_case, steady, vary
 from fenwear.common.arrays import Array
 from fenwear.heat.heat_exchange import CROSSING, TERMS
 from fenwear.steps import Block, stability_number
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 
 HALF_WIDTH = 30.0  # mm
 FRICTION = 0.5  # at most: with more of it Newton's iteration for contact may stagnate, see the last test
@@ -193,7 +195,7 @@ def problems(heat: st.SearchStrategy[Any] = st.none(), lever: float = 0.9) -> st
 
 
 def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
-    (block,) = march(system, half_cycles, block=half_cycles, **options)
+    (block,) = march_within(system, RunLimits(half_cycles, block=half_cycles), **options)
     return block
 
 

@@ -13,7 +13,9 @@ from fenwear.case import Case
 from fenwear.checks.uncertain_values import Values, values_of
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError
-from fenwear.steps import Block, Span, follow_program, jump, march
+from fenwear.steps import Block, Span, follow_program
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import RunState
 from fenwear.system import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
 
@@ -77,18 +79,19 @@ class Again:
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
-        shared: dict[str, Any] = {"leave": leave, "loading": span.loading}
+        limits = span.limits(None, leave=leave)
         if run.integration != "jump":
-            yield from march(system, span.until, implicit=run.integration == "implicit", start=start, **shared)
+            yield from march_within(system, limits, implicit=run.integration == "implicit", start=start)
             return
         state, left = start, False
         reduced, tolerance = with_reduced_heat(system), run.jump_tolerance
         stops = frozenset({self.until - system.motion.half_cycles})
-        for block in jump(reduced, span.until, tolerance=tolerance, start=start, finer=True, stops=stops, **shared):
+        jumped = jump_within(reduced, replace(limits, stops=stops), tolerance=tolerance, start=start, finer=True)
+        for block in jumped:
             yield block
             state, left = block.end, leave(block.end)
         if not left and (0 if state is None else state.half_cycle) < span.until:  # a cycle that is not whole
-            yield from march(system, span.until, implicit=True, start=state, **shared)
+            yield from march_within(system, limits, implicit=True, start=state)
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,9 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.common.signals import Signals
     from fenwear.report.key_numbers import first_screen
-    from fenwear.studies.run import run_case
+    from fenwear.studies.run import run_with
 
     loaded = load(case, settings)
     if resume and output is None:
@@ -78,8 +79,9 @@ def run(
         clear(output, resume=resume)
     say = (lambda _message: None) if quiet else log
     progress: How = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(
-        loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
+    signals = Signals(MPI.COMM_WORLD, last=True)
+    summary, directory = run_with(
+        signals, loaded, Path(case).stem, output, say, resume=resume, progress=progress, fresh=fresh
     )
     if as_json:
         print_json(summary)

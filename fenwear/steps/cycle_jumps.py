@@ -8,14 +8,14 @@ D. Skeel, BIT 26, 1986): how fast errors fade is found by the jumps themselves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from math import ceil
 
 from fenwear.common.errors import CaseError, InputError
 from fenwear.steps.block import Block, HalfCycle
-from fenwear.steps.driver import BLOCK, Jumps, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
+from fenwear.steps.driver import Jumps, RunLimits, Watching, run_steps
 from fenwear.steps.run_state import RunState, beginning, on_exchange
 from fenwear.system import Tribosystem
 
@@ -28,13 +28,7 @@ def jump(
     *,
     tolerance: float,
     periodic_within: float | None = None,
-    block: int = BLOCK,
     start: RunState | None = None,
-    stops: frozenset[int] = frozenset(),
-    leave: Callable[[RunState], bool] = lambda _: False,
-    watch: Watch = unwatched,
-    loading: Loading = as_given,
-    finer: bool = False,
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, in blocks; collective.
 
@@ -42,31 +36,41 @@ def jump(
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
         tolerance: Largest estimated error of one jump, see `fenwear.steps.jump_method.Estimate`.
-        periodic_within, block, leave, watch: As of `fenwear.steps.driver.RunLimits`; the change per cycle counts.
+        periodic_within: Fraction of the pressure scale by which the pressure changes in a cycle where the run ends.
         start: State to continue from, such as the end of a block; by default the beginning.
-        stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.
-        loading: Factor of all loads, continuous: a stage takes that of its own time, so that the error estimate
-            sees how it changes.
-        finer: Whether to follow where jumps of next to no length would lead; from a start that has it, it is followed.
 
     Raises:
         CaseError: `start` lies within a cycle, or the maps of the heat do not fit into the memory.
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
-        InterruptedRunError: as `watch`.
+    """
+    return jump_within(system, RunLimits(half_cycles, periodic_within), tolerance=tolerance, start=start)
+
+
+def jump_within(
+    system: Tribosystem, limits: RunLimits, *, tolerance: float, start: RunState | None = None, finer: bool = False
+) -> Iterator[Block]:
+    """Yield the last cycle of every jump, as `jump`, within limits; collective.
+
+    Args:
+        system: The assembled problem.
+        limits: End, loads and stops.
+        tolerance: As of `jump`.
+        start: As of `jump`.
+        finer: Whether to follow where jumps of next to no length would lead; from a start that has it, it is followed.
     """
     strokes = system.motion.half_cycles
     if start is not None and start.half_cycle % strokes:
         message = f"jumps start from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
-    watching = Watching(system.team, watch)
-    step: Jumps = system.contact_law.jumps(system, tolerance, watching, loading)
+    watching = Watching(system.team, limits.watch)
+    step: Jumps = system.contact_law.jumps(system, tolerance, watching, limits.loading)
     state = on_exchange(start or beginning(step.system), step.system.exchange)  # before rank 0 leads
     if finer and state.finer is None:
         state = replace(state, finer=state)
-    whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
-    course = RunLimits(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)
+    stops = frozenset(-(-stop // strokes) * strokes for stop in limits.stops)
+    limits = replace(limits, half_cycles=limits.half_cycles // strokes * strokes, stops=stops, watch=watching)
     system.wear_on_meshes(state.worn)  # before rank 0 leads: the elements' heights take all ranks
-    yield from run_steps(step.system, partial(_on_meshes, system, step), state, course)
+    yield from run_steps(step.system, partial(_on_meshes, system, step), state, limits)
 
 
 def _on_meshes(system: Tribosystem, step: Jumps, state: RunState, until: int) -> tuple[RunState, list[HalfCycle]]:

@@ -95,9 +95,11 @@ class RunLimits:
         periodic_within: Stop when in a whole cycle the pressure differs from the cycle before by less than this
             fraction of the pressure scale.
         block: Half-cycles in a block.
-        stops: Half-cycles at which a block ends in any case.
+        stops: Half-cycles at which a block ends in any case, and a jump, or the cycle that they are in.
         leave: Ends the run at the first state for which it is true.
         watch: Asked between solves.
+        loading: Factor of all loads, continuous: a half-cycle has that of its middle, a stage of a jump that of its own
+            time, so that the error estimate sees how it changes.
     """
 
     half_cycles: int
@@ -106,9 +108,10 @@ class RunLimits:
     stops: frozenset[int] = frozenset()
     leave: Callable[[RunState], bool] = lambda _: False
     watch: Watch = unwatched
+    loading: Loading = as_given
 
 
-def run_steps(system: Tribosystem, step: Step, state: RunState, course: RunLimits) -> Iterator[Block]:
+def run_steps(system: Tribosystem, step: Step, state: RunState, limits: RunLimits) -> Iterator[Block]:
     """Yield the half-cycles that the steps record, in blocks; collective.
 
     Rank 0 computes a block for all, wherever no step of it needs them. A failure comes after all that was done before
@@ -119,8 +122,8 @@ def run_steps(system: Tribosystem, step: Step, state: RunState, course: RunLimit
         InterruptedRunError: what watches has ended the run within a step.
     """
     system.team.serve(system)
-    stretches = _Stretches(system, step, state.half_cycle, course)
-    while state.half_cycle < course.half_cycles:
+    stretches = _Stretches(system, step, state.half_cycle, limits)
+    while state.half_cycle < limits.half_cycles:
         done = system.led(partial(stretches.next, state))
         state = done.state
         if done.block is not None:
@@ -143,14 +146,14 @@ class _Stretch(NamedTuple):
 class _Stretches:
     """Goes on block by block."""
 
-    def __init__(self, system: Tribosystem, step: Step, begin: int, course: RunLimits) -> None:
-        self.system, self.step, self.course = system, step, course
-        self._recorder = Recorder(system, course.block)
-        self._ends = sorted({stop for stop in course.stops if stop > begin} | {course.half_cycles})
+    def __init__(self, system: Tribosystem, step: Step, begin: int, limits: RunLimits) -> None:
+        self.system, self.step, self.limits = system, step, limits
+        self._recorder = Recorder(system, limits.block)
+        self._ends = sorted({stop for stop in limits.stops if stop > begin} | {limits.half_cycles})
 
     def next(self, state: RunState) -> _Stretch:
         """Return the next block."""
-        recorder, course = self._recorder, self.course
+        recorder, limits = self._recorder, self.limits
         while True:
             until = next(end for end in self._ends if end > state.half_cycle)
             try:
@@ -165,9 +168,9 @@ class _Stretches:
             periodic, state = self._recorded(recorded, state.periodic_phases), after
             if state.periodic_phases != periodic:
                 state = replace(state, periodic_phases=periodic)
-            finished = state.periodic_phases >= self.system.motion.half_cycles or course.leave(state)
+            finished = state.periodic_phases >= self.system.motion.half_cycles or limits.leave(state)
             try:
-                due = course.watch()
+                due = limits.watch()
             except InterruptedRunError as error:
                 return _Stretch(recorder.take(state), state, failure=error)
             if due or recorder.full or finished or state.half_cycle in self._ends:
@@ -175,7 +178,7 @@ class _Stretches:
 
     def _recorded(self, recorded: list[HalfCycle], periodic: int) -> int:
         """Record half-cycles; return how many in a row have repeated, from those before them."""
-        recorder, limit, team = self._recorder, self.course.periodic_within, self.system.team
+        recorder, limit, team = self._recorder, self.limits.periodic_within, self.system.team
         for one in recorded:
             recorder.add(one)
             repeats = limit is not None and team.lead(lambda: recorder.change() < limit)

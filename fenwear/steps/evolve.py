@@ -6,15 +6,15 @@ Half-cycle by half-cycle: heat, contact, wear, and the next half-cycle the other
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps.block import Block
-from fenwear.steps.cycle_jumps import jump
-from fenwear.steps.driver import BLOCK, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits, Watching, run_steps
 from fenwear.steps.program_stages import Span, follow_program
 from fenwear.steps.run_state import RunState, all_phases, beginning, on_exchange
 from fenwear.steps.uniqueness import NO_JUMPS, heat_gain
@@ -27,12 +27,7 @@ def march(
     *,
     implicit: bool = False,
     periodic_within: float | None = None,
-    block: int = BLOCK,
     start: RunState | None = None,
-    stops: frozenset[int] = frozenset(),
-    leave: Callable[[RunState], bool] = lambda _: False,
-    watch: Watch = unwatched,
-    loading: Loading = as_given,
 ) -> Iterator[Block]:
     """Yield all half-cycles, in blocks; collective.
 
@@ -43,34 +38,41 @@ def march(
         system: The assembled problem.
         half_cycles: The last one at most.
         implicit: Which of the two steps.
-        periodic_within, block, stops, leave, watch: As of `fenwear.steps.driver.RunLimits`.
+        periodic_within: Fraction of the pressure scale by which the pressure of a cycle differs from the one before
+            where the run ends.
         start: The state to resume from, such as the end of a block; by default the beginning.
-        loading: Factor of all loads; that in the middle of a half-cycle acts in it.
 
     Raises:
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
-        InterruptedRunError: as `watch`.
     """
+    return march_within(system, RunLimits(half_cycles, periodic_within), implicit=implicit, start=start)
+
+
+def march_within(
+    system: Tribosystem, limits: RunLimits, *, implicit: bool = False, start: RunState | None = None
+) -> Iterator[Block]:
+    """Yield all half-cycles, as `march`, within limits; collective."""
     state = on_exchange(start or beginning(system), system.exchange)  # before rank 0 leads
-    watching = Watching(system.team, watch)
-    course = RunLimits(half_cycles, periodic_within, block, stops, leave, watching)
-    step = system.contact_law.half_cycles(system, watching, loading, implicit=implicit)
-    yield from run_steps(system, step, state, course)
+    watching = Watching(system.team, limits.watch)
+    step = system.contact_law.half_cycles(system, watching, limits.loading, implicit=implicit)
+    yield from run_steps(system, step, state, replace(limits, watch=watching))
 
 
-def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **course: Any) -> Iterator[Block]:
-    """Yield the blocks of a span in the way that `run.integration` of a case names; collective.
+def integrate(
+    system: Tribosystem, how: str, limits: RunLimits, tolerance: float, start: RunState | None = None
+) -> Iterator[Block]:
+    """Yield the blocks within limits in the way that `run.integration` of a case names; collective.
 
     Args:
         system: The assembled problem.
         how: "explicit", "implicit" or "jump".
-        span: Length, and loads.
+        limits: End, loads and stops.
         tolerance: Of jumps.
-        course: Common part of `march` and `jump`: where it starts, and what ends it before.
+        start: The state to resume from; by default the beginning.
     """
     if how == "jump":
-        return _told_of_heat(system, jump(system, span.until, tolerance=tolerance, loading=span.loading, **course))
-    return march(system, span.until, implicit=how == "implicit", loading=span.loading, **course)
+        return _told_of_heat(system, jump_within(system, limits, tolerance=tolerance, start=start))
+    return march_within(system, limits, implicit=how == "implicit", start=start)
 
 
 def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
@@ -121,9 +123,8 @@ def evolve(
     def over(
         own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
-        bound = tolerance or run.jump_tolerance
-        within = span.periodic_within(run.periodic_within)
-        return integrate(own, how, span, bound, start=state, leave=leave, periodic_within=within)
+        limits = span.limits(run.periodic_within, leave=leave)
+        return integrate(own, how, limits, tolerance or run.jump_tolerance, state)
 
     if how == "jump":
         system = with_reduced_heat(system)

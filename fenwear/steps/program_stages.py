@@ -14,7 +14,7 @@ from fenwear.case import Case, Cycle
 from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.common.errors import CaseError, InputError
 from fenwear.steps.block import Block
-from fenwear.steps.driver import Loading, as_given
+from fenwear.steps.driver import Loading, RunLimits, as_given
 from fenwear.steps.run_state import RunState, carried_by, on_other_grid, with_phases
 from fenwear.steps.slow_changes import Integrate, follow
 from fenwear.system import Clock, ContactLaw, ContactSetup, Tribosystem, grows, regridded, with_case, with_room
@@ -33,9 +33,9 @@ class Span:
     loading: Loading = as_given
     last: bool = True
 
-    def periodic_within(self, asked: float | None) -> float | None:
-        """Return within what its cycles have to repeat to end it, as a case asks for; None where they cannot."""
-        return asked if self.last else None
+    def limits(self, periodic_within: float | None, **more: Any) -> RunLimits:
+        """Return the limits of its integration, with what a case asks for of cycles that repeat, and further ones."""
+        return RunLimits(self.until, periodic_within if self.last else None, loading=self.loading, **more)
 
 
 # Runs a system from a state over a span, and leaves at the first state for which it is told to.

@@ -39,7 +39,8 @@ from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import STIFF
 from fenwear.steps.block import Block
 from fenwear.steps.coupled_phases import Coupled, Solved, check_cycle_memory, end_temperatures
-from fenwear.steps.cycle_jumps import jump
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.program_stages import at_step
 from fenwear.steps.run_state import RunState, beginning, pressure_scale
 from fenwear.steps.steady_inequality import OPEN, SteadyInequality, check_heat_memory, rigid_of_phases
@@ -529,7 +530,9 @@ class _Way:
         """Yield the ends of the jumps of a run of so many cycles, which stop at some of them; collective."""
         phases = len(self.state.directions)
         ends = frozenset(phases * stop for stop in stops)
-        for block in jump(self.system, until * phases, tolerance=tolerance, block=phases, start=start, stops=ends):
+        for block in jump_within(
+            self.system, RunLimits(until * phases, block=phases, stops=ends), tolerance=tolerance, start=start
+        ):
             yield _Passed.of(block, self.state)
 
     def leads(self, law: Callable[[_Passed, float], float], later: _Passed) -> float:

@@ -21,7 +21,9 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.laws.wear import WornDepths
 from fenwear.results.summary import within
-from fenwear.steps import Block, Renewal, critical_speed, follow, jump, running_in, steady
+from fenwear.steps import Block, Renewal, critical_speed, follow, running_in, steady
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.run_state import RunState, all_phases, beginning
 from fenwear.steps.run_totals import Totals, cycle_totals
 from fenwear.steps.steady_cycle import SteadyCycle, cycle_of_state
@@ -209,7 +211,12 @@ class Model:
             if course.given:
                 start = start or beginning(on)
                 start = replace(start, jump_length=ONE_STEP)
-            return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
+            return jump_within(
+                on,
+                RunLimits(strokes * cycles, block=strokes, stops=ends, leave=leave),
+                tolerance=tolerance,
+                start=start,
+            )
 
         # The elements' heights are the base's wherever the geometry is: no need to measure them anew.
         base = self._base(tuple(settings))

@@ -6,6 +6,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +91,6 @@ def run_case(
     resume: bool = False,
     progress: How = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
-    last: bool = False,
     fresh: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
@@ -103,7 +103,6 @@ def run_case(
         resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
-        last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
         fresh: Condense the bodies again, even where they are kept on disk.
 
     Returns:
@@ -116,7 +115,22 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    begin = time.perf_counter()
+    return run_with(Signals(comm), case, name, output, log, resume=resume, progress=progress, fresh=fresh)
+
+
+def run_with(
+    signals: Signals,
+    case: Case,
+    name: str,
+    output: Path | str | None,
+    log: Log,
+    *,
+    resume: bool,
+    progress: How,
+    fresh: bool,
+) -> tuple[dict[str, Any], Path]:
+    """Run a case and write its results, as `run_case`, with signals to look out for; collective."""
+    begin, comm = time.perf_counter(), signals.comm
     log = case.names.telling(log)
     found = resolve_law(case, log, comm, heat=preparation_of(case), fresh=fresh)
     for line in found.system.bodies.solved_by:
@@ -126,7 +140,7 @@ def run_case(
     how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}
     directory = Path(output) if output else on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        summary = _run(found.system, directory, log, progress, how, Signals(comm, last=last), resume=resume)
+        summary = _run(found.system, directory, log, progress, how, signals, resume=resume)
         return summary, directory
     except OutputError as error:
         way_on = on_root(comm, lambda: _way_on(checkpoint.reached(directory)))
@@ -323,11 +337,10 @@ class _Run:
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
-        course: dict[str, Any] = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
+        limits = span.limits(run.periodic_within, leave=leave, stops=self._fields_at, watch=self._watch)
         if run.until:
-            course["block"] = system.motion.half_cycles
-        course["periodic_within"] = span.periodic_within(run.periodic_within)
-        return integrate(system, run.integration, span, run.jump_tolerance, **course)
+            limits = replace(limits, block=system.motion.half_cycles)
+        return integrate(system, run.integration, limits, run.jump_tolerance, start)
 
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:

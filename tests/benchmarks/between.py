@@ -16,7 +16,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fenwear import State, Tribosystem, assemble, load_case, march, register_law
+from fenwear import State, Tribosystem, assemble, load_case, register_law
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 
 FIRST = 20  # half-cycles that are not timed
 BODIES = {  # the case, its settings, half-cycles that are timed, in how many rounds; a hardness that caps some pressure
@@ -61,7 +63,7 @@ def systems(name: str, wanted: Sequence[str]) -> dict[str, Tribosystem]:
 
 def timed(system: Tribosystem, count: int) -> float:
     """Return the time of half-cycles after each other, s; those before them, which factor what is new, do not count."""
-    blocks = march(system, FIRST + count, stops=frozenset({FIRST}))
+    blocks = march_within(system, RunLimits(FIRST + count, stops=frozenset({FIRST})))
     next(blocks)
     begin = time.process_time()
     for _ in blocks:

@@ -13,9 +13,11 @@ import time
 
 import numpy as np
 
-from fenwear import assemble, jump, load_case
+from fenwear import assemble, load_case
 from fenwear.common.arrays import Array
 from fenwear.steps import Block
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 
 CYCLES = (1_000, 5_000, 10_000, 18_000)
 LOAD, RADIUS, YOUNG, POISSON = 18.5, 6.0, 200e3, 0.3  # N/mm, mm, MPa, 1
@@ -62,7 +64,7 @@ def run(elements: int, tolerance: float, positions: int) -> None:
     stops = frozenset(2 * cycles for cycles in CYCLES)
     x, centre = system.pair.strip.x[:, 0], None
     begin = time.perf_counter()
-    for block in jump(system, 2 * CYCLES[-1], tolerance=tolerance, stops=stops):
+    for block in jump_within(system, RunLimits(2 * CYCLES[-1], stops=stops), tolerance=tolerance):
         if block.half_cycle[-1] not in stops:
             continue
         flat, cylinder = block.wear_strip[-1], block.wear[-1]

@@ -9,7 +9,9 @@ import time
 
 import numpy as np
 
-from fenwear import assemble, jump, load_case
+from fenwear import assemble, load_case
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.stick_setup import partial_slip_problem
 
 
@@ -39,7 +41,7 @@ def main() -> None:
     system = assemble(load_case("fretting-partial-slip", ["stick.step_tolerance=1"]))
     for tolerance in (0.05, 0.01, 3e-3):
         begin = time.process_time()
-        jumps = list(jump(system, 36_000, tolerance=tolerance, block=1))
+        jumps = list(jump_within(system, RunLimits(36_000, block=1), tolerance=tolerance))
         end = jumps[-1].wear[-1]
         seconds = time.process_time() - begin
         print(f"18,000 cycles by {len(jumps)} jumps, tolerance {tolerance:g}: {seconds:.1f} s")

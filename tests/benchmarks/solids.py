@@ -24,7 +24,10 @@ from mpi4py import MPI
 from fenwear import Tribosystem
 from fenwear.case import Case, make_case
 from fenwear.contact import SlidingContact
-from fenwear.steps import jump, march, steady
+from fenwear.steps import steady
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.system import elastic, place_case, with_exchange
 from fenwear_verify.full_space import FullContact
 
@@ -77,7 +80,7 @@ def say(text: str) -> None:
 
 def warm(system: Tribosystem, half_cycles: int = 20) -> float:
     """Print and return the processor time of a half-cycle of a march that has begun."""
-    blocks = march(system, half_cycles + 4, implicit=True, block=1)
+    blocks = march_within(system, RunLimits(half_cycles + 4, block=1), implicit=True)
     for _ in range(4):
         next(blocks)
     begin = time.process_time()
@@ -115,7 +118,7 @@ def without_heat(asked: argparse.Namespace) -> None:
     each = warm(system)
     if "jumps" in asked.only:
         with timed(f"{asked.half_cycles:,} half-cycles by jumps"):
-            blocks = list(jump(system, asked.half_cycles, tolerance=3e-3, block=1))
+            blocks = list(jump_within(system, RunLimits(asked.half_cycles, block=1), tolerance=3e-3))
         say(f"{'':52} {len(blocks)} jumps")
     if "steady" in asked.only:
         with timed("cyclic steady state"):
@@ -134,7 +137,7 @@ def with_heat(asked: argparse.Namespace) -> None:
     first, second = (len(basis) for basis in hot.exchange.bases)
     say(f"{'':52} {first} and {second} temperatures")
     with timed("with heat: 2,000 half-cycles by jumps"):
-        blocks = list(jump(hot, 2000, tolerance=3e-3, block=1))
+        blocks = list(jump_within(hot, RunLimits(2000, block=1), tolerance=3e-3))
     say(f"{'':52} {len(blocks)} jumps")
 
 

@@ -40,6 +40,8 @@ from fenwear.common.errors import MeshQualityError, TimeUpError
 from fenwear.common.signals import time_limit
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
 from fenwear.studies.run import position_warnings, run_case
@@ -741,9 +743,9 @@ def test_balances_are_looked_at(assembled: Assembled) -> None:
     """A thousandth of a term missing in the balance of force, heat, volume or energy is a warning; rounding is none."""
     heated = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "geometry.follow_wear=never")
     system = assembled("example1-heat", *heated)
-    (block,) = march(system, 4, block=4)
+    (block,) = march_within(system, RunLimits(4, block=4))
     fretting = assembled("fretting-partial-slip", "geometry.parameters.elements_along_contact=8", "stick.steps=4")
-    (slipping,) = march(fretting, 2, block=2)
+    (slipping,) = march_within(fretting, RunLimits(2, block=2))
     assert block.heat is not None
     terms = block.heat.terms.copy()
     terms[2, 3] += 2e-3 * terms[2].max()
@@ -759,7 +761,7 @@ def test_balances_are_looked_at(assembled: Assembled) -> None:
         (text,) = (one for one in StateMonitor(own).see(block) if "balance" in one)
         assert text.startswith(f"{key}: ")
         assert "is off by 0.2" in text
-    for own, block in ((system, next(march(system, 4, block=4))), (fretting, slipping)):
+    for own, block in ((system, next(march_within(system, RunLimits(4, block=4)))), (fretting, slipping)):
         assert not [text for text in StateMonitor(own).see(block) if "balance" in text]
 
 

@@ -23,6 +23,9 @@ from fenwear.laws.friction import Friction
 from fenwear.laws.wear import PhasesWear
 from fenwear.steps import Block, critical_speed, cycles_to_reach, growth_rate, stability_number
 from fenwear.steps import run_state as cycle_state
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.jump_method import Sizes
 from fenwear.steps.stick_equations import Step
 from fenwear.steps.stick_final import final_shape
@@ -133,9 +136,9 @@ def test_ranks_whose_arithmetic_differs(
     noisy(monkeypatch)
     spread = "heat.operator=full" in changes
     for block in (
-        *march(system, 6 if spread else 40, implicit=True, periodic_within=1e-3, block=3),
-        *march(system, 4, block=3),
-        *(() if spread else jump(system, 400, tolerance=1e-2, periodic_within=1e-4, block=8)),
+        *march_within(system, RunLimits(6 if spread else 40, periodic_within=1e-3, block=3), implicit=True),
+        *march_within(system, RunLimits(4, block=3)),
+        *(() if spread else jump_within(system, RunLimits(400, periodic_within=1e-4, block=8), tolerance=1e-2)),
     ):
         check_same(block.half_cycle, block.pressure, block.wear, block.totals.sums, block.periodicity)
         if block.heat is not None:
@@ -157,7 +160,7 @@ def test_contacts_that_fail_on_one_rank(
 ) -> None:
     """On rank 0: remedies on all ranks, the same, and in the end the same error. On another one: nothing."""
     system, solve = assembled("example1-heat", *FEW_NODES, "heat.conductance=20"), Inequality.solve
-    calls, runs = [0], (lambda: march(system, 40, block=7), lambda: jump(system, 400, tolerance=1e-3))
+    calls, runs = [0], (lambda: march_within(system, RunLimits(40, block=7)), lambda: jump(system, 400, tolerance=1e-3))
     system.remedies.take()  # of runs that failed
     usual = [told(run) for run in runs]
 
@@ -202,7 +205,7 @@ def test_stick_on_ranks_whose_arithmetic_differs(monkeypatch: pytest.MonkeyPatch
     problem, fineness = fine_enough(given, case)
     check_same(fineness.change, fineness.steps)
     system = replace(system, law_state=replace(system.law_state, problem=problem))
-    for block in (*march(system, 4), *jump(system, 60, tolerance=0.1, block=1)):
+    for block in (*march(system, 4), *jump_within(system, RunLimits(60, block=1), tolerance=0.1)):
         check_same(block.half_cycle, block.wear, block.end.jump_length, *(steps.pressure for steps in block.steps))
     found = final_shape(problem)
     check_same(found.pressure, found.depth)

@@ -12,6 +12,8 @@ from fenwear import Case, Tribosystem, assemble, jump, march
 from fenwear.common.errors import CaseError
 from fenwear.results import checkpoint
 from fenwear.steps import follow_program
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.steady import steady
 
 Edited = Callable[..., Case]
@@ -60,7 +62,7 @@ def test_lumped_disc(edited: Edited) -> None:
     """
     system = assemble(edited("example1-heat", on_track(), *SMALL))
     exchange, count = system.exchange, 200
-    (block,) = march(system, count, block=count)
+    (block,) = march_within(system, RunLimits(count, block=count))
     power = 0.25 * 1e4 * SPEED
     meshed = sum(side.capacity for side in exchange.sides) * system.bodies.punch.thickness
     assert meshed > CAPACITY
@@ -87,7 +89,7 @@ def test_lumped_turning_disc(edited: Edited) -> None:
 
     sizes = [f"geometry.parameters.{name}" for name in ("across=2", "along=3", "pad_layers=1", "disc_layers=2")]
     system = assemble(edited("brake-pad", disc, "geometry.degree=1", "geometry.order=1", *sizes))
-    (block,) = march(system, count, block=count)
+    (block,) = march_within(system, RunLimits(count, block=count))
     power = block.heat.terms[:, 0] / 4.0
     radius = np.hypot(*system.pair.punch.x[:, :2].T)
     torque = 0.35 * system.pair.weights @ (block.pressure[-1] * radius)
@@ -171,7 +173,9 @@ def test_ten_stops(edited: Edited) -> None:
     blocks = list(
         follow_program(
             system,
-            lambda own, state, leave, span: march(own, span.until, start=state, leave=leave, loading=span.loading),
+            lambda own, state, leave, span: march_within(
+                own, RunLimits(span.until, leave=leave, loading=span.loading), start=state
+            ),
             280,
         )
     )

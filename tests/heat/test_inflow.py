@@ -14,6 +14,8 @@ from fenwear.case.program import stages_of
 from fenwear.common.errors import HeatError
 from fenwear.heat.temperature import ReducedField
 from fenwear.steps import growth_rate
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.program_stages import at_stage
 from fenwear.system import steady_exchange
 
@@ -67,7 +69,7 @@ def test_reduced_equals_full_on_an_open_strip(speed: float, conductivity: float,
     found = []
     for operator in ("full", "reduced"):
         system = pad_on_strip(speed, conductivity, motion=motion, heat={"operator": operator})
-        (block,) = march(system, 40, implicit=True, block=40)
+        (block,) = march_within(system, RunLimits(40, block=40), implicit=True)
         found.append(np.array([block.heat.temperature_punch, block.heat.temperature_strip]))
         assert block.heat.balance_error.max() < 1e-8
         through = system.motion.mean_speed * 0.05 / 100  # times that the material is renewed in a half-cycle
@@ -192,7 +194,7 @@ def test_bare_contact_surface_convects(operator: str) -> None:
             sizes={"overlap": overlap, "elements_along_contact": 16},
             heat={"operator": operator, "convection": 4.0, "ambient": 3.0},
         )
-        (block,) = march(system, 100, implicit=True, block=100)
+        (block,) = march_within(system, RunLimits(100, block=100), implicit=True)
         assert block.heat.balance_error.max() < 1e-8
         found.append(np.append(block.heat.temperature_strip[-1].max(), block.heat.terms[-1, 3]))
     np.testing.assert_allclose(found[1], found[0], rtol=0.01)

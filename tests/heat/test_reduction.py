@@ -14,6 +14,8 @@ from fenwear.heat import passing_strip, prepare
 from fenwear.heat.heat_exchange import TERMS
 from fenwear.heat.reduction import _Growing
 from fenwear.steps import Block
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 
 # Faces that convect and no debris: all losses, and a strong feedback.
 COARSE = (
@@ -30,7 +32,7 @@ WARM = (
 
 
 def run(system: Tribosystem) -> Block:
-    (block,) = march(system, 100, block=100)
+    (block,) = march_within(system, RunLimits(100, block=100))
     return block
 
 

@@ -15,6 +15,8 @@ from fenwear.results.layer_results import quantities
 from fenwear.results.quantity import computed
 from fenwear.steps import Block, evolve, growth_rate, march
 from fenwear.steps.coupled_phases import cycle_heat
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import RunState
 from fenwear.steps.tangent import lies_after, phase_tangent
 
@@ -95,7 +97,9 @@ def test_marches_come_near_the_steady_state_as_a_cycle_loses_less_of_what_lies()
     for life in (3, 30):
         system = system_of(wears, carried(0.6, f"{life} mm"), "run.half_cycles=400000")
         found, near = steady(system), end(system, "jump").end
-        marched = list(march(system, near.half_cycle + 1200, block=1200, implicit=True, start=near))[-1].end
+        marched = list(march_within(system, RunLimits(near.half_cycle + 1200, block=1200), implicit=True, start=near))[
+            -1
+        ].end
         pressure = np.concatenate([one.pressure for one in marched.contacts])
         by_debris = np.abs(bare.phase_pressure - found.phase_pressure).max()
         errors.append(np.abs(found.phase_pressure - pressure).max() / by_debris)
@@ -194,7 +198,7 @@ def test_growth_rates_follow_what_the_strip_carries(laws: tuple[str, ...], way: 
         ONE_WAY,
     )
     system = assemble(load_case("example2", [*few, wears, *laws])) if way == "track" else system_of(wears, *laws)
-    start = list(march(system, 100, block=100, implicit=implicit))[-1].end
+    start = list(march_within(system, RunLimits(100, block=100), implicit=implicit))[-1].end
     n, lies, worn = len(system.pair.weights), len(system.pair.strip.weights), start.worn
     phases, strokes = range(len(system.motion.phases)), system.motion.half_cycles
 

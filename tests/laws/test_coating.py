@@ -13,6 +13,8 @@ from combinations import STICK, WARM
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.common.arrays import Array
 from fenwear.laws.coating import shares
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import beginning
 
 Assemble = Callable[..., Tribosystem]
@@ -47,7 +49,7 @@ def test_rigid_limit(assembled: Assemble) -> None:
     system = assembled("example2", *PLAIN, COATED)
     steps, weights = 750, system.pair.weights  # of 10 mm
     exact = 0.05 + 5 * (1e-6 * MEAN * 10 * steps - 0.05)
-    *_, marched = march(system, steps, implicit=True, block=50)
+    *_, marched = march_within(system, RunLimits(steps, block=50), implicit=True)
     errors = []
     for tolerance in (3e-2, 1e-3):
         *_, last = jump(system, steps, tolerance=tolerance)
@@ -391,7 +393,7 @@ def test_a_soft_coating_opens_a_gap_of_its_own(base: str, settings: tuple[str, .
     coat = f", coating={{thickness='2 um', coefficient='{coefficient:g} 1/MPa', modulus='2 GPa'}}"
     soft, bare = (assemble(load_case(base, [*settings, text % (coefficient, more)])) for more in (coat, ""))
     # As far as a part of it is worn through.
-    *_, worn = march(soft, 400, leave=lambda state: bool((state.worn.punch > 2e-3).sum() > 2))
+    *_, worn = march_within(soft, RunLimits(400, leave=lambda state: bool((state.worn.punch > 2e-3).sum() > 2)))
     assert 2 < (worn.wear[-1] > 2e-3).sum() < (worn.pressure[-1] > 0).sum()
     none = next(iter(march(bare, 1)))
     for start in (None, worn.end):

@@ -15,6 +15,9 @@ from fenwear.case.dependence import evaluate_law
 from fenwear.common.errors import CaseError, ConvergenceError
 from fenwear.laws.compliant_layer import RoughClosure
 from fenwear.laws.wear import StepWear
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.stability import growth_rate
 from fenwear.studies.model import Model
 
@@ -164,12 +167,12 @@ def test_coating_worn_through(assembled: Assemble) -> None:
     steps, weights = 750, system.pair.weights  # of 10 mm
     through = 0.05 / (1e-6 * MEAN) + 5e-4 * np.log(5) / (4e-6 * MEAN)
     exact = 0.0505 + 5e-6 * MEAN * (10 * steps - through)
-    *_, marched = march(system, steps, implicit=True, block=50)
+    *_, marched = march_within(system, RunLimits(steps, block=50), implicit=True)
     assert weights @ marched.wear[-1] / weights.sum() == pytest.approx(exact, rel=2e-3)
     assert np.ptp(marched.wear[-1]) < 0.01 * exact
     errors, counts = [], []
     for tolerance in (3e-2, 3e-3):
-        blocks = list(jump(system, steps, tolerance=tolerance, block=1))
+        blocks = list(jump_within(system, RunLimits(steps, block=1), tolerance=tolerance))
         errors.append(abs(weights @ blocks[-1].wear[-1] / weights.sum() / exact - 1))
         counts.append(len(blocks))
         depths = [float(block.wear[-1].max()) for block in blocks]

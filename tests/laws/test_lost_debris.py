@@ -10,8 +10,10 @@ from combinations import SMALL, STICK
 
 from fenwear import Tribosystem, assemble, load_case, steady
 from fenwear.common.arrays import Array
-from fenwear.steps import Block, evolve, growth_rate, march
+from fenwear.steps import Block, evolve, growth_rate
 from fenwear.steps.coupled_phases import cycle_heat
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.tangent import lies_after, phase_tangent
 
 WORN = {"gross-sliding": 1e-6, "coulomb": 2e-5}  # 1/MPa: the scar grows by some nodes
@@ -89,13 +91,15 @@ FELT = "contact.friction={expression='0.2 + 0.3 * exp(-debris / 1e-3)'}"
 def test_growth_rates_follow_debris(laws: tuple[str, ...], *, implicit: bool) -> None:
     """A cycle's map of thickness and depth is the derivative of a march's, by differences."""
     system = system_of("gross-sliding", *(law.replace("WORN", "3e-6") for law in laws))
-    start = list(march(system, 200, block=200, implicit=implicit))[-1].end
+    start = list(march_within(system, RunLimits(200, block=200), implicit=implicit))[-1].end
     n = len(system.pair.weights)
 
     def cycle(change: Array) -> Block:
         between = start.worn.between + np.array([change[:n], np.zeros(n)])
         worn = replace(start.worn, punch=start.worn.punch + change[n:], between=between)
-        return list(march(system, 202, block=2, implicit=implicit, start=replace(start, worn=worn)))[-1]
+        return list(march_within(system, RunLimits(202, block=2), implicit=implicit, start=replace(start, worn=worn)))[
+            -1
+        ]
 
     pressures, predicted, worn = cycle(np.zeros(2 * n)).pressure, np.eye(2 * n), start.worn
     for phase, pressure in enumerate(pressures):

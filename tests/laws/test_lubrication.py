@@ -11,6 +11,8 @@ from combinations import SMALL as SMALLEST
 from combinations import STICK
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import beginning
 
 Assemble = Callable[..., Tribosystem]
@@ -134,7 +136,7 @@ def test_a_layer_under_a_film_that_changes_within_the_cycle(assembled: Assemble)
     given = (*SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM, "wear.punch.coefficient=4e-7")
     rigid = [f"materials.{material}.young='1e9 MPa'" for material in ("steel", "composite")]
     system = assembled("example2", *given, *rigid)
-    (block,) = march(system, 1, block=1)
+    (block,) = march_within(system, RunLimits(1, block=1))
     phases = system.motion.phases[:3]
     slid = np.array([system.conditions(k).speed[0] * phase.duration for k, phase in enumerate(phases)])
     film = 0.1 * (slid / [phase.duration for phase in phases]) ** 0.5
@@ -148,7 +150,7 @@ def test_a_layer_under_a_film_that_changes_within_the_cycle(assembled: Assemble)
     np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=0, atol=3e-3 * marched.wear[-1].max())
     state = steady(elastic)
     start = replace(beginning(elastic), worn=replace(elastic.unworn(), punch=state.shape))
-    (first,) = march(elastic, 1, block=1, start=start)
+    (first,) = march_within(elastic, RunLimits(1, block=1), start=start)
     np.testing.assert_allclose(first.end.contacts[0].pressure[0], state.phase_pressure[0], rtol=1e-9, atol=1e-9)
 
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from fenwear import Tribosystem, march, steady
+from fenwear import Tribosystem, steady
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.surfaces.sliding_field import node_rates
 
 RADIUS, FORCE, K = 3.0, 100.0, 1e-8
@@ -54,7 +56,7 @@ def test_nodes_at_the_axis(assembled: Callable[..., Tribosystem]) -> None:
     """The square around the axis: v_m is exact; a first turn under even pressure wears within 2 % of k p v."""
     system = pin(assembled, (0.0, 0.0), 6, 4)
     pair, radius = system.pair, np.linalg.norm(system.pair.punch.x[:, :2], axis=1)
-    (block,) = march(system, 1, block=1)
+    (block,) = march_within(system, RunLimits(1, block=1))
     slid = 2 * np.pi * (pair.weights * radius) @ block.pressure[0]
     assert pair.weights @ block.wear[-1] == pytest.approx(K * slid, rel=0.02)
     middle = radius.argmin()

@@ -20,6 +20,9 @@ from fenwear.results.sheet import sheet_rows, sheet_text
 from fenwear.results.stored_history import load_history
 from fenwear.results.summary import sheet_of
 from fenwear.steps import Block, follow
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.studies.run import run_case
 from fenwear.surfaces.placement import in_model
 
@@ -56,7 +59,7 @@ def test_volume_is_k_f_s(assembled: Assemble, every: str) -> None:
         blocks = list(jump(system, count, tolerance=0.05))
         assert sum(map(len, blocks)) < count / 2
     else:
-        blocks = list(march(system, count, implicit=every == "implicit", block=50))
+        blocks = list(march_within(system, RunLimits(count, block=50), implicit=every == "implicit"))
     found, s = last(blocks), count * STROKE
     assert found["cycles"] == count / 2
     assert found["sliding_distance"] == pytest.approx(s, rel=1e-12)
@@ -83,7 +86,7 @@ def test_half_cycles_of_changing_load_and_square_law(assembled: Assemble) -> Non
     """b = 2 and a load that swings: sums over all half-cycles of what their pressures do."""
     loads = "punch.loads=[{on='punch_load', traction=[0, -16.666], over_cycle=[[0, 1.2], [0.4, 0.3], [1, 1.2]]}]"
     system = assembled("example1", *SMALL, "wear.punch.coefficient=1e-9", "wear.punch.pressure_exponent=2", loads)
-    blocks = list(march(system, 30, block=7))
+    blocks = list(march_within(system, RunLimits(30, block=7)))
     pressure = np.concatenate([block.pressure for block in blocks])
     found, weights = last(blocks), 10 * system.pair.weights
     volume = 1e-9 * STROKE * (pressure**2 @ weights)
@@ -112,8 +115,8 @@ def test_both_bodies_after_their_meshes_have_followed(assembled: Assemble, how: 
 
     def integrate(on: Tribosystem, start: Any, leave: Any) -> Any:
         if how == "march":
-            return march(on, count, implicit=True, start=start, leave=leave)
-        return jump(on, count, tolerance=0.2, start=start, leave=leave)
+            return march_within(on, RunLimits(count, leave=leave), implicit=True, start=start)
+        return jump_within(on, RunLimits(count, leave=leave), tolerance=0.2, start=start)
 
     blocks = list(follow(system, integrate))
     assert blocks[-1].system is not system

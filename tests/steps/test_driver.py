@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, jump, march
+from fenwear import Tribosystem, march
 from fenwear.common.errors import InterruptedRunError
 from fenwear.steps import Block
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
+from fenwear.steps.run_state import RunState
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
 Blocks = Callable[..., Iterator[Block]]
 
 
-def jumps(system: Tribosystem, half_cycles: int, **options: object) -> Iterator[Block]:
-    return jump(system, half_cycles, tolerance=1e-3, **options)  # type: ignore[arg-type]
+def marches(system: Tribosystem, half_cycles: int, start: RunState | None = None, **limits: Any) -> Iterator[Block]:
+    return march_within(system, RunLimits(half_cycles, **limits), start=start)
 
 
-@pytest.mark.parametrize("run", [march, jumps])
+def jumps(system: Tribosystem, half_cycles: int, start: RunState | None = None, **limits: Any) -> Iterator[Block]:
+    return jump_within(system, RunLimits(half_cycles, **limits), tolerance=1e-3, start=start)
+
+
+@pytest.mark.parametrize("run", [marches, jumps])
 def test_interrupted_within_a_step(assembled: Callable[..., Tribosystem], run: Blocks) -> None:
     """What was done before it is yielded, then the run ends; going on from there is as if never interrupted."""
     system = assembled("fretting", "motion.positions=3", "geometry.parameters.elements_along_contact=16")
@@ -33,16 +42,16 @@ def test_interrupted_within_a_step(assembled: Callable[..., Tribosystem], run: B
         return False
 
     with pytest.raises(InterruptedRunError, match="asked to"):
-        blocks.extend(run(system, 40 if run is march else 1000, watch=watch))
+        blocks.extend(run(system, 40 if run is marches else 1000, watch=watch))
     assert len(blocks) == 1
     reached = blocks[0].end.half_cycle
     assert reached > 0
-    *_, resumed = run(system, 40 if run is march else 1000, start=blocks[0].end)
-    *_, whole = run(system, 40 if run is march else 1000)
+    *_, resumed = run(system, 40 if run is marches else 1000, start=blocks[0].end)
+    *_, whole = run(system, 40 if run is marches else 1000)
     np.testing.assert_allclose(resumed.wear[-1], whole.wear[-1], rtol=0, atol=1e-9 * whole.wear[-1].max())
 
 
-@pytest.mark.parametrize("run", [march, jumps])
+@pytest.mark.parametrize("run", [marches, jumps])
 def test_blocks_end_when_asked(assembled: Callable[..., Tribosystem], run: Blocks) -> None:
     """A block ends after the step in which what watches says so, whatever it holds; the results do not change."""
     system = assembled("example1", *COARSE)

@@ -18,6 +18,9 @@ from fenwear.heat import heat_exchange
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, coupled_phases, growth_rate, stationary_growth
 from fenwear.steps.coupled_phases import cycle_heat
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import RunState
 from fenwear.steps.run_totals import none_yet
 from fenwear.steps.stability import repeating_temperatures
@@ -35,7 +38,7 @@ COARSE = (
 
 
 def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
-    (block,) = march(system, half_cycles, block=half_cycles, **options)
+    (block,) = march_within(system, RunLimits(half_cycles, block=half_cycles), **options)
     return block
 
 
@@ -142,7 +145,7 @@ def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_
 def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, settings: tuple[str, ...]) -> None:
     """Contact of many nodes at known heat, again and again, and fluxes by factors: the same jumps as all at once."""
     system = assembled("example1-heat", *COARSE, *settings)
-    at_once = list(jump(system, 400, tolerance=0.01, block=2))
+    at_once = list(jump_within(system, RunLimits(400, block=2), tolerance=0.01))
     monkeypatch.setattr(coupled_phases, "MANY", 0)
     monkeypatch.setattr(heat_exchange, "FEW", 0)
     solved: list[bool] = []
@@ -154,7 +157,7 @@ def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(CondensedContact, "solve", noted)
     fresh = replace(system, exchange=system.exchange.varied(system.heat, system.exchange.friction))
-    lagged = list(jump(fresh, 400, tolerance=0.01, block=2))
+    lagged = list(jump_within(fresh, RunLimits(400, block=2), tolerance=0.01))
     assert len(solved) > 100
     assert sum(solved) < 0.05 * len(solved)
     assert [int(block.half_cycle[-1]) for block in lagged] == [int(block.half_cycle[-1]) for block in at_once]

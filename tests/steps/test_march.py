@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, march
+from fenwear import Case, Tribosystem, assemble
 from fenwear.steps import Block
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear_verify.full_space import nothing_condensed
 
 A, MEAN = 30.0, 1e4 / 600
@@ -18,9 +20,9 @@ OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")
 FAST = ("geometry.degree=2", "wear.punch.coefficient=4e-6")  # 100 times the paper's
 
 
-def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
+def run(system: Tribosystem, half_cycles: int, periodic_within: float | None = None, **options: Any) -> Block:
     """Return all half-cycles in one block."""
-    (block,) = march(system, half_cycles, block=half_cycles, **options)
+    (block,) = march_within(system, RunLimits(half_cycles, periodic_within, block=half_cycles), **options)
     return block
 
 
@@ -142,7 +144,7 @@ def test_blocks_are_one_sequence(assembled: Callable[..., Tribosystem]) -> None:
     """Cutting the run into blocks cuts nothing else."""
     system = assembled("example1", *FAST)
     whole = run(system, 10)
-    parts = list(march(system, 10, block=3))
+    parts = list(march_within(system, RunLimits(10, block=3)))
     assert [len(p) for p in parts] == [3, 3, 3, 1]
     for name in ("half_cycle", "direction", "pressure", "gap", "wear", "worn_area_increment", "periodicity"):
         np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(whole, name))

@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case, steady
+from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, read_history, run_case, steady
 from fenwear.case.program import cycle_of, read_program, stages_of
 from fenwear.checks import Seen
 from fenwear.common.errors import CaseError
 from fenwear.steps import Block, Span, at_step, evolve, follow_program
 from fenwear.steps import program_stages as program
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from tests.results.test_contacts import two_pads
 
 Edited = Callable[..., Case]
@@ -26,11 +29,13 @@ K = 1.25 * np.pi * 1e-8  # of the examples, 1/MPa
 
 
 def marched(system: Tribosystem, state: Any, leave: Any, span: Span) -> Iterator[Block]:
-    return march(system, span.until, start=state, leave=leave, loading=span.loading, implicit=True)
+    return march_within(system, RunLimits(span.until, leave=leave, loading=span.loading), start=state, implicit=True)
 
 
 def jumped(system: Tribosystem, state: Any, leave: Any, span: Span, tolerance: float = 3e-3) -> Iterator[Block]:
-    return jump(system, span.until, start=state, leave=leave, loading=span.loading, tolerance=tolerance)
+    return jump_within(
+        system, RunLimits(span.until, leave=leave, loading=span.loading), start=state, tolerance=tolerance
+    )
 
 
 def steps_of(steps: list[dict[str, Any]], **more: Any) -> Callable[[dict[str, Any]], object]:

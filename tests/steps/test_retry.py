@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import ConvergenceError, Tribosystem, jump, march
+from fenwear import ConvergenceError, Tribosystem, jump
 from fenwear.common.errors import FULL_START, INTERIOR, MARCHED, SHORTER_JUMPS, SMALLER_STEPS, SOFTER_START
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import Inequality
 from fenwear.steps import Block
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.phase import PhaseEnd, PhaseStep
 
 Assemble = Callable[..., Tribosystem]
@@ -25,7 +27,7 @@ MEAN = 1e4 / 600
 
 
 def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
-    (block,) = march(system, half_cycles, block=half_cycles, **options)
+    (block,) = march_within(system, RunLimits(half_cycles, block=half_cycles), **options)
     return block
 
 

@@ -9,11 +9,13 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, evolve, jump, make_case, march
+from fenwear import Tribosystem, assemble, evolve, make_case, march
 from fenwear.case.templates import fill_in, find_template
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, follow
-from fenwear.steps.cycle_jumps import LATE
+from fenwear.steps.cycle_jumps import LATE, jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import RunState
 from fenwear.steps.slow_changes import _in_place
 
@@ -22,7 +24,7 @@ SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.c
 
 def run(system: Tribosystem, half_cycles: int, tolerance: float = 0.1) -> list[Block]:
     def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump(now, half_cycles, tolerance=tolerance, start=start, leave=leave)
+        return jump_within(now, RunLimits(half_cycles, leave=leave), tolerance=tolerance, start=start)
 
     return list(follow(system, integrate))
 
@@ -119,7 +121,7 @@ def test_a_run_with_heat_goes_on(assembled: Callable[..., Tribosystem]) -> None:
     *_, expected = march(plain, 6)
 
     def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return march(now, 6, start=start, leave=leave)
+        return march_within(now, RunLimits(6, leave=leave), start=start)
 
     blocks = list(follow(moving, integrate))
     assert blocks[-1].system is not moving

@@ -12,6 +12,8 @@ from combinations import FEATURES, STICK
 from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps import evolve
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_jump import first_cycle as begin_cycle
 from fenwear.steps.stick_jump import jumped
@@ -87,7 +89,7 @@ def test_jumps_tend_to_the_march() -> None:
     exact, pressed = depths(marched), marched[-1].totals.pressure[-1]
     differences, others, counts = [], [], []
     for tolerance in (0.1, 1e-3):
-        found = list(jump(system, 2 * cycles, tolerance=tolerance, block=1))  # a block for each jump
+        found = list(jump_within(system, RunLimits(2 * cycles, block=1), tolerance=tolerance))  # a block for each jump
         assert found[-1].half_cycle[-1] == 2 * cycles
         counts.append(len(found))
         for before, after in itertools.pairwise(found):
@@ -137,7 +139,11 @@ def test_jumps_over_growing_contacts_are_as_many_on_any_mesh(elements: int) -> N
     wear = ("wear={punch={coefficient='4.8e-8 1/MPa'}}", "contact.friction=0.3")
     laws = ("contact.law='coulomb'", "stick={steps=4, step_tolerance=1}"), ("contact.law='gross-sliding'",)
     sticking, sliding = (
-        list(jump(assemble(load_case("fretting", [*sizes, *wear, *law])), 3000, tolerance=3e-3, block=1))
+        list(
+            jump_within(
+                assemble(load_case("fretting", [*sizes, *wear, *law])), RunLimits(3000, block=1), tolerance=3e-3
+            )
+        )
         for law in laws
     )
     assert len(sticking) <= len(sliding)

@@ -13,11 +13,14 @@ from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from fenwear import Case, Tribosystem, assemble, jump, make_case, march, read_history, run_case, steady
+from fenwear import Case, Tribosystem, assemble, make_case, march, read_history, run_case, steady
 from fenwear.common.errors import CaseError
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, SteadyState, evolve, follow, monotonic
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import RunState, beginning
 from fenwear.studies.model import Model
 from fenwear.studies.quantities import evaluate, parse_quantity
@@ -66,7 +69,7 @@ def growing(k0: float) -> dict[str, str]:
 
 def marched(system: Tribosystem, half_cycles: int, start: RunState | None = None) -> list[Block]:
     def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return march(own, half_cycles, start=state, leave=leave)
+        return march_within(own, RunLimits(half_cycles, leave=leave), start=state)
 
     return list(follow(system, integrate, start))
 
@@ -288,7 +291,7 @@ def test_jumps_follow_as_marches(edited: Edited) -> None:
     case = edited("example1-heat", softening, *SMALL, "run.half_cycles=16", "heat.steps=2")
 
     def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump(own, 16, tolerance=1e-3, start=state, leave=leave)
+        return jump_within(own, RunLimits(16, leave=leave), tolerance=1e-3, start=state)
 
     system = assemble(case, heat="reduced")
     jumped, last = list(follow(system, integrate))[-1], marched(system, 16)[-1]

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case, make_case
+from fenwear import Case, CaseError, Tribosystem, assemble, load_case, make_case
 from fenwear.steps import Block, critical_speed, follow
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity
 from fenwear.studies.model import cycle_of
@@ -147,7 +149,7 @@ def test_a_grid_that_grows() -> None:
 
     def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         last = cycles * on.motion.half_cycles
-        return jump(on, last, tolerance=case.run.jump_tolerance, start=start, leave=leave)
+        return jump_within(on, RunLimits(last, leave=leave), tolerance=case.run.jump_tolerance, start=start)
 
     *_, last = follow(system, integrate)
     *_, found = Model(case).run({}, cycles)

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, Tribosystem, assemble, jump, load_case
+from fenwear import Case, CaseError, Tribosystem, assemble, load_case
 from fenwear.steps import Block, follow
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity, sensitivity
 from fenwear.studies.model import Snapshot, edge_moved
@@ -200,7 +202,7 @@ def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
     cycles, quantity = 200, parse_quantity("temperature after 200 cycles")
 
     def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump(on, 2 * cycles, tolerance=0.03, start=start, leave=leave)
+        return jump_within(on, RunLimits(2 * cycles, leave=leave), tolerance=0.03, start=start)
 
     *_, last = follow(assemble(case, MPI.COMM_SELF, heat="reduced"), integrate)
     model = Model(case)

@@ -9,6 +9,8 @@ import numpy as np
 from fenwear.case import load_case, make_case
 from fenwear.common.arrays import Array
 from fenwear.steps import Block, jump, march
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.system import Tribosystem, assemble
 from fenwear_verify.suite import Line, Plot, Result, Row, number, verification
 
@@ -93,7 +95,7 @@ def published_ring() -> Result:
     system = assemble(load_case("block-on-ring"))
     case = system.case
     depths, rows = (16.155e-3, 25.709e-3), list[Row]()
-    blocks = list(jump(system, 3200, tolerance=3e-3, stops=frozenset((1600,)), block=1))
+    blocks = list(jump_within(system, RunLimits(3200, stops=frozenset((1600,)), block=1), tolerance=3e-3))
     for steps, depth in zip((1600, 3200), depths, strict=True):
         (worn,) = (block.wear[-1] for block in blocks if block.half_cycle[-1] == steps)
         area = 2e-9 * 65 / case.model.thickness * 500 * steps

@@ -6,7 +6,9 @@ import numpy as np
 from scipy.integrate import quad
 
 from fenwear.laws import LayerStep
-from fenwear.steps import growth_rate, march
+from fenwear.steps import growth_rate
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.system import Tribosystem
 from fenwear_verify.bodies import rigid_punch, two_blocks
 from fenwear_verify.suite import Result, Row, number, verification
@@ -46,7 +48,7 @@ def galin_layer() -> Result:
         slowest = np.expm1(-growth * system.motion.period / 2) / step
         rows.append(number(f"B = {ratio:g}, growth rate of the slowest mode (E* k V/a)", exact[0], slowest, 2e-3))
         if ratio == 1:
-            block = next(march(system, 100, block=100, implicit=True))
+            block = next(march_within(system, RunLimits(100, block=100), implicit=True))
             late = (block.pressure - MEAN)[[50, 60, 70, 80]] * np.sqrt(system.pair.weights)
             recurrence, *_ = np.linalg.lstsq(late[2::-1].T, late[3], rcond=None)
             factors = np.sort(np.roots([1, *-recurrence]).real)[::-1] ** (1 / 10)

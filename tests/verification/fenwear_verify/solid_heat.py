@@ -10,6 +10,8 @@ import numpy as np
 from fenwear.common.arrays import Array
 from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.steps import critical_speed, growth_rate, march, steady
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.surfaces.sliding_field import SlidingField
 from fenwear.system import Tribosystem, build_bodies
 from fenwear_verify.solid import STEEL, describe, solve
@@ -73,7 +75,7 @@ def slice_with_heat() -> Result:
         **shared,
     )
     node = np.searchsorted(flat.pair.x, solid.pair.x - 1e-9)
-    (exact,), (found,) = (march(system, 6, block=6) for system in (flat, solid))
+    (exact,), (found,) = (march_within(system, RunLimits(6, block=6)) for system in (flat, solid))
     rows: list[Row] = [profile("pressure (MPa)", exact.pressure[-1][node], found.pressure[-1], 1e-9)]
     if exact.heat is None or found.heat is None:
         return Result(rows)

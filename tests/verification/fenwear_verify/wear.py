@@ -14,6 +14,8 @@ from fenwear.laws.optimum import WearRates
 from fenwear.laws.optimum import optimum as minimal_dissipation
 from fenwear.laws.pressure_law import PressureLaw
 from fenwear.steps import growth_rate, jump, march, stability_number, steady
+from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import march_within
 from fenwear.system import Tribosystem
 from fenwear_verify.bodies import builtin, relief_rates, rigid_punch
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
@@ -87,7 +89,7 @@ def equilibrium() -> Result:
         system = builtin("example1", *settings, "wear.punch.coefficient=4e-7")
         x, weights = system.pair.x, system.pair.weights
         friction, height = system.case.contact.friction, 40.0 if settings else 20.0
-        block = next(march(system, 200, block=200))
+        block = next(march_within(system, RunLimits(200, block=200)))
         force = block.pressure * weights
         total = force.sum(axis=1)
         arm = force @ (x - HALF_WIDTH) + block.direction * friction * height * total
@@ -168,7 +170,7 @@ def galin() -> Result:
         growth = growth_rate(system, np.full((2, len(system.pair.x)), MEAN))
         slowest = np.expm1(-growth * system.motion.period / 2) / step
         rows.append(number(f"plane {plane}, growth rate of the slowest mode (E* k V/a)", exact[0], slowest, 2e-3))
-        block = next(march(system, 100, block=100, implicit=True))
+        block = next(march_within(system, RunLimits(100, block=100), implicit=True))
         deviation = block.pressure - MEAN
         late = deviation[[50, 60, 70, 80]] * np.sqrt(system.pair.weights)
         recurrence, *_ = np.linalg.lstsq(late[2::-1].T, late[3], rcond=None)
@@ -177,7 +179,7 @@ def galin() -> Result:
         rows.append(number(f"plane {plane}, march, even mode 1 (E* k V/a)", 1.7267, rates[0], 2e-3))
         rows.append(number(f"plane {plane}, march, even mode 2 (E* k V/a)", 3.3143, rates[1], 5e-3))
         across = rigid_punch(1e4, *fine, f"model.plane='{plane}'", *shared_wear(step * HALF_WIDTH / effective / STROKE))
-        both = next(march(across, 100, block=100, implicit=True))
+        both = next(march_within(across, RunLimits(100, block=100), implicit=True))
         rows.append(
             profile(f"plane {plane}, both bodies wear: pressure (MPa)", block.pressure, both.pressure, 1e-7, scale=MEAN)
         )
@@ -216,7 +218,7 @@ def one_way_sliding() -> Result:
             coefficient = f"wear.punch.coefficient={1e-4 * MEAN ** (1 - b)!r}"
             exponent = f"wear.punch.pressure_exponent={b}"
             system = builtin("example1", "geometry.degree=2", one_way(direction), coefficient, exponent)
-            block = next(march(system, 1500, implicit=True, block=1500))
+            block = next(march_within(system, RunLimits(1500, block=1500), implicit=True))
             rates = WearRates((np.full(len(system.pair.x), 3 * 1e-4 * MEAN ** (1 - b)),), (PressureLaw(b),))
             optimum = minimal_dissipation(system.rigid, system.friction_ratio(system.motion.directions[0]), rates)
             x, case = system.pair.x, f"b = {b}, {direction}"
@@ -305,7 +307,7 @@ def explicit_limit() -> Result:
     rows = [number("explicit: step at which the march ceases to settle / fenwear's limit", 1, (low + high) / 2, 0.02)]
     for ratio in (1.03, 100.0, 1e4):
         system = at_number(ratio)
-        block = next(march(system, 200, implicit=True, block=200))
+        block = next(march_within(system, RunLimits(200, block=200), implicit=True))
         deviation = np.sqrt((block.pressure - system.optimum(-1).pressure) ** 2 @ system.pair.weights)
         steps = np.diff(deviation[deviation > 1e-9 * deviation[0]])
         rows.append(

@@ -83,20 +83,30 @@ class BodyMesh:
             raise CaseError(InputError(key, f"no physical {entity} {group!r} on the {self.name}{_known(self.curves)}"))
         return self.curves[group]
 
+    def for_role(self, role: str) -> BodyMesh:
+        """Return the mesh for the body of a role, which begins the names of its groups in place of the mesh's own."""
+        if role == self.name:
+            return self
+        start = f"{self.name}_"
+        by_role = {group: f"{role}_{group.removeprefix(start)}" for group in (*self.regions, *self.curves)}
+        regions, curves = (
+            {by_role[group] if group.startswith(start) else group: tag for group, tag in tags.items()}
+            for tags in (self.regions, self.curves)
+        )
+        return replace(self, name=role, regions=regions, curves=curves)
+
 
 def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]]) -> BodyMesh:
     """Return the mesh of a body with groups of boundary facets that are marked by functions; collective.
 
     Args:
-        name: "punch" or "strip".
+        name: "punch" or "strip", or the name that the case gives the body.
         mesh: Its mesh, mm.
         groups: For each group whether points x (3, q) belong to it, such as NAME_contact for the contact.
 
     Raises:
-        CaseError: the name is another one, or a group is missing or has no facets.
+        CaseError: a group is missing or has no facets.
     """
-    if name not in BODIES:
-        raise CaseError(InputError("name", f"expected one of {' and '.join(BODIES)}, got {name!r}"))
     fdim = mesh.topology.dim - 1
     facets, values = [], []
     for tag, (group, marker) in enumerate(groups.items(), start=1):

@@ -219,15 +219,18 @@ def make_case(
     Args:
         data: The tables.
         folder: Where paths in it start.
-        meshes: Of "punch" and "strip", as `fenwear.own_mesh` makes them, in place of `geometry.file`.
+        meshes: Of the bodies by their names, "punch" and "strip" without other ones, as `fenwear.own_mesh` makes them,
+            in place of `geometry.file`.
         stresses: Of either, as `fenwear.OwnLaw`, in place of the isotropic stress of its material.
 
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
     data = by_roles(data)
-    with Names.of(data).told_in_errors():
-        return _made(data, folder, Given(dict(meshes), dict(stresses)))
+    names = Names.of(data)
+    on = {names.role_of(name): mesh.for_role(names.role_of(name)) for name, mesh in meshes.items()}
+    with names.told_in_errors():
+        return _made(data, folder, Given(on, {names.role_of(name): law for name, law in stresses.items()}))
 
 
 def _made(data: Mapping[str, Any], folder: Path | None, given: Given) -> Case:

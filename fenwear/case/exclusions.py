@@ -268,8 +268,8 @@ def coefficient_problems(case: Case) -> Iterator[str]:
             yield from (f"{key}.regions.{r}: no such region; known are {', '.join(regions)}" for r in unknown)
             yield from (f"{key}.regions.{r}: missing, but required" for r in missing)
     for body, law in case.wear.by_body.items():
-        if law.present("beta", "energy") and case.contact.friction == 0:
-            yield f"wear.{body}: expected friction where beta or energy gives the coefficient"
+        if law.present("energy") and case.contact.friction == 0:
+            yield f"wear.{body}: expected friction where energy gives the coefficient"
 
 
 def body_problems(case: Case) -> Iterator[str]:

@@ -201,7 +201,7 @@ def _laid_over(below: Any, above: Any) -> Any:
     """Return nested tables, those `above` before those `below`; one that names its kind or file stands alone."""
     if (
         not (isinstance(below, dict) and isinstance(above, dict))
-        or {"kind", "file", "beta", "archard", "energy", "per_area"} & above.keys()
+        or {"kind", "file", "archard", "energy", "per_area"} & above.keys()
     ):
         return above
     return {**below, **{key: _laid_over(below.get(key), value) for key, value in above.items()}}

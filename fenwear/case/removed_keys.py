@@ -11,6 +11,7 @@ from fnmatch import fnmatchcase
 REMOVED: dict[str, str] = {
     "contact.solver": "Leave it out: contacts are solved on the condensed bodies, which tests compare with "
     "all displacements.",
+    "wear.*.beta": "Set `energy`, which is the same with exponents of 1, or `coefficient` to beta mu^b.",
     "setup.way": "Leave it out: each body is factored on a rank of its own, or over all ranks where its factor takes "
     "more than 4 GiB.",
 }

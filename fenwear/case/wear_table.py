@@ -385,23 +385,19 @@ def _zero_or_more(key: str) -> Check:
 
 def _of_linear_laws(key: str) -> Check:
     """Return the check of a coefficient that belongs to exponents of 1."""
-    message = f"{key}: expected with exponents of 1 only; give coefficient or beta"
+    message = f"{key}: expected with exponents of 1 only; give coefficient"
     return Check(lambda law: law.present(key) and law.exponents != (1.0, 1.0), message)
 
 
 class WearLaw(Part):
     """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
 
-    beta~ is given as `coefficient`; or as `beta`, beta~ = beta mu^b; or, for a = b = 1, by Archard's
-    dimensionless coefficient K and the `hardness` H, beta~ = K / H, or by the volume worn for each
-    energy of friction, `energy`, beta~ = energy mu.
+    beta~ is given in one of three ways: as `coefficient`; or, for a = b = 1, by Archard's dimensionless coefficient K
+    and the `hardness` H, beta~ = K / H; or by the volume worn for each energy of friction, `energy`, beta~ = energy mu.
     """
 
     coefficient: constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
-    )
-    beta: Annotated[float | None, Unit("")] = Field(
-        default=None, description="beta in the same unit; beta~ = beta mu^b"
     )
     archard: Annotated[Number, Field(ge=0)] | None = Field(
         default=None, description="Archard's K; beta~ = K / hardness"
@@ -455,12 +451,11 @@ class WearLaw(Part):
         if not all(isinstance(e, (int, float)) and not isinstance(e, bool) and 0 < e < 100 for e in exponents):
             return data
         converted = dict(data)
-        for key in {"coefficient", "beta"} & data.keys():
-            if not isinstance(data[key], (Mapping, Dependence, type(None))):
-                try:
-                    converted[key] = convert(data[key], cls.coefficient_unit(*exponents))
-                except ValueError as error:
-                    raise ValueError(f"{key}: {error}") from None
+        if not isinstance(data.get("coefficient"), (Mapping, Dependence, type(None))):
+            try:
+                converted["coefficient"] = convert(data["coefficient"], cls.coefficient_unit(*exponents))
+            except ValueError as error:
+                raise ValueError(f"coefficient: {error}") from None
         own = data.get("coating")
         if isinstance(own, Mapping) and own.get("coefficient") is not None:
             try:
@@ -478,7 +473,7 @@ class WearLaw(Part):
             raise ValueError(f"coefficient: {error}") from None
         return self
 
-    one_of = (("coefficient", "beta", *COEFFICIENTS[1:]),)
+    one_of = (COEFFICIENTS,)
     together = (("archard", "hardness"),)
     checks = (
         Check(
@@ -489,7 +484,7 @@ class WearLaw(Part):
             lambda s: not (s.present("per_area") or math.isclose(s.touching_from, TOUCHING)),
             "touching_from: expected with per_area",
         ),
-        *map(_zero_or_more, ("coefficient", "beta")),
+        _zero_or_more("coefficient"),
         Check(
             lambda s: s.present("pressure_cap") and s.pressure_cap <= s.pressure_threshold,
             "pressure_cap: expected more than pressure_threshold",
@@ -523,7 +518,7 @@ class WearLaw(Part):
             changes |= {"pressure_threshold": 0.0, "pressure_cap": None}
         if own.touching_from is not None:
             changes["touching_from"] = own.touching_from
-        return self.model_copy(update={**changes, "beta": None, "coating": None})
+        return self.model_copy(update={**changes, "coating": None})
 
     @property
     def cap(self) -> float:
@@ -552,9 +547,8 @@ class WearLaw(Part):
 
     def resolved(self, data: dict[str, Any]) -> dict[str, Any]:
         """Return the dumped tables `data` of this law with the units of its coefficients."""
-        for key in ("coefficient", "beta"):
-            if isinstance(getattr(self, key), float):
-                data[key] = quantity_text(getattr(self, key), self.unit)
+        if isinstance(self.coefficient, float):
+            data["coefficient"] = quantity_text(self.coefficient, self.unit)
         if self.coating is not None and self.coating.coefficient is not None:
             data["coating"]["coefficient"] = quantity_text(self.coating.coefficient, self.unit)
         return data

@@ -379,7 +379,7 @@ class StepWear:
 def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
     """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
     laws = [one for law in wear for one in (law, law.of_coating) if one is not None]
-    of_friction = any(law.beta is not None or law.energy is not None for law in laws)
+    of_friction = any(law.energy is not None for law in laws)
     dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
     dependent = dependent or any(map(friction.contact.splits_pressure, laws))
     return not dependent and not friction.mixed and (friction.constant or not of_friction)
@@ -388,9 +388,9 @@ def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:
     """Return beta~ at the nodes (n,), in the internal unit of its exponents.
 
-    beta~ = beta mu^b, K / H (Archard), the energy wear coefficient times mu, or k_A over the pressure from which on
-    surfaces touch, beyond which wear grows no more. Under a share X of the pressure that asperities carry the wear is
-    that of X p: beta~ has X^b, or the ratio of what of X p wears to what of p does by `PressureLaw.of`.
+    beta~ is the coefficient itself, K / H (Archard), the energy wear coefficient times mu, or k_A over the pressure
+    from which on surfaces touch, beyond which wear grows no more. Under a share X of the pressure that asperities carry
+    the wear is that of X p: beta~ has X^b, or the ratio of what of X p wears to what of p does by `PressureLaw.of`.
 
     Raises:
         CaseError: it is negative or not finite; `key` is the law's key.
@@ -424,7 +424,4 @@ def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditio
         return scale * given
     if law.archard is not None and law.hardness is not None:
         return law.archard / law.hardness
-    mu = friction.of_asperities(conditions.of("friction"), conditions)
-    if law.energy is not None:
-        return law.energy * mu
-    return (law.beta or 0.0) * mu**law.pressure_exponent
+    return (law.energy or 0.0) * friction.of_asperities(conditions.of("friction"), conditions)

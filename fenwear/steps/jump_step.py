@@ -91,7 +91,7 @@ class Stepper(JumpLaw[_Moment]):
         follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
         follows = follows or bool(system.layers.memory.names)
         self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
-        by_friction = any(law.beta or law.energy for law in system.sliding.wear)
+        by_friction = any(law.energy for law in system.sliding.wear)
         self._wear_follows = follows or (self._follows and by_friction)
 
     def attempt(self, state: RunState, cycles: int) -> tuple[Attempt[_Moment], Estimate, list[HalfCycle]]:

@@ -12,7 +12,7 @@ import numpy as np
 from fenwear.case import Case, changed_case
 from fenwear.common.errors import CaseError, InputError
 
-BY_EXPONENTS = ("coefficient", "beta")  # whose units follow from the exponents
+BY_EXPONENTS = "coefficient"  # whose unit follows from the exponents
 EXPONENTS = ("pressure_exponent", "speed_exponent")
 BISECTIONS = 40
 
@@ -82,11 +82,9 @@ def settings_of(case: Case, values: Mapping[str, float]) -> list[str]:
     filled = dict(values)
     for path in values:
         body, _, name = path.rpartition(".")
-        if name in EXPONENTS:
-            for coefficient in (f"{body}.coefficient", f"{body}.beta"):
-                if coefficient in keys:
-                    filled.setdefault(coefficient, keys[coefficient].value)
-    units = {path: keys[path].unit for path in filled if path in keys and path.rpartition(".")[2] not in BY_EXPONENTS}
+        if name in EXPONENTS and (coefficient := f"{body}.{BY_EXPONENTS}") in keys:
+            filled.setdefault(coefficient, keys[coefficient].value)
+    units = {path: keys[path].unit for path in filled if path in keys and path.rpartition(".")[2] != BY_EXPONENTS}
     return [
         f'{path}="{float(value)!r} {units[path]}"' if units.get(path) else f"{path}={float(value)!r}"
         for path, value in filled.items()

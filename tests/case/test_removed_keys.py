@@ -24,6 +24,8 @@ def test_a_removed_key_or_word_says_what_takes_its_place(monkeypatch: pytest.Mon
 
 def test_removed_keys_of_the_set_up() -> None:
     """They were in case files once."""
+    with pytest.raises(CaseError, match=r"^wear\.punch\.beta: removed\. .*energy.*coefficient"):
+        load_case("example1", ["wear.punch={beta=1e-8}"])
     for setting in ("setup.way=multigrid", "contact.solver=full"):
         with pytest.raises(CaseError, match=rf"^{setting.split('=')[0]}: removed\. Leave it out"):
             load_case("example1", [setting])

@@ -115,7 +115,8 @@ coefficient = "1e-9 1/MPa"
     by_settings = ["unset=['heat.inflow', 'wear.strip']", "heat.track.heat_capacity=120 J/K", "heat.track.loss=0.6 W/K"]
     assert load_case(base, by_settings).resolved() == case.resolved()
     assert changed_case(load_case(base), *by_settings).resolved() == case.resolved()
-    later = load_case("example1", ["wear.punch.coefficient=1e-8", "unset=wear.punch", "wear.punch.beta=1e-8 1/MPa"])
+    other = ["wear.punch.coefficient=1e-8", "unset=wear.punch", "wear.punch.energy=1e-8 mm^3/(N*mm)"]
+    later = load_case("example1", other)
     assert later.wear.punch is not None
     assert later.wear.punch.coefficient is None
     for wrong, message in (

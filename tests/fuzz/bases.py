@@ -28,7 +28,7 @@ wear.punch.coefficient = {table = [[0, 4e-8], [50, 5e-8], [300, 9e-8]], of = "p"
 wear.strip.coefficient = {expression = "2e-8 * exp(-p / 1000) * (1 + v / 1e6)**2", unit = "MPa^-1"}
 """
 EXPONENTS = """
-wear.punch = {beta = "3e-9 MPa^-1.5", pressure_exponent = 1.5}
+wear.punch = {coefficient = "3e-9 MPa^-1.5", pressure_exponent = 1.5}
 wear.strip = {coefficient = "1e-9 MPa^-1*mm^-1*s^1", speed_exponent = 2.0}
 """
 HARDNESS = """
@@ -260,8 +260,8 @@ CYCLES = (
 )
 LAW_TABLES: tuple[Any, ...] = (
     *({"archard": 1e-4, "hardness": "3 GPa"}, {"archard": 1e-4}, {"hardness": "3 GPa"}, {"archard": 1, "hardness": 0}),
-    *({"energy": "1e-5 mm^3/J"}, {"energy": "1 J"}, {"energy": -1}, {"beta": 1e-8, "coefficient": 1e-8}, {}, None, 1),
-    *({"beta": "1e-8 1/MPa"}, {"beta": "1e-8 MPa^-2", "pressure_exponent": 2}, {"beta": {"expression": "1"}}),
+    *({"energy": "1e-5 mm^3/J"}, {"energy": "1 J"}, {"energy": -1}, {"energy": 1e-8, "coefficient": 1e-8}, {}, None, 1),
+    *({"beta": "1e-8 1/MPa"}, {"coefficient": "1e-8 MPa^-2", "pressure_exponent": 2}, {"energy": {"expression": "1"}}),
     *({"coefficient": 1e-8, "pressure_exponent": 0.5}, {"coefficient": 1e-8, "pressure_exponent": 1e-300}),
     *({"coefficient": 1e-8, "pressure_exponent": 99}, {"coefficient": 1e-8, "speed_exponent": 1e3}),
     *({"coefficient": "1e-8 MPa^-2", "pressure_exponent": "2"}, {"coefficient": "1e-8 1/MPa", "speed_exponent": 3}),

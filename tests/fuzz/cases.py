@@ -190,7 +190,7 @@ KEYS: tuple[Any, ...] = (
     lambda r: (("contact", "friction"), {"expression": r.choice(bases.GOOD), "unit": r.choice(bases.DEPENDENCE_UNITS)}),
     lambda r: (("contact", "transverse_friction"), r.choice((0.1, -0.1, 5, "0.1 mm", 1e300))),
     lambda r: (("wear", r.choice(("punch", "strip")), "coefficient"), dependence(r)),
-    lambda r: (("wear", r.choice(("punch", "strip")), "beta"), r.choice((dependence(r), 1e-8, "1e-8 1/MPa"))),
+    lambda r: (("wear", r.choice(("punch", "strip")), "energy"), r.choice((dependence(r), 1e-8, "1e-8 1/MPa"))),
     lambda r: (("wear", r.choice(("punch", "strip"))), r.choice(bases.LAW_TABLES)),
     lambda r: (("wear", r.choice(("punch", "strip")), "pressure_exponent"), r.choice((*NUMBERS, 0.5, 1.5, "2"))),
     lambda r: (("wear", r.choice(("punch", "strip")), "speed_exponent"), r.choice((*NUMBERS, 0.5, 1.5, "2"))),

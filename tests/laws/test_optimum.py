@@ -203,7 +203,7 @@ def test_almost_tipping_punch_is_accepted() -> None:
 def test_rates_beyond_all_numbers_have_no_optimum() -> None:
     """A run in which they come up goes on without one."""
     settings = ("geometry.parameters.elements_along_contact=4", "motion.positions=3", "motion.period=1e300")
-    slow = "wear.punch={beta='3e-9 MPa^-1.5', pressure_exponent=1.5}"
+    slow = "wear.punch={coefficient='3e-9 MPa^-1.5', pressure_exponent=1.5}"
     fast = "wear.strip={coefficient='1e-9 MPa^-1*mm^-1*s^1', speed_exponent=2.0}"
     system = assemble(load_case("fretting", [*settings, "geometry.degree=1", slow, fast]))
     (block,) = jump(system, 2, tolerance=0.05)

@@ -70,13 +70,12 @@ def test_uniform_pressure_wears_the_strip_evenly(assembled: Callable[..., Tribos
     assert worn.strip[np.abs(x) > 33].max() == 0
 
 
-def test_coefficients_of_archard_energy_and_beta() -> None:
-    """beta~ = K / H, energy mu, beta mu^b: 1e-4 / 2 GPa = 5e-8 / MPa; 2e-5 mm³/J at mu = 0.25: 5e-9 / MPa."""
+def test_coefficients_of_archard_and_energy() -> None:
+    """beta~ = K / H, energy mu: 1e-4 / 2 GPa = 5e-8 / MPa; 2e-5 mm³/J at mu = 0.25: 5e-9 / MPa."""
     friction, state = Friction(Contact(friction=0.25)), conditions(np.array([1.0, 3.0]))
     settings = {
         'archard = 1e-4, hardness = "2 GPa"': 5e-8,
         'energy = "2e-5 mm^3/J"': 5e-9,
-        "beta = 4e-8, pressure_exponent = 2.0": 2.5e-9,
         'coefficient = "1e-15 m^2/N"': 1e-9,
         'coefficient = {expression = "1e-6 * (1 + p) * v", unit = "1/GPa"}': [4e-9, 8e-9],
         'coefficient = {table = [[200, 0], [400, 2e-8]], of = "T"}': 1e-8,

@@ -46,7 +46,9 @@ def test_coordinates_are_those_of_the_cases() -> None:
     plan = make_plan(CASE, [parse_axis(CASE, "motion.amplitude=10 mm,12,1.5 cm")], "steady")
     assert plan.coordinates == (((10.0, 12.0, 15.0), "mm"),)
     plan = make_plan(CASE, [parse_axis(CASE, "wear.punch.pressure_exponent=1,2")], "steady")
-    assert [v.case is not None and v.case.wear.punch.beta for v in plan.variants] == [CASE.wear.punch.beta] * 2
+    assert [v.case is not None and v.case.wear.punch.coefficient for v in plan.variants] == [
+        CASE.wear.punch.coefficient
+    ] * 2
 
 
 @pytest.mark.parametrize(

@@ -433,7 +433,9 @@ class WearLaw(Part):
 
     @staticmethod
     def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
-        """Return the unit of beta~ for the exponents b and a."""
+        """Return the unit of beta~ for the exponents b and a: with 1 and 1 that of a specific wear rate."""
+        if (pressure_exponent, speed_exponent) == (1, 1):
+            return "mm^3/(N*mm)"
         unit = f"MPa^-{pressure_exponent:g}"
         return unit if speed_exponent == 1 else f"{unit}*mm^{1 - speed_exponent:g}*s^{speed_exponent - 1:g}"
 

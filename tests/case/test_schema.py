@@ -162,7 +162,7 @@ LOAD_TWICE = "punch.loads=[{on='punch_load', force=[0, -1], traction=[0, -1]}]"
         (["geometry.degree=0"], "geometry.degree", "1"),
         (["contact.friction=-0.1"], "contact.friction", "0"),
         (["wear.punch.coefficient=-1"], "wear.punch.coefficient", "zero or larger"),
-        (["wear.punch.coefficient='1 mm'"], "wear.punch.coefficient", "MPa^-1"),
+        (["wear.punch.coefficient='1 mm'"], "wear.punch.coefficient", "mm^3/(N*mm)"),
         (["wear.punch.pressure_exponent=0"], "wear.punch.pressure_exponent", "greater than 0"),
         (["wear.punch.speed_exponent=-1"], "wear.punch.speed_exponent", "greater than 0"),
         (["motion={kind='sideways'}"], "motion.kind", "reciprocating"),

@@ -42,7 +42,7 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
         (
             ["wear.punch.coefficient={expression='4e-8 * (1 + p / 50)'}"],
             "wear.punch.coefficient",
-            'an expression without a unit, read in MPa^-1: give it, {expression = ..., unit = "MPa^-1"}',
+            'an expression without a unit, read in mm^3/(N*mm): give it, {expression = ..., unit = "mm^3/(N*mm)"}',
         ),
         (
             ["wear.punch.coefficient={table=[[0, 1e-9], [9, 2e-9]], of='s'}", "wear.punch.pressure_exponent=1.5"],

@@ -64,7 +64,7 @@ def test_runs_and_optima(assembled: Callable[..., Tribosystem]) -> None:
     found = package.sweep(CASE, over, of="run").squeeze()
     system = assembled("example1", *SMALL, "wear.punch.coefficient=2e-7")
     *_, last = march(system, 11)
-    assert records(found).columns[0] == "wear.punch.coefficient (MPa^-1)"
+    assert records(found).columns[0] == "wear.punch.coefficient (mm^3/(N*mm))"
     np.testing.assert_allclose(found["wear"][1], last.wear[-1], rtol=1e-9, atol=1e-12 * last.wear.max())
     # 11 half-cycles end in a progressive one: phases are in the order of the cycle
     np.testing.assert_allclose(found["pressure"][1, 0], last.pressure[-1], rtol=1e-9, atol=1e-9)

@@ -311,7 +311,7 @@ def test_pressures_below_the_threshold_have_no_end_of_their_own(
 
 
 def test_a_pressure_of_rounding_is_none(assembled: Callable[..., Tribosystem]) -> None:
-    """The built-in bushing: a node that never touches was left with 5e-17 MPa, and "no steady state exists" was said."""
+    """The built-in bushing: a node that never touches was left with 5e-17 MPa, which was told as no steady state."""
     state = steady(assembled("bushing", "geometry.parameters.elements_along_contact=60"))
     np.testing.assert_array_equal(state.phase_pressure[:, np.isnan(state.shape)], 0)
     assert state.phase_pressure.max() == pytest.approx(3.1588, rel=1e-3)

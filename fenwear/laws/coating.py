@@ -168,11 +168,6 @@ class CoatedBody:
         """Return the derivative of the depth to A at a depth (n,)."""
         return np.where(depth < self.thickness, 1.0, self.ratio)
 
-    def measured_rate(self, depth: Array, coating: Array, base: Array) -> Array:
-        """Return by how much A grows where such a depth is worn, by what would be worn of coating and of base (n,)."""
-        of_base = np.divide(base, self.ratio, out=np.zeros_like(base), where=self.ratio > 0)
-        return np.where(depth < self.thickness, coating, of_base)
-
     def by(self, coating: Array, base: Array) -> CoatedBody:
         """Return the same by the ratio of what would be worn of base and coating (n,), where something is."""
         known = (coating > 0) & (base > 0)

@@ -56,7 +56,8 @@ class LayerEvolution:
         Args:
             pressure: (m, n), MPa.
             before: Depths and state at the start of the step.
-            cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
+            cycles: Of a step that is implicit, for each of which changes are returned, or with 0 the rate at its start;
+                None for the phases once.
             flowed: Addition to the plastic depth (n,), mm; by default nothing.
         """
         worn = self.wear.begun(before, cycles).worn(pressure)
@@ -82,6 +83,8 @@ class LayerEvolution:
         evolution = self.evolution.at(pressure)
         if cycles is None:
             return evolution.after(held) - held
+        if cycles == 0:
+            return evolution.rate(held)[0]
         return (evolution.implicit(held, cycles) - held).times(1 / cycles)
 
     def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array:

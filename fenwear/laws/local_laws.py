@@ -37,10 +37,6 @@ class BodyRate:
     speed_exponent: float = 1.0
     wears: bool = True
 
-    def depth(self, pressure: Array, slid: Array, duration: float) -> Array:
-        """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
-        return self.rate * self.law.value(np.maximum(pressure, 0.0)) * self.slide(slid, duration)
-
     def slide(self, slid: Array, duration: float | Array) -> Array:
         """Return how far a node slides in a time, to the power a (n,), mm^a s^(1-a)."""
         a = self.speed_exponent
@@ -65,14 +61,6 @@ class LocalWear:
         """Of punch and strip, the laws of coating and base each; of a body without coating that of the base twice."""
         punch, strip = self.bases or (self.punch, self.strip)
         return (self.punch, punch), (self.strip, strip)
-
-    def both(self, pressure: Array, slid: Array, duration: float) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Return the depths worn off punch and strip (n,), mm, of coatings that last; and those of the bases."""
-        punch, strip = (law.depth(pressure, slid, duration) for law in (self.punch, self.strip))
-        if not self.bases:
-            return (punch, strip), (punch, strip)
-        first, second = (law.depth(pressure, slid, duration) for law in self.bases)
-        return (punch, strip), (first, second)
 
 
 @dataclass(frozen=True)

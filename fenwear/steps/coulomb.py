@@ -368,7 +368,7 @@ class HalfCycles(_Run):
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = begin.pressures[own]
-        lost = problem.losses.worn_in(records, first, begin)
+        lost = problem.losses.worn(records, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)
         totals = state.totals + adds
@@ -425,13 +425,12 @@ class Jumps(_Run):
         at_all = np.asarray(stuck.all(axis=0))
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
-        ended = replace(then.end, worn=then.worn, held=None)
-        lost = [problem.losses.worn_in(records, first, ended) for first, records in parts]
-        adds = [self.meter(records, first, own) for (first, records), own in zip(parts, lost, strict=True)]
+        lost = [problem.losses.worn(then.records, then.begin, which) for *_, which in parts]
+        adds = [self.meter(records, first, own) for (first, records, _), own in zip(parts, lost, strict=True)]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
             sums.insert(0, sums[0] - adds[k])
-        for k, ((first, records), (_, earlier)) in enumerate(zip(parts, old, strict=True)):
+        for k, ((first, records, _), (_, earlier, _)) in enumerate(zip(parts, old, strict=True)):
             before = records.pressure - (records.pressure - earlier.pressure) / cycles
             steps = Steps(records, before, at_all, _energy_ratio(records, problem.weights), then.error, first, lost[k])
             record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
@@ -503,12 +502,13 @@ def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
     return records.energy(weights) / max(most * stroke, 1e-300)
 
 
-def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[int, TimeStepRecords]]:
-    """Return the first steps and the records of a cycle's half-cycles in the order of the motion."""
-    steps, first, found = problem.program.steps, cycle.first_step, []
-    for records in cycle.half_cycles:
-        found.append((first, records))
-        first = (first + len(records)) % len(steps)
+def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[int, TimeStepRecords, slice]]:
+    """Return first step, records and place in the cycle's record of each half-cycle, in the order of the motion."""
+    steps, ends = problem.program.steps, np.cumsum([len(records) for records in cycle.half_cycles])
+    found = [
+        ((cycle.first_step + int(end) - len(records)) % len(steps), records, slice(end - len(records), end))
+        for records, end in zip(cycle.half_cycles, ends, strict=True)
+    ]
     return sorted(found, key=lambda one: one[0])
 
 

@@ -19,16 +19,15 @@ from numpy.typing import NDArray
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
-from fenwear.laws.law_states import Held
 from fenwear.laws.local_laws import LocalLaws, LocalWear
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
-from fenwear.steps.stick_losses import CoatedBodies, StepConditions, StepLosses, StepSlips
+from fenwear.steps.stick_losses import CoatedBodies, StepConditions, StepLosses
 from fenwear.steps.stick_position import LoadEffect, Position
 from fenwear.steps.stick_program import Program, TimeStep
-from fenwear.steps.stick_records import TimeStepRecords, record
+from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords, record
 from fenwear.steps.stick_state import NO_SHIFT, Imposed, PartialSlipState, StickState
 from fenwear.surfaces.placement import HERE, Placement, in_model
 from fenwear.surfaces.sliding_field import Screw
@@ -102,12 +101,12 @@ class PartialSlipProblem:
 
         return self._with(heat=None, expanded=expanded)
 
-    def worn_like(self, records: TimeStepRecords, first: int) -> PartialSlipProblem:
+    def worn_like(self, cycle: FrettingCycle) -> PartialSlipProblem:
         """Return the same whose coatings have the ratios of what a cycle's steps would wear of bases and of them."""
-        if self.losses.one_ratio:
+        if not self.coatings.any:
             return self
-        worn, bases = (self.losses.worn_of(records, first, of_bases=of_bases) for of_bases in (False, True))
-        return self._with(coatings=self.coatings.by(worn, bases))
+        wear = self.losses.over(cycle.records, cycle.begin).wear
+        return self._with(coatings=self.coatings.by(wear, cycle.records.pressure))
 
     def elastic(self) -> PartialSlipProblem:
         """Return the same whose surfaces are as hard as they like."""
@@ -240,20 +239,11 @@ class PartialSlipProblem:
 
     def _step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         after = self._stepped(at, step)
-        wear, held = self._passed(at, after, step)
-        return replace(after, held=held), record(self.interface, self.heat, at, after, step, wear)
-
-    def _passed(self, at: PartialSlipState, after: PartialSlipState, step: TimeStep) -> tuple[LocalWear, Held | None]:
-        """Return by what law a time step wears, and what laws remember at its end."""
-        laws, layers, slipped = self.laws, self.interface.layers, np.linalg.norm(after.contact.slip, axis=1)
-        if laws is None:
-            return self.wear, None
-        steps = StepSlips(after.contact.pressure[None], slipped[None], np.array([step.duration]), np.zeros((1, 2, 0)))
-        evolution = self.losses.evolution_of(steps, at)
+        made = record(self.interface, self.heat, at, after, step)
+        evolution = self.losses.evolution(made, at)
         if evolution is None:
-            return laws.wear_at(self.conditions.of_steps(steps, at)[0]), None
-        (conditions,), end, _ = evolution.through(at.held or layers.held(at.worn))
-        return laws.wear_at(conditions), evolution.memory.bounded(end)
+            return after, made
+        return replace(after, held=evolution.after(at.held or self.interface.layers.held(at.worn))), made
 
     def _stepped(self, at: PartialSlipState, step: TimeStep) -> PartialSlipState:
         if self.laws is None or not self.laws.changes():

@@ -8,7 +8,6 @@ that the pressures of the cycle itself are the solution where nothing more is wo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,15 +15,12 @@ from numpy.typing import NDArray
 
 from fenwear.common.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
-from fenwear.laws.layer_step import LayerEvolution, LayerStep
-from fenwear.laws.local_laws import LocalWear, phases_wear
+from fenwear.laws.layer_step import LayerStep
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_creep import CreepNear, opened_by_creep
 from fenwear.steps.stick_cycle import PartialSlipProblem
-from fenwear.steps.stick_losses import slips_of
 from fenwear.steps.stick_position import Position
 from fenwear.steps.stick_records import FrettingCycle
-from fenwear.steps.stick_state import PartialSlipState
 
 
 @dataclass(frozen=True)
@@ -105,11 +101,7 @@ class Frozen:
         self._duration = records.duration / records.duration.sum()
         self.positions, self.groups, self.contact = _grouped(problem, cycle)
         pressure = self.contact.pressure
-        slid = cycle.end.slid - records.slip_magnitude.sum(axis=0) / 2
-        begin = replace(
-            cycle.end, worn=cycle.worn, held=None, next_step=cycle.first_step, temperature=cycle.warm, slid=slid
-        )
-        self._passing = _passing(problem, cycle, begin)
+        self._passing = problem.losses.over(records, cycle.begin)
         phases, offsets = [], []
         closed = LayerStep(self._passing, cycle.worn, None, implicit=False).opening(self.groups.pressure(pressure))
         for k, (position, first) in enumerate(zip(self.positions, self.groups.first, strict=True)):
@@ -161,13 +153,9 @@ class Frozen:
 
     def rate(self, contact: ContactState, worn: WornDepths) -> WornDepths:
         """Return M, by how much depths change in a cycle with this contact."""
-        pressure, passing = self.groups.pressure(contact.pressure), self._passing
-        found = replace(passing, evolution=None).worn(pressure, worn, 0.0)
-        found = replace(found, crept=self._creep.rate(worn.crept, self._duration @ pressure - self._mean))
-        if passing.evolution is None:
-            return found
-        layers = self.problem.interface.layers
-        return layers.with_held(found, passing.evolution.at(pressure).rate(layers.held(worn))[0])
+        pressure = self.groups.pressure(contact.pressure)
+        crept = self._creep.rate(worn.crept, self._duration @ pressure - self._mean)
+        return replace(self._passing.worn(pressure, worn, 0.0), crept=crept)
 
 
 def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Position], Groups, ContactState]:
@@ -194,19 +182,3 @@ def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Po
     places = [interface.position(own[k].offset if interface.moves else 0.0) for k in first]
     rigid = np.zeros((len(first), interface.middle.modes.shape[1]))
     return places, Groups(of, first, share), ContactState(mean, gap, rigid, 0)
-
-
-def _passing(problem: PartialSlipProblem, cycle: FrettingCycle, begin: PartialSlipState) -> LayerEvolution:
-    """Return what the time steps of a cycle that begins at a state wear by their pressures, and do besides."""
-    records, losses, layers = cycle.records, problem.losses, problem.interface.layers
-    slips, evolution = slips_of(records), losses.evolution(records, begin)
-    wears: Sequence[LocalWear] = [problem.wear] * len(records)
-    if problem.laws is not None:
-        conditions = problem.conditions.of_steps(slips, begin)
-        if evolution is not None:
-            conditions = evolution.through(layers.held(cycle.worn))[0]
-        wears = [problem.laws.wear_at(one) for one in conditions]
-    punch, strip = (law.slide(slips.slid, slips.duration[:, None]) for law in (wears[0].punch, wears[0].strip))
-    coatings = problem.coatings.punch.thickness, problem.coatings.strip.thickness
-    wear = phases_wear(wears, (punch, strip), problem.conditions.pairs(slips, begin), coatings)
-    return LayerEvolution(layers, wear, losses.debris_over(records, begin), evolution)

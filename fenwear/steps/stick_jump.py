@@ -177,11 +177,11 @@ def _recorded(
     begin = problem.shaped(at, layers.flown_as(worn, at.worn))
     first, warm = begin.next_step, begin.temperature
     at, parts = problem.cycle(begin)
-    rate = problem.losses.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
+    records = TimeStepRecords.joined(parts)
+    rate = problem.losses.over(records, begin).worn(records.pressure, begin.worn, 0.0)
     rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
-    bases = problem.losses.worn_of(TimeStepRecords.joined(parts), first, of_bases=True)
     end = replace(at, slid=slid)
-    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, bases, 0.0, first, end, warm=warm)
+    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, 0.0, first, end, warm=warm)
 
 
 def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
@@ -285,12 +285,12 @@ class _Jump(JumpLaw[_Moment]):
         Raises:
             ConvergenceError: it is beyond all numbers.
         """
-        found = self._coatings.measured_rate(cycle.rate, cycle.bases, cycle.worn)
+        found = cycle.rate
         if not all(
             np.isfinite(part).all() for part in (found.punch, found.strip, found.between, found.carried, found.crept)
         ):
             raise ConvergenceError(TOO_LARGE)
-        return found - self._coatings.with_slopes(self._frozen.rate(at.contact, cycle.worn), cycle.worn)
+        return self._coatings.with_slopes(found - self._frozen.rate(at.contact, cycle.worn), cycle.worn)
 
     def _cycle(self, end: _Moment, done: float) -> FrettingCycle:
         """Return the cycle so many later, at the end of a step.
@@ -315,7 +315,7 @@ def _attempt(
     begin_of_heat: FrettingCycle,
 ) -> tuple[FrettingCycle, Estimate]:
     """Return the cycle after a jump, and its error; temperatures continue from those of the last whole cycle."""
-    law = _Jump(problem.worn_like(now.records, now.first_step), now, load, begin_of_heat)
+    law = _Jump(problem.worn_like(now), now, load, begin_of_heat)
     made = attempt(law, law.begin, cycles)
     estimate, missed = law.estimate(made)
     finer = None

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from fenwear.common.arrays import Array, Mask
-from fenwear.laws.local_laws import LocalWear
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_heat import StickHeat
 from fenwear.steps.stick_interface import OppositeBodies
@@ -33,9 +32,6 @@ class TimeStepRecords:
         dissipated: Friction's work of each node over its area (k, n), N/mm.
         closing: Work of the pressure on gaps that close or open in the step (k,): of the step's size, it vanishes
             with it.
-        punch_depth, strip_depth: Worn off each body in the step, at the contact nodes (k, n), mm; of a coated one as if
-            all of it were of the coating.
-        punch_base, strip_base: The same as if all coatings were worn through.
         strain: Of the strip's surface opposite each node, along and across the sliding (k, n, m).
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
@@ -59,10 +55,6 @@ class TimeStepRecords:
     stored: Array
     dissipated: Array
     closing: Array
-    punch_depth: Array
-    strip_depth: Array
-    punch_base: Array
-    strip_base: Array
     strain: Array
     iterations: Array
     unique: Mask
@@ -129,8 +121,7 @@ class FrettingCycle:
         number: Of cycles done before it.
         worn: Depths at its shape.
         half_cycles: Records of its half-cycles.
-        rate: Depths that a cycle wears there, of coated bodies as if coatings lasted.
-        bases: The same as if coatings were worn through.
+        rate: Depths that a cycle wears there.
         error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
@@ -144,7 +135,6 @@ class FrettingCycle:
     worn: WornDepths
     half_cycles: list[TimeStepRecords]
     rate: WornDepths
-    bases: WornDepths
     error: float
     first_step: int
     end: PartialSlipState
@@ -157,6 +147,13 @@ class FrettingCycle:
         """All time steps."""
         return TimeStepRecords.joined(self.half_cycles)
 
+    @property
+    def begin(self) -> PartialSlipState:
+        """State in which its records begin."""
+        slid = self.end.slid - self.records.slip_magnitude.sum(axis=0) / 2
+        known = {"next_step": self.first_step, "temperature": self.warm, "slid": slid}
+        return replace(self.end, worn=self.worn, held=None, **known)
+
 
 def record(
     interface: OppositeBodies,
@@ -164,7 +161,6 @@ def record(
     at: PartialSlipState,
     after: PartialSlipState,
     step: TimeStep,
-    wear: LocalWear,
 ) -> TimeStepRecords:
     """Return the record of a time step.
 
@@ -173,12 +169,9 @@ def record(
         heat: Of friction; None without.
         at, after: The states at its start and end.
         step: Its loads and motions.
-        wear: By its law.
     """
     state, position = after.contact, interface.position(step.offset)
     weights, (work, stored) = position.pair.weights, _work(interface, position, at, after)
-    slipped = np.linalg.norm(state.slip, axis=1)
-    coatings, bases = wear.both(state.pressure, slipped, step.duration)
     values = (
         state.displacement,
         state.force,
@@ -190,8 +183,6 @@ def record(
         stored,
         state.heat,
         weights @ (state.pressure * state.approach),
-        *coatings,
-        *bases,
         surface_strain(position, interface.gradient, state.on_strip),
         float(state.iterations),
         state.unique,

@@ -113,12 +113,15 @@ def test_with_stick_by_hand_and_by_jumps() -> None:
     assert system.layers.strip_carries
     problem, weights = system.law_state.problem, system.pair.strip.weights
     lies = ejected = np.zeros(len(weights))
+    start = problem.beginning()
     for block in evolve(system, integration="explicit"):
         for steps in block.steps:
+            wear = problem.losses.over(steps.records, replace(start, next_step=steps.first)).wear
+            depth = wear.punch.depth(steps.records.pressure) + wear.strip.depth(steps.records.pressure)
             for k, step in enumerate(problem.program.steps[steps.first :][: len(steps.records)]):
                 onto = problem.interface.position(step.offset).pair.wear_projection
                 x = onto @ (steps.records.slip_magnitude[k] / 0.3)
-                worn = onto @ (steps.records.punch_depth[k] + steps.records.strip_depth[k])
+                worn = onto @ depth[k]
                 lost = -np.expm1(-x)
                 stays = 0.6 * worn * np.divide(lost, x, out=np.ones_like(x), where=x > 0)
                 lies, ejected = lies - lost * lies + stays, ejected + lost * lies + worn - stays

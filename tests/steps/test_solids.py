@@ -174,8 +174,9 @@ def test_cross_shear_of_an_ellipse() -> None:
     )
     at, _ = driven.cycle(driven.beginning())
     found = TimeStepRecords.joined(driven.cycle(at)[1])
+    depth = driven.losses.over(found, at).wear.depth(found.pressure).sum(axis=0)
     rubbed = found.pressure * found.slip_magnitude
     rubs = found.touched
-    crosses = found.punch_depth.sum(axis=0)[rubs] / (1e-9 * rubbed.sum(axis=0)[rubs])
+    crosses = depth[rubs] / (1e-9 * rubbed.sum(axis=0)[rubs])
     assert rubs.any()
     assert np.abs(crosses - crossing).max() < 0.005 * crossing

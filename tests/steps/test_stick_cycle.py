@@ -10,6 +10,7 @@ import pytest
 from combinations import FEATURES, STICK
 
 from fenwear import Block, CaseError, assemble, jump, load_case, march
+from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps import evolve
 from fenwear.steps.cycle_jumps import jump_within
@@ -20,6 +21,7 @@ from fenwear.steps.stick_jump import jumped
 from fenwear.steps.stick_program import make_program
 from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import HALVINGS, fine_enough, partial_slip_problem, with_steps
+from fenwear.steps.stick_state import PartialSlipState
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
 SMALL = (*COARSE, "motion.amplitude='3 um'")
@@ -28,6 +30,14 @@ SMALL = (*COARSE, "motion.amplitude='3 um'")
 @lru_cache
 def problem(*settings: str) -> PartialSlipProblem:
     return partial_slip_problem(load_case("fretting-partial-slip", [*SMALL, *settings]))
+
+
+def worn_in_steps(
+    driven: PartialSlipProblem, records: TimeStepRecords, begin: PartialSlipState | None = None
+) -> tuple[Array, Array]:
+    """Return what punch and strip lose in each time step at the contact nodes (k, n), mm."""
+    wear = driven.losses.over(records, begin or driven.beginning()).wear
+    return wear.punch.depth(records.pressure), wear.strip.depth(records.pressure)
 
 
 def first_cycle(of: PartialSlipProblem) -> TimeStepRecords:
@@ -182,7 +192,7 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
     driven = problem()
     records = first_cycle(driven)
-    energy, worn = records.energy(driven.weights), driven.losses.worn_in(records, 0, driven.beginning())
+    energy, worn = records.energy(driven.weights), driven.losses.worn(records, driven.beginning())
     assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
     strip = driven.interface.middle.pair.strip.weights
     assert strip @ worn.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
@@ -191,13 +201,15 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
 def test_wear_begins_at_a_pressure_and_ends_to_grow_at_another() -> None:
     """Threshold and cap count at each node in each time step; sqrt(p) and the square of the speed, too."""
     law = "wear.punch={coefficient='1e-8 1/MPa', pressure_threshold='200 MPa', pressure_cap='500 MPa'}"
-    records = first_cycle(problem(law))
+    driven = problem(law)
+    records = first_cycle(driven)
     expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slip_magnitude
-    assert records.punch_depth == pytest.approx(expected, rel=1e-12)
+    assert worn_in_steps(driven, records)[0] == pytest.approx(expected, rel=1e-12)
     law = "wear.punch={coefficient=1e-8, pressure_exponent=0.5, speed_exponent=2}"
-    records = first_cycle(problem(law))
+    driven = problem(law)
+    records = first_cycle(driven)
     duration = 0.2 / 40
-    assert records.punch_depth == pytest.approx(
+    assert worn_in_steps(driven, records)[0] == pytest.approx(
         1e-8 * records.pressure**0.5 * records.slip_magnitude**2 / duration, rel=1e-12
     )
 
@@ -310,24 +322,20 @@ def test_the_surface_is_stretched_most_at_the_ends_of_strokes() -> None:
 
 
 def test_mean_pressure_of_the_last_cycle() -> None:
-    """A wear law by pm and cs: of the time steps of the cycle before, over their slip; to and fro nothing crosses."""
+    """A wear law by pm and cs: of the cycle before that of the steps, over its slip; to and fro nothing crosses."""
     law = "coefficient={expression='1e-9 * pm * (1 + cs)', unit='1/MPa'}"
     driven = problem(f"wear={{punch={{{law}}}, strip={{{law}}}}}")
     at, parts = driven.cycle(driven.beginning())
     before = TimeStepRecords.joined(parts)
-    at, parts = driven.cycle(at)
-    now = TimeStepRecords.joined(parts)
-    both, steps = TimeStepRecords.joined([before, now]), len(now)
-    pressures, slips = both.pressure, both.slip_magnitude
-    for k in range(steps):  # the last cycle before each step
-        p, s = pressures[k : k + steps], slips[k : k + steps]
-        slid = s.sum(axis=0) > 0
-        mean = (p * s).sum(axis=0)[slid] / s.sum(axis=0)[slid]
-        wanted = 1e-9 * mean * (now.pressure[k] * now.slip_magnitude[k])[slid]
-        assert wanted.max() > 0
-        # Directions at nodes of the strip are those of some of the punch's, which is round.
-        for depth, same in ((now.punch_depth, 1e-11), (now.strip_depth, 1e-8)):
-            assert np.abs(depth[k][slid] - wanted).max() < same * now.punch_depth.max()
+    now = TimeStepRecords.joined(driven.cycle(at)[1])
+    p, s = before.pressure, before.slip_magnitude
+    slid = s.sum(axis=0) > 0
+    mean = (p * s).sum(axis=0)[slid] / s.sum(axis=0)[slid]
+    wanted = 1e-9 * mean * (now.pressure * now.slip_magnitude)[:, slid]
+    assert wanted.max() > 0
+    # Directions at nodes of the strip are those of some of the punch's, which is round.
+    for depth, same in zip(worn_in_steps(driven, now, at), (1e-11, 1e-8), strict=True):
+        assert np.abs(depth[:, slid] - wanted).max() < same * depth.max()
 
 
 @pytest.mark.parametrize(("amplitude", "passes"), [("5 um", False), ("8 um", True)])

@@ -290,7 +290,7 @@ class _Run:
     def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
         setup: StickSetup = system.law_state
         self.system, self.setup, self.loading = system, setup, loading
-        self.problem = setup.problem.watching(watch)
+        self.problem = replace(setup.problem, watch=watch)
         self.strokes = system.motion.half_cycles
         self.meter = Meter(system, self.problem)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
-from fenwear.steps.stick_losses import CoatedBodies, StepConditions, StepLosses
+from fenwear.steps.stick_losses import BARE, CoatedBodies, StepConditions, StepLosses
 from fenwear.steps.stick_position import LoadEffect, Position
 from fenwear.steps.stick_program import Program, TimeStep
 from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords, record
@@ -37,53 +37,48 @@ T = TypeVar("T")
 MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
 
 
+@dataclass(frozen=True, eq=False)
 class PartialSlipProblem:
     """Two bodies, what is done to them, and their wear.
 
-    Args:
+    Attributes:
         interface: The bodies.
         program: Of a cycle.
         wear: By local slip.
         friction: mu (n,).
-        heat: Of friction; None without.
         watch: Called before every time step: may raise InterruptedRunError.
+        heat: Of friction; None without.
         expanded: Gaps by loads with a constant thermal expansion, at an offset of the strip.
         laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
-        coatings: Of both bodies, whose `wear` is then that of the coating, by the ratio of coefficients unless another
-            one is given.
+        coatings: Of both bodies, by the ratio of the coefficients of base and coating unless another one is given.
+        pressed: State in which the first cycle begins, unworn, under the loads of the case, once it is known.
     """
 
-    def __init__(
-        self,
-        interface: OppositeBodies,
-        program: Program,
-        wear: LocalWear,
-        friction: Array,
-        watch: Callable[[], object] = lambda: None,
-        heat: StickHeat | None = None,
-        expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded,
-        laws: LocalLaws | None = None,
-        coatings: CoatedBodies | None = None,
-    ) -> None:
-        pair = interface.middle.pair
-        self.expanded, self.laws = expanded, laws
-        self.coatings = coatings or CoatedBodies.bare(len(pair.weights), len(pair.strip.weights))
-        self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
-        self.weights, self.watch, self.heat = pair.weights, watch, heat
-        self.conditions = StepConditions(interface, program, laws, heat, wear.strip.wears)
-        self.losses = StepLosses(self.conditions, wear, self.coatings)
-        self._pressed: PartialSlipState | None = None  # unworn, under the case's loads, where the first cycle begins
+    interface: OppositeBodies
+    program: Program
+    wear: LocalWear
+    friction: Array
+    watch: Callable[[], object] = lambda: None
+    heat: StickHeat | None = None
+    expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded
+    laws: LocalLaws | None = None
+    coatings: CoatedBodies = BARE
+    pressed: list[PartialSlipState] = field(default_factory=list)
 
-    def watching(self, watch: Callable[[], object]) -> PartialSlipProblem:
-        """Return the same with what is called before every time step."""
-        found = self._with(watch=watch)
-        found._pressed = self._pressed
-        return found
+    @property
+    def weights(self) -> Array:
+        """Areas of the contact nodes (n,)."""
+        return self.interface.middle.pair.weights
 
-    def _with(self, **changed: Any) -> PartialSlipProblem:
-        """Return the same with other arguments."""
-        names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws", "coatings")
-        return PartialSlipProblem(**{**{name: getattr(self, name) for name in names}, **changed})
+    @cached_property
+    def conditions(self) -> StepConditions:
+        """Variables of laws in the time steps."""
+        return StepConditions(self.interface, self.program, self.laws, self.heat, self.wear.strip.wears)
+
+    @cached_property
+    def losses(self) -> StepLosses:
+        """Wear of the time steps."""
+        return StepLosses(self.conditions, self.wear, self.coatings)
 
     def led(self, function: Callable[[], T]) -> T:
         """Call the function that continues from condensed bodies, on rank 0 for all; collective.
@@ -99,31 +94,25 @@ class PartialSlipProblem:
         def expanded(loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
             return heat.expanded(loaded, temperature, offset)
 
-        return self._with(heat=None, expanded=expanded)
+        return replace(self, heat=None, expanded=expanded, pressed=[])
 
     def worn_like(self, cycle: FrettingCycle) -> PartialSlipProblem:
         """Return the same whose coatings have the ratios of what a cycle's steps would wear of bases and of them."""
         if not self.coatings.any:
             return self
         wear = self.losses.over(cycle.records, cycle.begin).wear
-        return self._with(coatings=self.coatings.by(wear, cycle.records.pressure))
+        return replace(self, coatings=self.coatings.by(wear, cycle.records.pressure))
 
     def elastic(self) -> PartialSlipProblem:
         """Return the same whose surfaces are as hard as they like."""
         interface = copy(self.interface)
         interface.layers = replace(interface.layers, hardness=np.inf)
-        return self._with(interface=interface)
-
-    def with_heat(self, heat: StickHeat | None) -> PartialSlipProblem:
-        """Return the same with the heat of friction."""
-        return self._with(heat=heat)
+        return replace(self, interface=interface, pressed=[])
 
     def driven(self, program: Program) -> PartialSlipProblem:
         """Return the same in other time steps, without heat."""
-        found = self._with(program=program, heat=None)
-        if self.program.same_way(program):
-            found._pressed = self._pressed
-        return found
+        same = self.program.same_way(program)
+        return replace(self, program=program, heat=None, pressed=self.pressed if same else [])
 
     @cached_property
     def reach(self) -> float:
@@ -164,11 +153,12 @@ class PartialSlipProblem:
     def _begun(self, shape: WornDepths | None, load: float) -> PartialSlipState:
         unworn = self.unworn()
         as_made = load == 1.0 and (shape is None or shape.same(unworn))
-        at = self._pressed if as_made else None
-        if at is None:
+        if not as_made:
             at = self._pressed_to(shape or unworn, load)
-            if as_made:
-                self._pressed = at
+        else:
+            if not self.pressed:
+                self.pressed.append(self._pressed_to(unworn, load))
+            at = self.pressed[0]
         at = self.forgotten(at)
         if self.heat is None:
             return at

@@ -120,11 +120,6 @@ class CoatedBodies:
     punch: CoatedBody
     strip: CoatedBody
 
-    @classmethod
-    def bare(cls, punch: int, strip: int) -> CoatedBodies:
-        """Return bodies of so many contact nodes without coatings."""
-        return cls(*(CoatedBody(np.zeros(nodes), np.ones(nodes)) for nodes in (punch, strip)))
-
     @property
     def any(self) -> bool:
         """Whether a body is coated."""
@@ -151,6 +146,9 @@ class CoatedBodies:
 
 def _over(rate: Array, slope: Array) -> Array:
     return np.divide(rate, slope, out=np.zeros_like(rate), where=slope > 0)
+
+
+BARE = CoatedBodies(*(CoatedBody(np.zeros(1), np.ones(1)),) * 2)  # both bodies without coatings
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,7 @@ def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
         return problem
     steps = len(problem.program.steps) // problem.program.half_cycles
     heat = stick_heat(meshed(problem.interface), case, steps)
-    return problem.with_heat(heat)
+    return replace(problem, heat=heat)
 
 
 def _check_passing(case: Case, surface: ContactSurface) -> None:

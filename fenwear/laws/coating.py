@@ -158,21 +158,6 @@ class CoatedBody:
         """Return the depth (n,), mm, of what the coating's coefficient would have worn in all, A (n,), mm."""
         return np.asarray(measure + (self.ratio - 1) * np.maximum(measure - self.thickness, 0.0))
 
-    def measure(self, depth: Array) -> Array:
-        """Return A of a depth; that of the end of the coating where the base does not wear."""
-        beyond = np.maximum(depth - self.thickness, 0.0)
-        further = np.divide(beyond, self.ratio, out=np.zeros_like(beyond), where=self.ratio > 0)
-        return np.asarray(np.minimum(depth, self.thickness) + further)
-
-    def slope(self, depth: Array) -> Array:
-        """Return the derivative of the depth to A at a depth (n,)."""
-        return np.where(depth < self.thickness, 1.0, self.ratio)
-
-    def by(self, coating: Array, base: Array) -> CoatedBody:
-        """Return the same by the ratio of what would be worn of base and coating (n,), where something is."""
-        known = (coating > 0) & (base > 0)
-        return CoatedBody(self.thickness, np.divide(base, coating, out=self.ratio.copy(), where=known))
-
     def at(self, interpolation: Array) -> CoatedBody:
         """Return the same at other nodes, by a matrix that interpolates there."""
         return CoatedBody(interpolation @ self.thickness, interpolation @ self.ratio)

@@ -113,10 +113,6 @@ class BodyWear:
         """Return the wear from a depth on, through the coating that is left there, in a step of so many cycles."""
         return self
 
-    def parts(self, pressure: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """Return what would be worn of coating and of base at the body's own nodes: without coating nothing counts."""
-        return np.zeros(1), np.zeros(1)
-
     def at(self, pressure: Array) -> BodyWear:  # noqa: ARG002
         """Return the wear at pressures (m, n), which say what of it is of the coating and of the base."""
         return self
@@ -184,15 +180,10 @@ class CoatedWear(BodyWear):
         """Return the wear from a depth on."""
         return replace(self, left=left_of(self.thickness, depth), cycles=cycles)
 
-    def parts(self, pressure: Array) -> tuple[Array, Array]:
-        """Return what pressures (m, n) would wear at the body's own nodes (n_own,), mm, of coating and of base."""
-        both = (self.coating.depth(pressure), super().depth(pressure))
-        coating, base = (np.sum(self._put(own) if self.pairs else own, axis=0) for own in both)
-        return coating, base
-
     def at(self, pressure: Array) -> BodyWear:
         """Return the wear at pressures (m, n)."""
-        coating, base = self.parts(pressure)
+        both = (self.coating.depth(pressure), super().depth(pressure))
+        coating, base = (np.sum(self._put(own) if self.pairs else own, axis=0) for own in both)
         found = shares(self.cycles * coating, self.cycles * base, self.left)
         here = found.at(self.pairs[0].wear_interpolation) if self.pairs else found
         return replace(self, shares=found, here=here)

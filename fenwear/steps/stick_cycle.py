@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
+from fenwear.laws.coating import CoatedBody
 from fenwear.laws.local_laws import LocalLaws, LocalWear
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
-from fenwear.steps.stick_losses import BARE, CoatedBodies, StepConditions, StepLosses
+from fenwear.steps.stick_losses import BARE, StepConditions, StepLosses
 from fenwear.steps.stick_position import LoadEffect, Position
 from fenwear.steps.stick_program import Program, TimeStep
-from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords, record
+from fenwear.steps.stick_records import TimeStepRecords, record
 from fenwear.steps.stick_state import NO_SHIFT, Imposed, PartialSlipState, StickState
 from fenwear.surfaces.placement import HERE, Placement, in_model
 from fenwear.surfaces.sliding_field import Screw
@@ -50,7 +51,7 @@ class PartialSlipProblem:
         heat: Of friction; None without.
         expanded: Gaps by loads with a constant thermal expansion, at an offset of the strip.
         laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
-        coatings: Of both bodies, by the ratio of the coefficients of base and coating unless another one is given.
+        coatings: Of both bodies.
         pressed: State in which the first cycle begins, unworn, under the loads of the case, once it is known.
     """
 
@@ -62,7 +63,7 @@ class PartialSlipProblem:
     heat: StickHeat | None = None
     expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded
     laws: LocalLaws | None = None
-    coatings: CoatedBodies = BARE
+    coatings: tuple[CoatedBody, CoatedBody] = (BARE, BARE)
     pressed: list[PartialSlipState] = field(default_factory=list)
 
     @property
@@ -95,13 +96,6 @@ class PartialSlipProblem:
             return heat.expanded(loaded, temperature, offset)
 
         return replace(self, heat=None, expanded=expanded, pressed=[])
-
-    def worn_like(self, cycle: FrettingCycle) -> PartialSlipProblem:
-        """Return the same whose coatings have the ratios of what a cycle's steps would wear of bases and of them."""
-        if not self.coatings.any:
-            return self
-        wear = self.losses.over(cycle.records, cycle.begin).wear
-        return replace(self, coatings=self.coatings.by(wear, cycle.records.pressure))
 
     def elastic(self) -> PartialSlipProblem:
         """Return the same whose surfaces are as hard as they like."""

@@ -445,9 +445,10 @@ def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
     """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
     rates = [float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    if not problem.coatings.any or not 0 < share < 1:
+    punch, strip = problem.coatings
+    if not (punch.thickness.any() or strip.thickness.any()) or not 0 < share < 1:
         return np.asarray(share * depth)
-    punch, strip = problem.coatings.punch, problem.coatings.strip.at(problem.interface.middle.pair.wear_interpolation)
+    strip = strip.at(problem.interface.middle.pair.wear_interpolation)
 
     def lost(rubbed: Array) -> tuple[Array, Array]:
         return punch.depth(share * rubbed), strip.depth((1 - share) * rubbed)

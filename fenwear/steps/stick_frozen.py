@@ -137,7 +137,7 @@ class Frozen:
         contact = self._solver.solve(gap, near, None if step is None else GroupedStep(step, self.groups), coupling)
         pressure = self.groups.pressure(contact.pressure)
         crept = self._creep.after(before.crept, cycles, self._duration @ pressure - self._mean)
-        worn = self._passing.worn(pressure, before, cycles)
+        worn = self.worn(contact, before, cycles)
         return replace(before + worn.times(cycles), crept=crept), contact
 
     def _opened(self, crept: Array) -> Array:
@@ -153,9 +153,12 @@ class Frozen:
 
     def rate(self, contact: ContactState, worn: WornDepths) -> WornDepths:
         """Return M, by how much depths change in a cycle with this contact."""
-        pressure = self.groups.pressure(contact.pressure)
-        crept = self._creep.rate(worn.crept, self._duration @ pressure - self._mean)
-        return replace(self._passing.worn(pressure, worn, 0.0), crept=crept)
+        crept = self._creep.rate(worn.crept, self._duration @ self.groups.pressure(contact.pressure) - self._mean)
+        return replace(self.worn(contact, worn, 0.0), crept=crept)
+
+    def worn(self, contact: ContactState, before: WornDepths, cycles: float) -> WornDepths:
+        """Return what each of so many cycles wears with this contact, from depths on; with 0 cycles the rate there."""
+        return self._passing.worn(self.groups.pressure(contact.pressure), before, cycles)
 
 
 def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Position], Groups, ContactState]:

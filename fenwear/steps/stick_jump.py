@@ -11,11 +11,9 @@ second step starts there; the cycle at its end begins the next jump. Its error h
 parts: of M a third of the difference to one step over the whole jump, and of R Simpson's rule against the line, each as
 the last stage damps it.
 
-Layers change with the depths: y has its state, too. Of coated bodies y has the wear of their coatings if these lasted,
-by the ratio of the wear of base and coating in the jump's first cycle: that grows evenly through their end
-(`fenwear.laws.coating.CoatedBody`) where the ratio stays, and nearly so elsewhere. No depth decreases. A cycle whose
-error is too large goes in parts, of which each is such a jump: N is below 1. Loads that change are those of each
-cycle's own time.
+Layers change with the depths: y has their state, too. Coated bodies wear through the coating that is left where a step
+begins, and below it the base. No depth decreases. A cycle whose error is too large goes in parts, of which each is
+such a jump: N is below 1. Loads that change are those of each cycle's own time.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
 is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
@@ -193,10 +191,7 @@ def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
 
 @dataclass(frozen=True)
 class _Moment(Moment):
-    """The end of a stage, and where it began and how many cycles it was long.
-
-    Of coated bodies its depths are the wear of their coatings if these lasted.
-    """
+    """The end of a stage, and where it began and how many cycles it was long."""
 
     begin: WornDepths
     length: float = 0.0
@@ -209,24 +204,15 @@ class _Jump(JumpLaw[_Moment]):
         self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], whole: FrettingCycle
     ) -> None:
         self.problem, self._now, self._load, self._whole = problem, now, load, whole
-        self._layers, self._coatings = problem.interface.layers, problem.coatings
-        self._frozen, y = Frozen(problem, now), self._coatings.measured(now.worn)
-        self.begin = _Moment(y, self._frozen.contact, 0.0, y)
+        self._layers, self._frozen = problem.interface.layers, Frozen(problem, now)
+        self.begin = _Moment(now.worn, self._frozen.contact, 0.0, now.worn)
         self._first = self._beside(now, self.begin)
         self._bend = self._first.times(0.0)  # R is their line
         self._middle = self.then = now  # the cycles halfway and at the end
 
     def depths(self, worn: WornDepths) -> WornDepths:
         """Return the depths of a moment, no thickness below zero."""
-        return self._layers.settled(self._on_the_way(worn))
-
-    def moment(self, worn: WornDepths) -> _Moment:
-        """Return the begin at other depths."""
-        return replace(self.begin, worn=self._coatings.measured(worn))
-
-    def _on_the_way(self, worn: WornDepths) -> WornDepths:
-        """Return the depths at the begin of a stage: they may overshoot, and so may debris."""
-        return self._layers.bounded(self._coatings.depths(worn))
+        return self._layers.settled(self._layers.bounded(worn))
 
     def stage(
         self,
@@ -238,12 +224,14 @@ class _Jump(JumpLaw[_Moment]):
     ) -> _Moment:
         """Return z = before + cycles (M(z) + R(time)); to all digits."""
         begin = before.worn + self._at(time).times(cycles)
-        worn, contact = self._frozen.stage(self._on_the_way(begin), cycles, near)
-        return _Moment(self._coatings.measured(worn), contact, time, begin, cycles)
+        worn, contact = self._frozen.stage(self._layers.bounded(begin), cycles, near)
+        return _Moment(worn, contact, time, begin, cycles)
 
     def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
         """Return before + cycles (M + R), at the rate of a stage."""
-        rate = (stage.worn - stage.begin).times(1 / stage.length) + self._at(stage.time)
+        rate = (stage.worn - stage.begin).times(1 / stage.length)
+        through = self._frozen.worn(stage.contact, before.worn, cycles)  # coatings as thick as they are there
+        rate = replace(rate, punch=through.punch, strip=through.strip) + self._at(stage.time)
         return replace(stage, worn=before.worn + rate.times(cycles))
 
     def settled(self, end: _Moment) -> _Moment:
@@ -270,7 +258,7 @@ class _Jump(JumpLaw[_Moment]):
         missed = end.worn - self.stage(start, end.length, end.time, end.contact, FINE).worn
         opened = partial(opened_by_creep, interface.middle, interface.creep)
         begin, whole, last = (self.depths(one.worn) for one in (made.begin, made.whole, end))
-        parts = (whole - last).times(HALVES), self._on_the_way(end.worn) - self._on_the_way(end.worn - missed)
+        parts = (whole - last).times(HALVES), missed
         sizes = Sizes(self._layers, interface.middle.pair, opened, REST)
         of_heat = max(self._middle.error, self.then.error)
         return sizes.estimate((begin, last), made, parts, of_heat), missed
@@ -290,7 +278,7 @@ class _Jump(JumpLaw[_Moment]):
             np.isfinite(part).all() for part in (found.punch, found.strip, found.between, found.carried, found.crept)
         ):
             raise ConvergenceError(TOO_LARGE)
-        return self._coatings.with_slopes(found - self._frozen.rate(at.contact, cycle.worn), cycle.worn)
+        return found - self._frozen.rate(at.contact, cycle.worn)
 
     def _cycle(self, end: _Moment, done: float) -> FrettingCycle:
         """Return the cycle so many later, at the end of a step.
@@ -315,12 +303,13 @@ def _attempt(
     begin_of_heat: FrettingCycle,
 ) -> tuple[FrettingCycle, Estimate]:
     """Return the cycle after a jump, and its error; temperatures continue from those of the last whole cycle."""
-    law = _Jump(problem.worn_like(now), now, load, begin_of_heat)
+    law = _Jump(problem, now, load, begin_of_heat)
     made = attempt(law, law.begin, cycles)
     estimate, missed = law.estimate(made)
     finer = None
     if now.finer is not None:
-        finer = law.depths(made.finer(law, law.begin if now.finer is now.worn else law.moment(now.finer)).worn - missed)
+        fine = law.begin if now.finer is now.worn else replace(law.begin, worn=now.finer)
+        finer = law.depths(made.finer(law, fine).worn - missed)
     return replace(law.then, finer=finer), estimate
 
 

@@ -1,13 +1,13 @@
 """Wear of both bodies in time steps of contact with stick, by the laws of phases in gross sliding.
 
 A time step wears as a phase of the motion does, over the slip of its nodes. Conditions of the laws are those of each
-node in the step, and of the cycle before. Jumps count the depth of a coated body by the wear of its coating.
+node in the step, and of the cycle before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from fenwear.steps.stick_state import PartialSlipState
 from fenwear.surfaces import ContactPair
 
 ALL = slice(None)  # time steps of a record
+BARE = CoatedBody(np.zeros(1), np.ones(1))  # without a coating
 
 
 @dataclass(frozen=True)
@@ -114,44 +115,6 @@ class StepConditions:
 
 
 @dataclass(frozen=True)
-class CoatedBodies:
-    """The coatings of punch and strip."""
-
-    punch: CoatedBody
-    strip: CoatedBody
-
-    @property
-    def any(self) -> bool:
-        """Whether a body is coated."""
-        return bool(self.punch.thickness.any() or self.strip.thickness.any())
-
-    def by(self, wear: PhasesWear, pressure: Array) -> CoatedBodies:
-        """Return the same by the ratio of what bases and coatings would wear at pressures (m, n), where they wear."""
-        bodies = zip((self.punch, self.strip), (wear.punch, wear.strip), strict=True)
-        return CoatedBodies(*(own.by(*body.parts(pressure)) for own, body in bodies))
-
-    def measured(self, worn: WornDepths) -> WornDepths:
-        """Return depths as the wear of coatings that last: it grows evenly through their end."""
-        return replace(worn, punch=self.punch.measure(worn.punch), strip=self.strip.measure(worn.strip))
-
-    def depths(self, measured: WornDepths) -> WornDepths:
-        """Return the depths that `measured` made these of."""
-        return replace(measured, punch=self.punch.depth(measured.punch), strip=self.strip.depth(measured.strip))
-
-    def with_slopes(self, rate: WornDepths, worn: WornDepths) -> WornDepths:
-        """Return rates of depths as those of `measured`, where these depths are worn."""
-        punch, strip = self.punch.slope(worn.punch), self.strip.slope(worn.strip)
-        return replace(rate, punch=_over(rate.punch, punch), strip=_over(rate.strip, strip))
-
-
-def _over(rate: Array, slope: Array) -> Array:
-    return np.divide(rate, slope, out=np.zeros_like(rate), where=slope > 0)
-
-
-BARE = CoatedBodies(*(CoatedBody(np.zeros(1), np.ones(1)),) * 2)  # both bodies without coatings
-
-
-@dataclass(frozen=True)
 class StepLosses:
     """Wear of the time steps of a cycle, and its effect on what lies between.
 
@@ -163,7 +126,7 @@ class StepLosses:
 
     conditions: StepConditions
     wear: LocalWear
-    coatings: CoatedBodies
+    coatings: tuple[CoatedBody, CoatedBody]
 
     @property
     def layers(self) -> Layers:
@@ -202,7 +165,7 @@ class StepLosses:
     ) -> PhasesWear:
         """Return the wear of time steps by their laws, slips (k, n) and durations (k,)."""
         punch, strip = (law.slide(slid, durations[:, None]) for law in (wears[0].punch, wears[0].strip))
-        coatings = self.coatings.punch.thickness, self.coatings.strip.thickness
+        coatings = self.coatings[0].thickness, self.coatings[1].thickness
         return phases_wear(wears, (punch, strip), pairs, coatings)
 
     def evolution(self, records: TimeStepRecords, begin: PartialSlipState) -> Evolution | None:

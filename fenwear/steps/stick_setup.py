@@ -25,7 +25,6 @@ from fenwear.common.parallel import memory_size
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_heat import stick_heat
 from fenwear.steps.stick_interface import StickInterface, meshed
-from fenwear.steps.stick_losses import CoatedBodies
 from fenwear.steps.stick_program import Program, far_enough, make_program, passes, steps_of
 from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.surfaces.sliding_field import Screw
@@ -119,7 +118,7 @@ def unheated_problem(
     )
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
     changing = None if laws.constant and not layers.varies else laws
-    coated = CoatedBodies(*laws.coated(middle.pair, conditions))
+    coated = laws.coated(middle.pair, conditions)
     return PartialSlipProblem(interface, make_program(case, steps), wear, mu, laws=changing, coatings=coated)
 
 

@@ -82,7 +82,8 @@ class Stepper(JumpLaw[_Moment]):
         self.wear = system.phases_wear
         self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]
         self.evolution = system.evolution(self.conditions)
-        self._measure([system.friction.values(one) for one in self.conditions])
+        self._mu = [system.friction.values(one) for one in self.conditions]
+        self._meters = [PhaseMeter(system, k) for k in range(len(self.ratios))]
         self.coupled = Coupled(system, self.take)
         self._flowed: Array | float = 0.0  # beyond the hardness, in the stage solved last
         self._begin: RunState = beginning(system)  # of the jump
@@ -309,18 +310,15 @@ class Stepper(JumpLaw[_Moment]):
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
         self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
-        self._measure([system.friction.values(state) for state in conditions])
+        self._mu = [system.friction.values(one) for one in conditions]
         if system.friction.constant:
             return
         self.ratios = system.friction_ratios(conditions)
         self.contact.slide(self.ratios)
 
-    def _measure(self, friction: Sequence[Array]) -> None:
-        self.meters = [PhaseMeter(self.system, k, mu, self.wear.some([k])) for k, mu in enumerate(friction)]
-
     def _adds(self, pressure: Array) -> list[Totals]:
         """Return what each phase of a cycle adds at its pressure (m, n)."""
-        return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
+        return [meter(pressure[k, :], self._mu[k], self.wear.some([k])) for k, meter in enumerate(self._meters)]
 
     def ended(self, end: _Moment, cycles: float) -> None:
         """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""

@@ -22,7 +22,6 @@ from fenwear.contact import CondensedContact, ContactSolver, ContactState
 from fenwear.heat.temperature import HeatState
 from fenwear.laws import LayerEvolution
 from fenwear.laws.compliant_layer import Law
-from fenwear.laws.debris import DebrisCycle
 from fenwear.laws.friction import ContactConditions, FollowingFriction
 from fenwear.laws.sliding_tensors import CycleShear
 from fenwear.laws.wear import WornDepths
@@ -168,8 +167,6 @@ class PhaseStep:
         self._friction_ratio = system.phase_friction(phase, self._mu)
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
-        self._debris, self._slid = self._passing.debris, system.path[[phase]]
-        self._edge: Array | None = None  # distances from it, for which debris is lost as it is there
         self._flowed: Array | float = 0.0  # beyond the hardness, in the last solve
         self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
         self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
@@ -179,7 +176,7 @@ class PhaseStep:
             modes = system.rigids[phase].rigid_normal.shape[1]
             self._onwards = Onwards(len(self._mu), modes, layers.closure, layers.hardness)
         self._even = np.full(len(self._mu), system.rigid.mean_pressure)
-        self._meter = PhaseMeter(system, phase, self._mu, wear)
+        self._meter = PhaseMeter(system, phase)
 
     def solve(
         self,
@@ -328,17 +325,11 @@ class PhaseStep:
                 self._contact.slide([self._friction_ratio])
                 self._thermal.slide(heating_friction(system, mu, self.phase))
         wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
-        ends = end if ended else None
-        return LayerEvolution(self._layers, wear, self._lost(conditions), evolution, ends)
-
-    def _lost(self, conditions: ContactConditions) -> DebrisCycle:
-        """Return what the phase does to debris at conditions: as before where no more than the same edges matter."""
-        layers, edge = self.system.layers, conditions.edge
-        if not layers.varies or (not layers.debris.of_state and edge is self._edge):
-            return self._debris
-        onto = layers.places([self.system.pairs[self.phase]])
-        self._debris, self._edge = layers.debris.over(self._slid, [conditions], onto), edge
-        return self._debris
+        layers, debris = self._layers, self._passing.debris
+        if layers.varies:
+            onto = layers.places([system.pairs[self.phase]])
+            debris = layers.debris.over(system.path[[self.phase]], [conditions], onto)
+        return LayerEvolution(layers, wear, debris, evolution, end if ended else None)
 
     @cached_property
     def _uncapped(self) -> ContactSolver:
@@ -392,8 +383,6 @@ class PhaseStep:
     ) -> PhaseEnd:
         if self._onwards is not None:
             self._onwards.keep(at.before, contact)
-        alike = self.system.friction.constant and passing.wear is self._passing.wear
-        meter = self._meter if alike else self._meter.at(self._mu, passing.wear)
 
         def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]
@@ -402,7 +391,7 @@ class PhaseStep:
             if creep.creeps:
                 crept = creep.change(self.phase, at.worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)
-            return with_coated(self.system, meter(pressure), lost), lost
+            return with_coated(self.system, self._meter(pressure, self._mu, passing.wear), lost), lost
 
         adds, lost = self.system.team.lead(left)
         record = PhaseRecord(self.phase, contact, at.before.pressure[0], adds, self._friction_ratio)

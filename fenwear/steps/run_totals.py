@@ -80,16 +80,14 @@ def none_yet(system: ContactSetup) -> Totals:
 
 
 class PhaseMeter:
-    """Additions of a phase at a pressure: all that is linear in it in one product.
+    """Additions of a phase at a pressure.
 
     Args:
         system: The bodies.
         phase: Number of the phase.
-        mu: Friction coefficient at the nodes (n,).
-        wear: Of this phase alone.
     """
 
-    def __init__(self, system: ContactSetup, phase: int, mu: Array, wear: PhasesWear) -> None:
+    def __init__(self, system: ContactSetup, phase: int) -> None:
         pair, slid = system.pairs[phase], system.sliding_ratio[phase]
         self._areas = system.bodies.punch.thickness * pair.weights
         self._path = system.motion.phases[phase].distance * slid
@@ -115,35 +113,24 @@ class PhaseMeter:
         # What is linear in the pressure, and in mu times it: each with what friction drags along the three axes.
         self._by_pressure = np.array([self._weights, self._moved, path, areas * carried, *(areas * bare.T)])
         self._by_friction = np.array([path, areas * dragged, *(areas * along.T)])
-        self._mu, self._wear = mu, wear
-        # At coefficients that stay all is linear, but for wear by a law that is not.
-        bodies = list(zip((wear.punch, wear.strip), self._weigh, strict=True))
-        linear = all(own.linear for own, _ in bodies)
-        worn = [weigh * own.rate[0] for own, weigh in bodies]
-        self._energy = mu * self._path
-        self._rows = np.concatenate([self._by_pressure, self._by_friction * mu, *worn]) if linear else None
 
-    def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
-        """Return the meter at other coefficients."""
-        found = object.__new__(PhaseMeter)
-        found.__dict__.update(self.__dict__, _mu=mu, _wear=wear, _rows=None)
-        return found
+    def __call__(self, pressure: Array, mu: Array, wear: PhasesWear) -> Totals:
+        """Return what the phase adds.
 
-    def __call__(self, pressure: Array) -> Totals:
-        """Return what the phase adds at a pressure (n,)."""
-        if self._rows is None:
-            rubbed = self._mu * pressure
-            parts = [*map(float, self._by_pressure @ pressure), *map(float, self._by_friction @ rubbed)]
-            for own, weigh in zip((self._wear.punch, self._wear.strip), self._weigh, strict=True):
-                parts += (weigh @ own.depth(pressure[None])[0]).tolist()
-            energy = self._path * rubbed
-        else:
-            parts, energy = (self._rows @ pressure).tolist(), self._energy * pressure
+        Args:
+            pressure: At the nodes (n,), MPa.
+            mu: Friction coefficient there (n,).
+            wear: Of this phase alone.
+        """
+        rubbed = mu * pressure
+        parts = [*(self._by_pressure @ pressure).tolist(), *(self._by_friction @ rubbed).tolist()]
+        for own, weigh in zip((wear.punch, wear.strip), self._weigh, strict=True):
+            parts += (weigh @ own.depth(pressure[None])[0]).tolist()
         force, moved, path, carried, x, y, z, work, dragged, by_x, by_y, by_z, *worn = parts
         distance = moved / force if force else self._mean_distance
         drag = math.hypot(x + by_x, y + by_y, z + by_z)
         sums = np.array([distance, path, (carried + dragged) * distance, drag * distance, work, *worn])
-        return Totals(sums, energy, self._share * pressure)
+        return Totals(sums, self._path * rubbed, self._share * pressure)
 
 
 def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Totals:
@@ -199,7 +186,7 @@ def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[Con
     """
     wear = system.wear.phases(conditions)
     return [
-        PhaseMeter(system, k, system.friction.values(state), wear.some([k]))(pressure[k])
+        PhaseMeter(system, k)(pressure[k], system.friction.values(state), wear.some([k]))
         for k, state in enumerate(conditions)
     ]
 

@@ -51,7 +51,7 @@ def test_sample(seed: int, request: pytest.FixtureRequest) -> None:
 def test_a_meter_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """By what is worn off all material points."""
     true = PhaseMeter.__call__
-    monkeypatch.setattr(PhaseMeter, "__call__", lambda self, pressure: true(self, pressure).times(1 + 1e-6))
+    monkeypatch.setattr(PhaseMeter, "__call__", lambda self, *given: true(self, *given).times(1 + 1e-6))
     verdict, why = invariants.try_problem(SEEDS["plane; scale, mirror, restart"])
     assert verdict == "wrong"
     assert "volume" in why

@@ -13,7 +13,7 @@ from fenwear.laws.debris import DebrisCycle
 from fenwear.laws.friction import ContactConditions
 from fenwear.laws.law_states import Evolution, Held
 from fenwear.laws.layers import DEBRIS, PLASTIC, Layers
-from fenwear.laws.wear import PhasesWear, StepWear, WornDepths
+from fenwear.laws.wear import PhasesWear, WornDepths
 
 NUDGE = 1e-6  # of the largest pressure, for differences
 
@@ -157,10 +157,6 @@ class LayerStep:
         return 1.0 if self.cycles is None else self.cycles
 
     @property
-    def _wear(self) -> StepWear:
-        return StepWear(self._worn, self._length)
-
-    @property
     def _worn(self) -> PhasesWear:
         return self.passing.wear.begun(self.before, self.cycles)
 
@@ -172,7 +168,7 @@ class LayerStep:
             closed = closed + self._coatings(pressure).closure(pressure)
         if not self.implicit:
             return closed
-        found = self._wear.opening(pressure)
+        found = self._length * self._worn.opening(pressure)
         if passing.layers.debris.present:
             added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
             if passing.layers.strip_carries:
@@ -188,14 +184,17 @@ class LayerStep:
             return np.zeros_like(pressure)
         if self.passing.layers.strip_carries:
             return None
-        found = self._wear.local(pressure)
-        if found is not None and self.passing.layers.softens:
+        found = self._worn.local(pressure)
+        if found is None:
+            return None
+        if self.passing.layers.softens:
             found = found * self._felt(pressure)[0].mean(axis=0)  # of all phases: a step to the solution
-        return None if found is None else found - self._covered(pressure)
+        return self._length * found - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
-        left, right = self._wear.border(pressure)
+        left, right = self._worn.border(pressure)
+        right = self._length * right
         if self.passing.layers.softens:
             left = self._felt_by_border(left, pressure)
         if self.passing.layers.strip_carries:
@@ -227,10 +226,11 @@ class LayerStep:
         """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
         if not self.implicit:
             return None, None
-        punch, strip = self._wear.by_body(pressure)
+        felt: Sequence[Array | float] = (1.0, 1.0)
         if self.passing.layers.softens:
-            both = zip((punch, strip), self._felt(pressure), strict=True)
-            punch, strip = (None if own is None else own * share.mean(axis=0) for own, share in both)
+            felt = [share.mean(axis=0) for share in self._felt(pressure)]
+        both = zip(self._worn.by_body(pressure), felt, strict=True)
+        punch, strip = (None if own is None else self._length * own * share for own, share in both)
         if self.passing.layers.strip_carries:
             return punch, self._carried_below(pressure, strip)
         if not self.passing.layers.lies_here:

@@ -336,46 +336,6 @@ class PhasesWear:
         return np.concatenate(parts, axis=2)
 
 
-@dataclass(frozen=True)
-class StepWear:
-    """The wear of `repeats` cycles at the pressures of their phases, as a compliance of the contact.
-
-    Put into the inequality it makes the step implicit: pressure and wear belong to its end, so that
-    it is stable for any number of repeats.
-    """
-
-    wear: PhasesWear
-    repeats: float = 1.0
-
-    def opening(self, pressure: Array) -> Array:
-        """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
-        return self.repeats * self.wear.opening(pressure)
-
-    def local(self, pressure: Array) -> Array | None:
-        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
-        found = self.wear.local(pressure)
-        return None if found is None else self.repeats * found
-
-    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
-        """Return what unit pressures wear off punch and strip in the step (m, n), mm/MPa; None where one does not."""
-        punch, strip = (None if one is None else self.repeats * one for one in self.wear.by_body(pressure))
-        return punch, strip
-
-    def border(self, pressure: Array) -> tuple[Array, Array]:
-        """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""
-        left, right = self.wear.border(pressure)
-        return left, self.repeats * right
-
-    @property
-    def curved(self) -> bool:
-        """Whether a coating has a compliance that is not linear: nothing does."""
-        return False
-
-    def layer(self, _pressure: Array) -> Array | None:
-        """Return what opens each phase's own gaps alone: nothing does."""
-        return None
-
-
 def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
     """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
     laws = [one for law in wear for one in (law, law.of_coating) if one is not None]

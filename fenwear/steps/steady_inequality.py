@@ -17,11 +17,10 @@ from fenwear.contact.grid_contact import PhasesGrid
 from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.steady_blocks import ShapeEquations
 from fenwear.contact.steady_products import GridShape
-from fenwear.laws import Evolution
+from fenwear.laws import Evolution, LayerEvolution, Layers, LayerStep
+from fenwear.laws.debris import NO_CYCLE
 from fenwear.laws.friction import ContactConditions
-from fenwear.laws.layer_step import LayerEvolution
 from fenwear.laws.optimum import Optimum
-from fenwear.laws.wear import StepWear
 from fenwear.system import Tribosystem
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
@@ -247,10 +246,12 @@ class SteadyInequality:
         base = self.system.pair.initial_gap
         moved = np.array([own.pair.initial_gap - base for own in self.system.interfaces])
         omega, solved, worn = begin[self.omega], None, np.zeros(self.n)
+        alone = LayerEvolution(Layers(self.n), self.wear, NO_CYCLE)  # nothing between the surfaces
         for length in STEPS:
             cycles = length * self.gap_scale / self.wear_scale
             try:
-                solved = contact.solve(moved + omega * self.gap_scale, solved, StepWear(self.wear, cycles))
+                wearing = LayerStep(alone, self.system.unworn(), cycles)
+                solved = contact.solve(moved + omega * self.gap_scale, solved, wearing)
             except ConvergenceError:
                 return self._newton(begin, None, near=False)
             worn = self.wear.opening(solved.pressure)[0] / self.wear_scale

@@ -130,7 +130,7 @@ def grid(side: int) -> Interface:
 
 @dataclass(frozen=True)
 class Wearing:
-    """What a step wears, as `fenwear.laws.wear.StepWear` has it."""
+    """What a step wears, as `fenwear.laws.LayerStep` has it."""
 
     def opening(self, pressure: Array) -> Array:
         """Return the depth."""

@@ -13,8 +13,8 @@ from fenwear import Tribosystem, assemble, jump, load_case, make_case, march, st
 from fenwear.case import Case, changed_case, dependence
 from fenwear.case.dependence import evaluate_law
 from fenwear.common.errors import CaseError, ConvergenceError
+from fenwear.laws import LayerStep
 from fenwear.laws.compliant_layer import RoughClosure
-from fenwear.laws.wear import StepWear
 from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import march_within
@@ -215,7 +215,7 @@ def test_threshold_and_cap(assembled: Assemble) -> None:
     p = np.resize(np.array([0.0, 4.0, 6.0, 15.0, 25.0]), (1, len(system.pair.x)))
     depths = 1e-8 * 100 * np.resize(np.array([0.0, 0.0, 1.0, 100.0, 225.0]), p.shape)
     np.testing.assert_allclose(wear.depth(p), depths, rtol=1e-12)
-    layer, change = StepWear(wear, 3.0), np.full_like(p, 1e-6)
+    layer, change = LayerStep(system.passing(wear), system.unworn(), 3.0), np.full_like(p, 1e-6)
     left, right = layer.border(p)
     derivative = np.einsum("knq,jqi,ji->kn", left, right, change)
     differences = (layer.opening(p + change) - layer.opening(p - change)) / 2

@@ -10,8 +10,9 @@ import pytest
 from fenwear import CaseError, Tribosystem, load_case
 from fenwear.case import Contact, Dependence, WearLaw
 from fenwear.common.arrays import Array
+from fenwear.laws import LayerStep
 from fenwear.laws.friction import ContactConditions, Friction
-from fenwear.laws.wear import StepWear, coefficient
+from fenwear.laws.wear import coefficient
 
 BOTH = (
     "geometry.parameters.elements_along_contact=8",
@@ -39,7 +40,7 @@ def test_depth(assembled: Callable[..., Tribosystem], b: float) -> None:
 def test_layer_and_its_border(assembled: Callable[..., Tribosystem]) -> None:
     """The layer opens the gap by N cycles' wear of both bodies; L_k R_j is its derivative (central differences)."""
     system = assembled("example1", *BOTH)
-    layer = StepWear(system.phases_wear, repeats=50)
+    layer = LayerStep(system.passing(system.phases_wear), system.unworn(), 50)
     shape = (len(system.motion.phases), len(system.pair.x))
     random = np.random.default_rng(1)
     p, change = random.uniform(1, 20, shape), random.uniform(-1, 1, shape)

@@ -11,7 +11,6 @@ import pytest
 from fenwear import Case, Tribosystem, assemble, jump, load_case, march
 from fenwear.common.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.laws.wear import StepWear
 from fenwear.steps import Block
 from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
@@ -46,7 +45,8 @@ def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> N
     contact = system.contact((1, -1))
     wear, state = np.zeros_like(system.pair.x), None
     for _ in range(2 * cycles):  # steps of half a cycle, as accurate as the shortest jump
-        wearing = StepWear(system.phases_wear, 0.5)
+        wearing = system.passing(system.phases_wear).step(system.unworn(), 0.5)
+        assert wearing is not None
         state = contact.solve(system.pair.initial_gap + wear, state, wearing)
         wear = wear + wearing.opening(state.pressure)[0]
     assert isinstance(state, ContactState)

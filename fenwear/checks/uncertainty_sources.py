@@ -325,7 +325,7 @@ def by_short_jumps(last: Block) -> Block:
 def _with_steps(last: Block, finer: RunState) -> Block:
     """Return a block whose last time steps are those of the cycle on other depths."""
     cycle = None if finer.memory is None else finer.memory.cycle
-    return last if cycle is None else replace(last, steps=(replace(last.steps[-1], records=cycle.records),))  # type: ignore[type-var]
+    return last if cycle is None else replace(last, steps=(replace(last.steps[-1], records=cycle.records),))
 
 
 def _with_pressures(last: Block, finer: RunState) -> Block:

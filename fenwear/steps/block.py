@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,7 +135,7 @@ class Block:
     between: Array = field(kw_only=True)
     crept: Array = field(kw_only=True)
     carried: Array = field(kw_only=True)
-    steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
+    steps: tuple[Any, ...] = field(default=(), kw_only=True)
     friction_ratio: tuple[Array, ...] = field(kw_only=True)
     sliding: tuple[SlidingTensor, ...] = field(default=(), kw_only=True)
 
@@ -221,26 +221,6 @@ class PhaseRecord:
     equilibrium: RigidEquilibrium | None = None
 
 
-class StepRecords(Protocol):
-    """The k time steps of a half-cycle of n contact nodes, of a law that resolves it in time."""
-
-    @property
-    def pressure(self) -> Array:
-        """At the end of each step (k, n), MPa."""
-
-    @property
-    def before(self) -> Array:
-        """The pressure a cycle ago (k, n), MPa; NaN where there was none."""
-
-    @property
-    def gap(self) -> Array:
-        """At the end of each step (k, n), mm."""
-
-    @property
-    def wear(self) -> WornDepths:
-        """Depths worn off both bodies in all steps."""
-
-
 class HalfCycle(NamedTuple):
     """One half-cycle that is to be recorded.
 
@@ -251,7 +231,7 @@ class HalfCycle(NamedTuple):
         totals: Of all half-cycles up to its end.
         heat: Of all its phases; None without heat.
         load: Factor of all loads.
-        steps: Of a law that resolves it in time; None where its phases are all there is.
+        steps: Of a law that resolves it in time, with pressures, those a cycle ago, and gaps (k, n); None of phases.
     """
 
     number: int
@@ -260,7 +240,7 @@ class HalfCycle(NamedTuple):
     totals: Totals
     heat: HalfCycleHeat | None
     load: float = 1.0
-    steps: StepRecords | None = None
+    steps: Any = None
 
 
 @dataclass

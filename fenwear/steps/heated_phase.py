@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.algebra.fixed_point import fixed_point
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.common.parallel import agreed
@@ -22,6 +23,10 @@ from fenwear.steps.block import HalfCycleHeat
 from fenwear.system import Tribosystem
 
 MAX_ITERATIONS = 200
+APART = (
+    'set heat.conducting = "nominal" or take more heat.steps: nodes open and close in turn, so that contact and heat '
+    "did not converge"
+)
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
 WORTH_IT = 12  # iterations with the same conductances after which a costly response of their own pays
 CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implicit iterations
@@ -82,31 +87,32 @@ class ThermalContact:
     def _implicit(
         self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
     ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
-        exchange, contact = self.exchange, start
-        mean = self.system.rigid.mean_pressure
-        relaxed = 1.0
-        pressure = start.pressure[0]
-        for iteration in range(1, MAX_ITERATIONS + 1):
-            conductance = exchange.conductance(pressure)
-            after, terms = exchange.half_cycle(temperature, self.phase, pressure, conductance)
+        exchange, contact, iterations = self.exchange, start, 0
+        closed = CLOSE * self.system.rigid.mean_pressure
+
+        def advance(pressure: Array) -> tuple[Array, tuple[HeatState, Array], bool]:
+            nonlocal contact, iterations
+            conductance, iterations = exchange.conductance(pressure), iterations + 1
+            after, terms = exchange.conduct(temperature, self.phase, pressure, conductance)
             response = self._respond(conductance)
-            exact = np.array_equal(response.conductance, conductance, equal_nan=True)
             free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
             contact = self._contact.solve(free, contact, wearing, response.gap[None, :, None, :])
-            change = contact.pressure[0] - pressure
-            if agreed(self.system.comm, bool(np.abs(change).max() < CLOSE * mean)):
-                return contact, after, self._heat(after, terms, iteration)
-            exact = exact and np.array_equal(exchange.conductance(contact.pressure[0]), conductance, equal_nan=True)
-            if agreed(self.system.comm, exact):
-                after = exchange.at(after.values + response.state @ change)
-                return contact, after, self._heat(after, terms + response.terms @ change, iteration)
-            if iteration > 20:  # nodes that open and close in turn: go half way
-                relaxed = 0.5
-            pressure = pressure + relaxed * change
-        raise ConvergenceError(
-            f"contact and heat did not converge in {MAX_ITERATIONS} iterations: nodes open and close in turn; "
-            'set heat.conducting = "nominal" or take more heat.steps'
+            others = response.conductance, exchange.conductance(contact.pressure[0])
+            exact = all(np.array_equal(other, conductance, equal_nan=True) for other in others)
+            if exact:
+                change = contact.pressure[0] - pressure
+                after, terms = exchange.at(after.values + response.state @ change), terms + response.terms @ change
+            return contact.pressure[0], (after, terms), exact
+
+        after, terms = fixed_point(
+            advance,
+            start.pressure[0],
+            lambda change, _: bool(np.abs(change).max() < closed),
+            APART,
+            team=self.system.team,
         )
+        exchange.check_bounds(temperature, after, float(terms[0] - terms[1]))
+        return contact, after, self._heat(after, terms, iterations)
 
     def _respond(self, conductance: Array) -> _Response:
         """Return the response for these conductances, or a near one where it is costly to make."""

@@ -265,15 +265,8 @@ class PartialSlipProblem:
             return advance(self.interface, at.contact, at.imposed, end, friction, position, near)
 
         flux = float((friction * at.contact.pressure).max()) * self.reach / step.duration
-        found = coupled_step(self.heat, solved, imposed.loaded, at, step, flux)
-        after = self._after(at, found.state, replace(imposed, loaded=found.loaded), step)
-        return replace(
-            after,
-            temperature=found.temperature,
-            heating=found.heating,
-            conductance=found.conductance,
-            coupling=found.iterations,
-        )
+        state, loaded, warm = coupled_step(self.heat, solved, imposed.loaded, at, step, flux)
+        return replace(self._after(at, state, replace(imposed, loaded=loaded), step), **warm)
 
     def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
         worn = self.interface.layers.flown(at.worn, state.flowed)

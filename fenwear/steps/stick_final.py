@@ -48,7 +48,6 @@ from fenwear.steps.run_totals import none_yet, stacked
 from fenwear.steps.steady_cycle import SteadyCycle, heat_of
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_edge import Edge, beside, stick_edges, zone_width
-from fenwear.steps.stick_heat import HeatHistory
 from fenwear.steps.stick_records import TimeStepRecords
 
 FAR = 1e3  # times the largest gap: never closes
@@ -194,8 +193,7 @@ def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None)
     before: Array = np.zeros((2, len(problem.weights)))
     for _ in range(MOST_TIMES):
         conductance = np.array([heat.exchange.conductance(pressure) for pressure in pressures])
-        course = HeatHistory(list(range(len(pressures))), np.zeros_like(pressures), conductance)
-        warm = heat.through(course).at_rest()
+        warm = heat.through(np.zeros_like(pressures), conductance).at_rest()
         found, now = _final_shape(problem.kept_at(heat, warm), stick), heat.surfaces(warm)
         if np.abs(now - before).max() <= SAME * max(float(np.abs(now).max()), 1e-300):
             return replace(found, temperature=now)

@@ -16,6 +16,7 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -33,7 +34,7 @@ from fenwear.heat.heat_exchange import TERMS, HeatExchange
 from fenwear.heat.passage import Passage
 from fenwear.heat.periodic_heat import JumpEnd
 from fenwear.heat.prepare import prepare_exchange
-from fenwear.heat.temperature import ReducedBasis
+from fenwear.heat.temperature import Functional, HeatState, ReducedBasis
 from fenwear.laws import conductance_of
 from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_position import LoadEffect
@@ -45,38 +46,12 @@ from fenwear.system import Bodies
 NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out
 
 
-@dataclass(frozen=True)
-class Expansion:
-    """Displacement of the contact by a body's reduced temperature: u = by_coordinates s + at_lift, along all axes, mm.
-
-    Attributes:
-        by_coordinates: (q, d, dim).
-        at_lift: (q, d).
-    """
-
-    by_coordinates: Array
-    at_lift: Array
-
-    def __call__(self, coordinates: Array) -> Array:
-        """Return the displacement (q, d), mm."""
-        return self.at_lift + self.by_coordinates @ coordinates
-
-
-@dataclass(frozen=True)
-class HeatedStep:
-    """Result of a time step: temperatures (dim,), terms of its balance (8,), mJ, and both surfaces (2, n), K."""
-
-    values: Array
-    terms: Array
-    surfaces: Array
-
-
 class StickHeat:
     """Temperatures of both bodies over the time steps of a cycle.
 
     Args:
         exchange: With a phase for each time step; takes heat in place of pressures.
-        expansions: Of the punch and of the strip.
+        expansions: Displacement of punch and strip by their temperatures, rows (q, d, dim), along all axes, mm.
         interface: The bodies in contact.
         stays: Whether the heated place stays under the punch; else it is the strip's material that carries it.
     """
@@ -84,7 +59,7 @@ class StickHeat:
     def __init__(
         self,
         exchange: HeatExchange,
-        expansions: tuple[Expansion, Expansion],
+        expansions: tuple[Functional, Functional],
         interface: StickInterface,
         *,
         stays: bool,
@@ -98,8 +73,8 @@ class StickHeat:
         """Return the temperatures at the start (dim,)."""
         return self.exchange.initial().values
 
-    def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> HeatedStep:
-        """Return what a time step leads to.
+    def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> tuple[HeatState, Array]:
+        """Return the temperatures at the end of a time step, and the terms of its balance (8,), mJ.
 
         Args:
             number: Of the time step in the cycle.
@@ -107,8 +82,7 @@ class StickHeat:
             heat: Of friction (n,), mW/mm².
             conductance: Of the nodes (n,).
         """
-        after, terms = self.exchange.conduct(self.exchange.at(temperature), number, heat, conductance)
-        return HeatedStep(after.values, terms, np.array(self.exchange.contact_temperatures(after, number)))
+        return self.exchange.conduct(self.exchange.at(temperature), number, heat, conductance)
 
     def check_bounds(self, before: Array, after: Array, terms: Array) -> None:
         """Hold what a half-cycle has stored against what can have entered: a step that slips little has no influence.
@@ -140,14 +114,17 @@ class StickHeat:
         """Return the contact temperatures of punch and strip (2, n), K."""
         return np.array(self.exchange.contact_temperatures(self.exchange.at(temperature)))
 
-    def through(self, course: HeatHistory) -> CycleMap:
-        """Return what a cycle of this heat makes of the temperatures at its start."""
+    def through(self, heats: Array, conductances: Array) -> CycleMap:
+        """Return what a cycle makes of the temperatures at its start.
+
+        Args:
+            heats: Of friction in each of its time steps (k, n), mW/mm².
+            conductances: Of the nodes (k, n), N/(mm s K).
+        """
         exchange, dim = self.exchange, sum(len(basis) for basis in self.exchange.bases)
         through: Array = np.eye(dim)
         source: Array = np.zeros(dim)
-        for k, number in enumerate(course.numbers):
-            heat: Array = course.heat[k]
-            conductance: Array = course.conductance[k]
+        for number, (heat, conductance) in enumerate(zip(heats, conductances, strict=True)):
             through, _ = exchange.change(number, conductance, changes=through)
             source = exchange.conduct(exchange.at(source), number, heat, conductance)[0].values
         return CycleMap(through, source)
@@ -183,15 +160,6 @@ class CycleMap:
         now = self.through @ after + self.source - after
         missing = after - before - cycles / 2 * (rate + now)
         return JumpEnd(self.through, cycles).state(missing, np.zeros_like(missing))
-
-
-@dataclass(frozen=True)
-class HeatHistory:
-    """The heat of a cycle: numbers of its k time steps, heat (k, n), mW/mm², conductance (k, n), N/(mm s K)."""
-
-    numbers: list[int]
-    heat: Array
-    conductance: Array
 
 
 def balance_error(terms: Array) -> float:
@@ -276,7 +244,7 @@ def heated_directly(exchange: HeatExchange) -> HeatExchange:
 
 def expansions(
     interface: StickInterface, exchange: HeatExchange, bodies: Bodies, initial: float
-) -> tuple[Expansion, Expansion]:
+) -> tuple[Functional, Functional]:
     """Return the thermal expansion of both bodies on the bases of their temperatures; collective."""
     found = []
     for elastic, patterns, basis in zip((bodies.punch, bodies.strip), interface.patterns, exchange.bases, strict=True):
@@ -285,7 +253,7 @@ def expansions(
         fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
         picked = free_expansion(elastic, basis.body, fields)
         at_patterns = np.einsum("qN,Ndk->qdk", patterns.T.toarray(), picked)
-        found.append(Expansion(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
+        found.append(Functional(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
     return found[0], found[1]
 
 
@@ -310,18 +278,6 @@ ENOUGH = 12  # iterations after which nodes that open and close no longer decide
 APART = "contact with stick and heat did not converge: expected more stick.steps, or less friction heat; tried"
 
 
-@dataclass(frozen=True)
-class CoupledStep:
-    """The contact at the end, loads with the expansion, temperatures (dim,), heat and conductance of the nodes (n,)."""
-
-    state: StickState
-    loaded: LoadEffect
-    temperature: Array
-    heating: Array
-    conductance: Array
-    iterations: int
-
-
 def coupled_step(
     heat: StickHeat,
     solved: Callable[[LoadEffect, tuple[Array, Array] | None], StickState],
@@ -329,8 +285,10 @@ def coupled_step(
     at: PartialSlipState,
     step: TimeStep,
     flux: float,
-) -> CoupledStep:
-    """Return contact and heat of a time step that belong together.
+) -> tuple[StickState, LoadEffect, dict[str, Any]]:
+    """Return contact and heat of a time step that belong together: state, loads with the expansion, and what is warm.
+
+    The last one by the names of `PartialSlipState`.
 
     Args:
         heat: Of both bodies.
@@ -356,7 +314,7 @@ def coupled_step(
         # Pressures that iterations have mixed are not zero where nodes are open: the last contact tells who conducts.
         conducting = last.closed if tries < ENOUGH else conducting
         made, pressure = np.split(x / units, 2)
-        warm = heat.step(at.next_step, at.temperature, made, conductance(pressure, conducting)).values
+        warm = heat.step(at.next_step, at.temperature, made, conductance(pressure, conducting))[0].values
         expanded = heat.expanded(loaded, warm, step.offset)
         last = solved(expanded, near)
         near, tries = (last.pressure, last.trial), tries + 1
@@ -368,5 +326,5 @@ def coupled_step(
 
     expanded = fixed_point(once, units * np.concatenate([at.heating, before.pressure]), close, APART)
     made, conducts = np.asarray(last.heat / step.duration), conductance(last.pressure, conducting)
-    warm = heat.step(at.next_step, at.temperature, made, conducts).values
-    return CoupledStep(last, expanded, warm, made, conducts, tries)
+    warm = heat.step(at.next_step, at.temperature, made, conducts)[0].values
+    return last, expanded, {"temperature": warm, "heating": made, "conductance": conducts, "coupling": tries}

@@ -35,7 +35,7 @@ from fenwear.steps.jump_method import FINE, HALVES, Attempt, Estimate, JumpLaw, 
 from fenwear.steps.stick_creep import opened_by_creep
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_frozen import Frozen
-from fenwear.steps.stick_heat import HeatHistory
+from fenwear.steps.stick_heat import CycleMap, StickHeat
 from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords
 from fenwear.steps.stick_state import NO_HEAT, PartialSlipState
 
@@ -151,13 +151,13 @@ def _cycle_after(
     led, heat, slid = _led_to(problem, at, worn, cycles), problem.heat, at.slid
     if heat is None:
         return _recorded(problem, led, slid, worn, number)
-    since, rate, steps = number - before.number, before.end.temperature - before.warm, len(problem.program.steps)
+    since, rate = number - before.number, before.end.temperature - before.warm
     if since <= 1:  # nothing is jumped over: the temperatures go to those after the cycle before
         return _recorded(problem, replace(led, temperature=before.warm + since * rate), slid, worn, number)
-    warm = heat.through(_course(before, steps)).after(before.warm, since)
+    warm = _through(heat, before).after(before.warm, since)
     for _ in range(MOST_HEATINGS):
         found = _recorded(problem, replace(led, temperature=warm), slid, worn, number)
-        over = heat.through(_course(found, steps))
+        over = _through(heat, found)
         again = over.after(before.warm, since)
         warmest = float(np.abs(heat.surfaces(again)).max())
         if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
@@ -182,11 +182,10 @@ def _recorded(
     return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, 0.0, first, end, warm=warm)
 
 
-def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
-    """Return the heat of a cycle's time steps."""
+def _through(heat: StickHeat, cycle: FrettingCycle) -> CycleMap:
+    """Return what the heat of a cycle, which begins with the first time step, makes of temperatures."""
     records = cycle.records
-    numbers = [(cycle.first_step + k) % steps for k in range(len(records))]
-    return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
+    return heat.through(records.dissipated / records.duration[:, None], records.conductance)
 
 
 @dataclass(frozen=True)

@@ -222,5 +222,5 @@ def _of_heat(heat: StickHeat | None, at: PartialSlipState, after: PartialSlipSta
     """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
     if heat is None:
         return NO_HEAT, np.zeros((2, 0)), NO_HEAT
-    made = heat.step(at.next_step, at.temperature, after.heating, after.conductance)
-    return made.terms, made.surfaces, after.conductance
+    warm, terms = heat.step(at.next_step, at.temperature, after.heating, after.conductance)
+    return terms, np.array(heat.exchange.contact_temperatures(warm, at.next_step)), after.conductance

@@ -25,7 +25,7 @@ from fenwear.laws.wear import WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
-from fenwear.steps.stick_losses import BARE, StepConditions, StepLosses
+from fenwear.steps.stick_losses import BARE, StepLosses
 from fenwear.steps.stick_position import LoadEffect, Position
 from fenwear.steps.stick_program import Program, TimeStep
 from fenwear.steps.stick_records import TimeStepRecords, record
@@ -71,15 +71,10 @@ class PartialSlipProblem:
         """Areas of the contact nodes (n,)."""
         return self.interface.middle.pair.weights
 
-    @cached_property
-    def conditions(self) -> StepConditions:
-        """Variables of laws in the time steps."""
-        return StepConditions(self.interface, self.program, self.laws, self.heat, self.wear.strip.wears)
-
-    @cached_property
+    @property
     def losses(self) -> StepLosses:
         """Wear of the time steps."""
-        return StepLosses(self.conditions, self.wear, self.coatings)
+        return StepLosses(self)
 
     def led(self, function: Callable[[], T]) -> T:
         """Call the function that continues from condensed bodies, on rank 0 for all; collective.
@@ -238,7 +233,7 @@ class PartialSlipProblem:
             conditions = laws.conditions(
                 position.pair,
                 pressure,
-                **self.conditions.at_start(at),
+                **self.losses.at_start(at),
                 states=layers.known(position.pair, at.worn, at.held),
                 debris=layers.facing(position.pair, at.worn),
                 touching=at.contact.pressure > 0,  # in the step before: nodes that open and close in turn end nowhere

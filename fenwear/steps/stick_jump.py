@@ -119,7 +119,7 @@ def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths,
                 break
         return replace(at, slid=slid - half)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    constant = not own.layers.memory.names and not own.creep.creeps and not problem.conditions.asks_cycle
+    constant = not own.layers.memory.names and not own.creep.creeps and not problem.losses.asks_cycle
     if program.half_cycles == 2 and constant and problem.heat is None:
         at, _ = problem.half_cycle(at)
         return replace(at, slid=2 * slid - at.slid)

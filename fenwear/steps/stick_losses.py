@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,48 +16,42 @@ from fenwear.common.arrays import Array
 from fenwear.laws import Evolution, LayerEvolution, Layers
 from fenwear.laws.coating import CoatedBody
 from fenwear.laws.friction import ContactConditions
-from fenwear.laws.local_laws import LocalLaws, LocalWear, phases_wear
+from fenwear.laws.local_laws import LocalWear, phases_wear
 from fenwear.laws.sliding_tensors import CycleShear, SlidingWays
 from fenwear.laws.wear import PhasesWear, WornDepths
-from fenwear.steps.stick_heat import StickHeat
-from fenwear.steps.stick_interface import OppositeBodies
-from fenwear.steps.stick_program import Program
 from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_state import PartialSlipState
 from fenwear.surfaces import ContactPair
+
+if TYPE_CHECKING:
+    from fenwear.steps.stick_cycle import PartialSlipProblem
 
 ALL = slice(None)  # time steps of a record
 BARE = CoatedBody(np.zeros(1), np.ones(1))  # without a coating
 
 
 @dataclass(frozen=True)
-class StepConditions:
-    """Values at each node in the time steps of a cycle.
+class StepLosses:
+    """Wear of the time steps of a cycle, and its effect on what lies between."""
 
-    Attributes:
-        interface: The bodies.
-        program: Of a cycle.
-        laws: Of friction and wear that change with the state of each node; None where they stay.
-        heat: Of friction; None without.
-        strip_wears: Whether the strip does.
-    """
+    problem: PartialSlipProblem
 
-    interface: OppositeBodies
-    program: Program
-    laws: LocalLaws | None
-    heat: StickHeat | None
-    strip_wears: bool
+    @property
+    def layers(self) -> Layers:
+        """The layers between the surfaces."""
+        return self.problem.interface.layers
 
     @property
     def asks_cycle(self) -> bool:
         """Whether a law depends on what a whole cycle does: its cross-shear, its mean pressure."""
-        return self.laws is not None and (self.laws.asks("cs") or self.laws.asks("pm"))
+        laws = self.problem.laws
+        return laws is not None and (laws.asks("cs") or laws.asks("pm"))
 
     def at_start(self, at: PartialSlipState) -> dict[str, Any]:
         """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
-        warm = None
-        if self.heat is not None and len(at.temperature):
-            punch, strip = self.heat.surfaces(at.temperature)
+        warm, heat = None, self.problem.heat
+        if heat is not None and len(at.temperature):
+            punch, strip = heat.surfaces(at.temperature)
             warm = punch, strip
         return {
             "temperatures": warm,
@@ -74,19 +68,22 @@ class StepConditions:
         """
         if not self.asks_cycle:
             return None
-        middle, mean, places = self.interface.middle, self.interface.middle.rigid.mean_pressure, self.program.steps
-        positions = [self.interface.position(step.offset) for step in places]
+        interface, middle = self.problem.interface, self.problem.interface.middle
+        positions, mean = (
+            [interface.position(step.offset) for step in self.problem.program.steps],
+            middle.rigid.mean_pressure,
+        )
         slips: Array = np.nan_to_num(at.slips)
         ways = np.array([position.slid(slips[k]) for k, position in enumerate(positions)])
         lengths = np.linalg.norm(ways, axis=2)
         directions = ways / np.where(lengths > 0, lengths, 1.0)[:, :, None]
-        pairs, wears = [position.pair for position in positions], self.strip_wears
+        pairs, wears = [position.pair for position in positions], self.problem.wear.strip.wears
         known = SlidingWays(pairs, middle.pair, lengths, directions, wears, mean, asked=True)
         return known.shear(np.where(np.isnan(at.pressures), mean, at.pressures))
 
     def of_steps(self, records: TimeStepRecords, before: PartialSlipState) -> list[ContactConditions]:
         """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
-        laws, known = self.laws, self.at_start(before)
+        laws, known = self.problem.laws, self.at_start(before)
         assert laws is not None
         lengths = records.slip_magnitude
         slid = before.slid + np.cumsum(lengths, axis=0)
@@ -101,7 +98,7 @@ class StepConditions:
                 temperatures=warm[k],
                 worn=before.worn,
                 slid=slid[k],
-                debris=self.interface.layers.facing(pair, before.worn),
+                debris=self.layers.facing(pair, before.worn),
                 cycle=known["cycle"],
             )
             for k, pair in enumerate(self.pairs(records, before))
@@ -109,29 +106,9 @@ class StepConditions:
 
     def pairs(self, records: TimeStepRecords, before: PartialSlipState) -> list[ContactPair]:
         """Return the surfaces opposite each other in steps that begin at a state."""
-        steps = self.program.steps
+        steps = self.problem.program.steps
         places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(records))]
-        return [self.interface.position(place).pair for place in places]
-
-
-@dataclass(frozen=True)
-class StepLosses:
-    """Wear of the time steps of a cycle, and its effect on what lies between.
-
-    Attributes:
-        conditions: Variables of laws in them.
-        wear: By local slip, where no law changes.
-        coatings: Of both bodies.
-    """
-
-    conditions: StepConditions
-    wear: LocalWear
-    coatings: tuple[CoatedBody, CoatedBody]
-
-    @property
-    def layers(self) -> Layers:
-        """The layers between the surfaces."""
-        return self.conditions.interface.layers
+        return [self.problem.interface.position(place).pair for place in places]
 
     def worn(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> WornDepths:
         """Return what time steps wear, and how the state of what lies between changes; arguments as of `over`."""
@@ -146,39 +123,39 @@ class StepLosses:
             begin: State in which the first of them begins.
             which: Time steps of the record; by default all.
         """
-        known, laws = self.conditions, self.conditions.laws
+        laws = self.problem.laws
         evolution, conditions = self.evolution(records, begin), list[ContactConditions]()
         if evolution is not None:
             conditions = evolution.through(self.layers.held(begin.worn))[0]
         elif laws is not None:
-            conditions = known.of_steps(records, begin)
+            conditions = self.of_steps(records, begin)
         chosen = range(len(records))[which]
-        conditions, pairs = conditions[which], known.pairs(records, begin)[which]
+        conditions, pairs = conditions[which], self.pairs(records, begin)[which]
         slid, durations = records.slip_magnitude[which], records.duration[which]
-        wears = [self.wear] * len(chosen) if laws is None else [laws.wear_at(one) for one in conditions]
+        wears = [self.problem.wear] * len(chosen) if laws is None else [laws.wear_at(one) for one in conditions]
         wear = self._wear(wears, slid, durations, pairs)
-        debris = self.layers.debris.over(slid, conditions, self.layers.places(pairs))
-        return LayerEvolution(self.layers, wear, debris, None if evolution is None else evolution.some(chosen))
+        evolution = None if evolution is None else evolution.some(chosen)
+        return LayerEvolution.over(self.layers, wear, slid, evolution, conditions)
 
     def _wear(
         self, wears: Sequence[LocalWear], slid: Array, durations: Array, pairs: Sequence[ContactPair]
     ) -> PhasesWear:
         """Return the wear of time steps by their laws, slips (k, n) and durations (k,)."""
         punch, strip = (law.slide(slid, durations[:, None]) for law in (wears[0].punch, wears[0].strip))
-        coatings = self.coatings[0].thickness, self.coatings[1].thickness
+        coatings = self.problem.coatings[0].thickness, self.problem.coatings[1].thickness
         return phases_wear(wears, (punch, strip), pairs, coatings)
 
     def evolution(self, records: TimeStepRecords, begin: PartialSlipState) -> Evolution | None:
         """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""
-        memory, laws = self.layers.memory, self.conditions.laws
+        memory, laws = self.layers.memory, self.problem.laws
         if not memory.names or laws is None:
             return None
-        pairs = self.conditions.pairs(records, begin)
+        pairs = self.pairs(records, begin)
 
         def wearing(k: int, at: ContactConditions) -> Array:
             own, wears = slice(k, k + 1), [laws.wear_at(at)]
             wear = self._wear(wears, records.slip_magnitude[own], records.duration[own], pairs[own])
             return np.asarray(wear.begun(begin.worn, 0.0).taken(at.pressure[None])[0] / records.duration[k])
 
-        conditions = self.conditions.of_steps(records, begin)
+        conditions = self.of_steps(records, begin)
         return Evolution(memory, conditions, records.duration, pairs, wearing, begin.worn.strip)

@@ -285,12 +285,13 @@ class _Jump(JumpLaw[_Moment]):
         It continues from the last one of the jump; but where not a whole cycle lies between them, from the last whole
         one, as all its parts do.
         """
-        now, start, whole, last = self._now, _slid_on(self._now, done, self._load), self._whole, self._middle
+        now, whole, last = self._now, self._whole, self._middle
         worn = _balanced(self.problem, now.worn, self.depths(end.worn))
         number = now.number + done
         cycles = max(1, int(number - whole.number)) - max(int(last.number - whole.number), int(last is not whole))
         after = last if cycles else whole
-        at = replace(after.end, slid=start.slid, load=start.load)
+        slid = now.end.slid + done * now.records.slip_magnitude.sum(axis=0)
+        at = replace(after.end, slid=slid, load=self._load(number))
         return _cycle_after(self.problem, whole, at, worn, number, max(cycles, 1))
 
 
@@ -329,9 +330,3 @@ def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths
         weights, changed, state = pair.weights, change.between, after.between.copy()
     state[1] += (worn - float(weights @ changed[:2].sum(axis=0))) / weights.sum()
     return layers.with_debris(after, state)
-
-
-def _slid_on(now: FrettingCycle, cycles: float, load: Callable[[float], float]) -> PartialSlipState:
-    """Return the end of a cycle under the load of so many later, as far as the slip of its nodes determines it."""
-    slid = now.end.slid + cycles * now.records.slip_magnitude.sum(axis=0)
-    return replace(now.end, load=load(now.number + cycles), slid=slid)

@@ -169,10 +169,6 @@ class Coulomb:
         ends = system.law_state.ends if same_steps(before, case) else None
         return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
 
-    def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could continue alone."""
-        return system.exchange.reduced
-
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
         return float(system.law_state.problem.interface.middle.elastic_length)

@@ -305,10 +305,6 @@ class GrossSliding:
         placed = place_case_bodies(case, bodies, sliding)
         return placed if placed.law == self.name else replace(placed, law=self.name)
 
-    def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could continue alone."""
-        return system.exchange.reduced
-
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
         return system.interface.elastic_length

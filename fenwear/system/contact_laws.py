@@ -76,9 +76,6 @@ class ContactLaw(Protocol):
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case of the same set-up and law, sharing what the change leaves; collective."""
 
-    def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could continue alone: no temperatures, no contact on all displacements."""
-
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa: the scale of gaps."""
 

@@ -111,7 +111,7 @@ class Tribosystem(ContactSetup):
     @property
     def replicated(self) -> bool:
         """Whether every rank could continue alone: no temperatures of all nodes, no contact on all displacements."""
-        return bool(self.contact_law.replicated(self))
+        return self.exchange.reduced
 
     def led(self, function: Callable[[], T]) -> T:
         """Call a function of prepared bodies, on rank 0 for all where possible, else on every rank; collective.

@@ -289,7 +289,7 @@ def export_worn(directory: Path, folder: Path | None = None, at: str = "last") -
             path
             for body, depth in depths.items()
             if getattr(case.wear, body) is not None
-            for path in _written(target / f"worn_{body}", case, surfaces[body], depth)
+            for path in _written(target / f"worn_{case.names.by_roles[body]}", case, surfaces[body], depth)
         ]
 
     return on_root(comm, write)

@@ -151,8 +151,8 @@ class FrettingCycle:
     def begin(self) -> PartialSlipState:
         """State in which its records begin."""
         slid = self.end.slid - self.records.slip_magnitude.sum(axis=0) / 2
-        known = {"next_step": self.first_step, "temperature": self.warm, "slid": slid}
-        return replace(self.end, worn=self.worn, held=None, **known)
+        at = replace(self.end, worn=self.worn, held=None, temperature=self.warm)
+        return replace(at, next_step=self.first_step, slid=slid)
 
 
 def record(

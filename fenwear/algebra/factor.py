@@ -2,8 +2,12 @@
 
 A factor that is spread over the ranks adds up what they send as it arrives, so that its last bits are
 others in every run. A matrix whose factor fits one rank is moved to one, its owner, and factored there,
-which is also faster for it; larger ones are spread. Factors of different owners are made at once, and
-solve at once.
+which is also faster for it. Other ranks make copies where it is to solve for many columns, of which each
+solves for a share: columns hardly gain by a factor that is spread. Larger matrices are spread. Factors of
+different owners are made at once, and solve at once.
+
+A matrix whose factor does not fit the memory is solved without one, by conjugate gradients on all ranks,
+preconditioned by algebraic multigrid (`Iterative`).
 
 Schur complements come from MUMPS, through the C functions of PETSc that petsc4py does not have:
 
@@ -17,7 +21,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -32,9 +36,12 @@ from fenwear.algebra.assembled import dense, destroy
 from fenwear.common.arrays import Array
 from fenwear.common.compat import petsc_library
 from fenwear.common.errors import ConvergenceError
-from fenwear.common.parallel import all_together
+from fenwear.common.parallel import SMALL, all_together, free_on_ranks
 
 SPREAD = 4 * 2**30  # bytes of a factor: larger ones are spread over the ranks
+WORKING = 1.3  # of a factor: what it is made in
+TOLERANCE, MOST = 1e-10, 1000  # of solutions without a factor: residual in the preconditioner's norm, iterations
+LONG = 2e10  # operations on columns, half a second, for which a copy of the factor pays
 
 
 def entries(size: int, dim: int) -> int:
@@ -43,6 +50,11 @@ def entries(size: int, dim: int) -> int:
     Nested dissection's growth (George 1973), with constants measured on elements of degree 2 to 4.
     """
     return int(5 * size * math.log2(max(size, 2)) if dim == 2 else 22 * size ** (4 / 3))
+
+
+def fits(size: int, dim: int, comm: MPI.Comm) -> bool:
+    """Return whether the factor of a symmetric matrix fits the memory that the ranks have together; collective."""
+    return 8 * WORKING * entries(size, dim) <= max(free_on_ranks(comm), SMALL)
 
 
 def operations(size: int, dim: int) -> float:
@@ -58,6 +70,7 @@ class Factor:
         is_moved: Whether the matrix is another one than that which was given.
         is_made: Whether it is computed.
         owner: The rank that has it, unless all share it.
+        copies: The ranks that have one, the owner first.
         has_schur: Whether it solves on the surface alone.
         schur: On its owner the Schur complement of the surface (m, m), where it was asked for; else None.
     """
@@ -71,6 +84,7 @@ class Factor:
         comm: MPI.Comm,
         dim: int,
         owner: int = 0,
+        copies: int = 1,
         surface: NDArray[np.int64] | None = None,
     ) -> None:
         """Move a matrix to those that are to hold its factor; collective.
@@ -82,6 +96,7 @@ class Factor:
             comm: Its ranks: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
             owner: The rank that has it, unless it is spread; a rank that has the whole matrix is the owner.
+            copies: Number of ranks from the owner on that make one, where it is not spread.
             surface: Rows whose Schur complement is kept (m,), by the owner alone.
         """
         self.comm, self._sizes = comm, matrix.getSizes()[0]
@@ -95,15 +110,21 @@ class Factor:
         self._surface = None if self.is_spread else surface
         self.has_schur = self._surface is not None
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
-        self._matrix: PETSc.Mat | None = _moved(matrix, self.owner, kind) if self.is_moved else matrix
+        self.copies = range(self.owner, self.owner + (1 if whole or self.is_spread or self.has_schur else copies))
+        self._matrix: PETSc.Mat | None = _moved(matrix, self.copies, kind) if self.is_moved else matrix
         self._solver: PETSc.Mat | None = None
         self.schur: Array | None = None
         self._schur_factor: Array | None = None
 
     @property
+    def is_owner(self) -> bool:
+        """Whether this rank is the owner."""
+        return self.comm.rank == self.owner
+
+    @property
     def answers(self) -> bool:
         """Whether this rank solves where all ask: its owner, or all that share it."""
-        return self.is_spread or self.comm.rank == self.owner
+        return self.is_spread or self.is_owner
 
     def compute(self) -> None:
         """Factor the matrix, on the ranks that have it; collective where it is spread.
@@ -134,7 +155,7 @@ class Factor:
         if self.is_spread or self.comm.size == 1:
             return right
         columns = right.shape[1]
-        whole: Array = np.empty((self._sizes[1] if self.answers else 0, columns))
+        whole: Array = np.empty((self._sizes[1] if self.is_owner else 0, columns))
         counts: Any = np.diff(self._rows) * columns
         self.comm.Gatherv(np.ascontiguousarray(right), (whole, counts), root=self.owner)
         return whole
@@ -156,7 +177,7 @@ class Factor:
         return solved(factor, right, self._sizes if self.is_spread else None)
 
     def solve_sparse(self, right: csr_array) -> Array:
-        """Return the solutions (n, k) for the rows of a sparse matrix (k, n), on a rank that has the factor.
+        """Return the solutions (n, k) for the rows of a sparse matrix (k, n), on a rank that has the factor or a copy.
 
         MUMPS leaves out what the zeros of a right-hand side do not reach.
         """
@@ -174,6 +195,11 @@ class Factor:
         destroy(columns, rows, found)
         return solution
 
+    def free_copies(self) -> None:
+        """Free the copies, whose work is done: the owner keeps its factor."""
+        if self.comm.rank in self.copies and not self.answers:
+            self.free()
+
     def solve_on_surface(self, right: Array) -> Array:
         """Return the surface's part of the solutions for right-hand sides there (m, k), on the owner alone."""
         if self._schur_factor is None:
@@ -190,6 +216,60 @@ class Factor:
             if one is not None:
                 one.destroy()
         self._solver = self._matrix = None
+
+
+class Iterative(Factor):
+    """What solves for few right-hand sides without a factor: conjugate gradients with PETSc's algebraic multigrid."""
+
+    is_spread, is_moved, has_schur, schur, owner, copies = True, False, False, None, 0, range(1)
+
+    def __init__(self, matrix: PETSc.Mat, prefix: str, *, comm: MPI.Comm, x: Array) -> None:
+        """Take the matrix.
+
+        Args:
+            matrix: Symmetric and positive definite, in blocks of the nodes' components.
+            prefix: Of PETSc's options.
+            comm: Its ranks.
+            x: This rank's nodes (n, d), for the rigid motions.
+        """
+        self.comm, self._prefix, self.is_made = comm, prefix, False
+        places = PETSc.Vec().createWithArray(np.ascontiguousarray(x).ravel(), bsize=x.shape[1], comm=matrix.comm)
+        modes = PETSc.NullSpace().createRigidBody(places)
+        matrix.setNearNullSpace(modes)
+        destroy(modes, places)
+        self._ksp = PETSc.KSP().create(matrix.comm)
+        self._ksp.setOptionsPrefix(prefix)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType("cg")
+        self._ksp.pc.setType("gamg")
+        self._ksp.setTolerances(rtol=TOLERANCE, max_it=MOST)
+        self._ksp.setFromOptions()
+
+    def compute(self) -> None:
+        """Make the preconditioner; collective."""
+        self.is_made = True
+        self._ksp.setUp()
+
+    def solve_here(self, right: Array) -> Array:
+        """Return the solutions of right-hand sides (owned, k); collective.
+
+        Raises:
+            ConvergenceError: the iteration does not converge.
+        """
+        before, after = self._ksp.getOperators()[0].createVecs()
+        found = np.empty_like(right)
+        for column, values in enumerate(right.T):
+            before.array[:] = values
+            self._ksp.solve(before, after)
+            if self._ksp.reason < 0:
+                raise without_factor(self._prefix, f"{self._ksp.its} iterations, reason {self._ksp.reason}")
+            found[:, column] = after.array_r
+        destroy(before, after)
+        return found
+
+    def free(self) -> None:
+        """Free its memory: it solves no more; collective."""
+        self._ksp.destroy()
 
 
 def factored(
@@ -283,9 +363,9 @@ def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[A
     ]
 
 
-def moved(matrix: PETSc.Mat, rank: int) -> PETSc.Mat | None:
-    """Return the whole of a distributed matrix on one rank; None on others; collective."""
-    here = matrix.comm.tompi4py().rank == rank
+def moved(matrix: PETSc.Mat, ranks: Container[int]) -> PETSc.Mat | None:
+    """Return the whole of a distributed matrix on some ranks; None on others; collective."""
+    here = matrix.comm.rank in ranks
     # General index sets: those of a stride give wrong values.
     rows, columns = (
         PETSc.IS().createGeneral(np.arange(size if here else 0, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
@@ -300,8 +380,8 @@ def moved(matrix: PETSc.Mat, rank: int) -> PETSc.Mat | None:
     return None
 
 
-def _moved(matrix: PETSc.Mat, rank: int, kind: str) -> PETSc.Mat | None:
-    whole = moved(matrix, rank)
+def _moved(matrix: PETSc.Mat, ranks: Container[int], kind: str) -> PETSc.Mat | None:
+    whole = moved(matrix, ranks)
     if whole is not None:
         whole.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
     return whole

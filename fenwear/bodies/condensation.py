@@ -19,12 +19,12 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fenwear.algebra.assembled import transposed_times
-from fenwear.algebra.factor import entries, make_together, operations, solve_together
+from fenwear.algebra.factor import LONG, WORKING, entries, make_together, operations, solve_together
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.response import Request, by_surface, respond_together
 from fenwear.common import disk_cache
 from fenwear.common.arrays import Array, Nodes
-from fenwear.common.parallel import total
+from fenwear.common.parallel import free_on_ranks, total
 
 BOUNDARY_SHARE = 1.0  # of the factor's operations that joining the ranks' boundaries may take
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
@@ -186,15 +186,29 @@ def _guided(one: Request, response: Array, by_temperature: Array | None) -> tupl
 
 
 def _eliminate(requests: Sequence[Request]) -> None:
-    """Factor each body on a rank of its own, or in substructures on all ranks, all at once; collective."""
+    """Factor each body on ranks of its own, or in substructures on all ranks, all at once; collective."""
     factors = []
-    for owner, one in enumerate(reversed(requests)):  # the first rank gets the last one
+    ranks = max(requests[0].elastic.body.mesh.comm.size // len(requests), 1)
+    for number, one in enumerate(reversed(requests)):  # the first ranks get the last one
         elastic = one.elastic
         surface = one.thermal_coupling is None and by_surface(elastic)  # temperatures act inside the body
         together = surface and elastic.body.mesh.comm.size > 1 and not elastic.setup.reproducible
         together = together and elastic.boundary.size**3 <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
-        factors.append(elastic.begin_factor(owner, with_surface=surface, together=together))
+        copies = 1 if surface or together else _copies(one, ranks, len(requests))
+        factors.append(elastic.begin_factor(number * ranks, copies, with_surface=surface, together=together))
     make_together([factor for factor in factors if not factor.is_made])
+
+
+def _copies(request: Request, ranks: int, bodies: int) -> int:
+    """Return how many ranks solve for the columns of a body, each with a factor of its own; collective.
+
+    Each has half a second of work, and all copies of all bodies take half of the memory that is free.
+    """
+    elastic = request.elastic
+    size = entries(elastic.size, elastic.dim)
+    worth = 4 * size * request.count // LONG
+    room = 0.5 * free_on_ranks(elastic.body.mesh.comm) // (bodies * 8 * (WORKING * size + elastic.matrix_entries()))
+    return int(max(min(ranks, worth, room), 1))
 
 
 def _symmetric(response: Array, along: Array) -> Array:

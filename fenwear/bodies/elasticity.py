@@ -19,7 +19,7 @@ from scipy.sparse import csr_array
 from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear.algebra.assembled import assembled, assembled_vector, compiled
-from fenwear.algebra.factor import Factor, make_together, solve_together
+from fenwear.algebra.factor import Factor, Iterative, fits, make_together, solve_together
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
 from fenwear.bodies.distributed_mesh import BodyMesh
 from fenwear.bodies.elastic_material import ElasticLaw, measure, strain_of
@@ -308,11 +308,14 @@ class ElasticBody:
             make_together([factor])
         return factor
 
-    def begin_factor(self, owner: int = 0, *, with_surface: bool = False, together: bool = False) -> Factor:
+    def begin_factor(
+        self, owner: int = 0, copies: int = 1, *, with_surface: bool = False, together: bool = False
+    ) -> Factor:
         """Return the factor of K, made or yet to be made; collective at first use.
 
         Args:
             owner: The rank that gets it at first use.
+            copies: Number of ranks from that one on that get it, too, where they solve for columns.
             with_surface: Whether it keeps the Schur complement of the surface's degrees of freedom.
             together: Whether every rank eliminates its own cells (see `substructure`).
         """
@@ -324,7 +327,13 @@ class ElasticBody:
                 return self._factors[0]
             kept, matrix = "stiffness" in self.__dict__, self.stiffness
             known = surface if with_surface else None
-            factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=known)
+            if self.operator == CONDENSED or fits(self.size, self.dim, comm):
+                factor = Factor(
+                    matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, copies=copies, surface=known
+                )
+            else:
+                nodes = self.space.tabulate_dof_coordinates()[: self.space.dofmap.index_map.size_local, : self.dim]
+                factor = Iterative(matrix, PREFIX, comm=comm, x=nodes)
             self._factors.append(factor)
             if not kept:  # all that needs it has it now
                 del self.stiffness

@@ -2,12 +2,13 @@
 
 Where the surface is small against the body, the Schur complement S of its degrees of freedom has all of
 the answer, (K^-1)_ss = S^-1. Else each column of forces is solved for: sparse right-hand sides, of which
-MUMPS leaves out what their zeros do not reach. Columns are solved for in blocks, the same on any ranks.
+MUMPS leaves out what their zeros do not reach. Columns are solved for in blocks, the same on any ranks: those
+that have a copy of the factor take turns.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -110,6 +111,8 @@ def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | N
     """
     answers = [_Answer(one) for one in requests]
     found = [answer.solve() for answer in answers]
+    for answer in answers:
+        answer.factor.free_copies()
     return [answer.shared(*one) for answer, one in zip(answers, found, strict=True)]
 
 
@@ -129,7 +132,7 @@ class _Answer:
         self._temperatures: NDArray[np.int64] = np.zeros(0, dtype=np.int64)  # first one of each rank
         if coupling is not None:
             self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
-            self._coupling = _rows(coupling if self.factor.is_spread else moved(coupling, self.factor.owner))
+            self._coupling = _rows(coupling if self.factor.is_spread else moved(coupling, self.factor.copies))
 
     def solve(self) -> tuple[Array, Array | None]:
         """Return the response and G^T times the solutions, on ranks with the factor; collective where it is spread.
@@ -138,16 +141,21 @@ class _Answer:
         """
         request = self.request
         response: Array = np.empty((request.patterns.shape[1], request.elastic.dim, request.count))
-        if not self.factor.answers:
-            return response, None
-        size, warm = request.count if self.factor.has_schur else BLOCK, None
-        for first in range(0, request.count, size):
-            columns = np.arange(first, min(first + size, request.count))
-            response[:, :, columns[0] : columns[-1] + 1], by_heat = self._solved(columns)
-            if by_heat is not None:
-                warm = np.empty((request.count, len(by_heat))) if warm is None else warm
-                warm[columns] = by_heat.T
+        warm = None
+        for some, rank in self._blocks():
+            if self.factor.is_spread or self.comm.rank == rank:
+                response[:, :, some], by_heat = self._solved(np.arange(some.start, some.stop))
+                if by_heat is not None:
+                    warm = np.empty((request.count, len(by_heat))) if warm is None else warm
+                    warm[some] = by_heat.T
         return response, warm
+
+    def _blocks(self) -> Iterator[tuple[slice, int]]:
+        """Yield the blocks of columns, and the rank that solves for each: those with a copy of the factor in turn."""
+        count, copies = self.request.count, self.factor.copies
+        size = count if self.factor.has_schur else BLOCK
+        for number, first in enumerate(range(0, count, size)):
+            yield slice(first, min(first + size, count)), copies[number % len(copies)]
 
     def _solved(self, columns: NDArray[np.int64]) -> tuple[Array, Array | None]:
         """Return the response to some columns and G^T times their solutions."""
@@ -177,15 +185,18 @@ class _Answer:
     def shared(self, response: Array, warm: Array | None) -> tuple[Array, Array | None]:
         """Return the response on every rank, and to each its part of that to temperature (q a, owned); collective."""
         if not self.factor.is_spread and self.comm.size > 1:  # where it is spread, equal to the last bit on all ranks
-            self.comm.Bcast(response, root=self.factor.owner)
             counts = np.diff(self._temperatures)
             own: Array = np.empty((self.request.count, counts[self.comm.rank] if len(counts) else 0))
-            for first in range(0, self.request.count if len(counts) else 0, BLOCK):
-                part = np.empty((own.shape[1], min(BLOCK, len(own) - first)))
-                sizes: Any = counts * part.shape[1]
-                sent = None if warm is None else (np.ascontiguousarray(warm[first : first + BLOCK].T), sizes)
-                self.comm.Scatterv(sent, part, root=self.factor.owner)
-                own[first : first + BLOCK] = part.T
+            for some, rank in self._blocks():
+                block = np.ascontiguousarray(response[:, :, some])
+                self.comm.Bcast(block, root=rank)
+                response[:, :, some] = block
+                if len(counts):
+                    part = np.empty((own.shape[1], some.stop - some.start))
+                    sizes: Any = counts * part.shape[1]
+                    sent = (np.ascontiguousarray(warm[some].T), sizes) if self.comm.rank == rank else None
+                    self.comm.Scatterv(sent, part, root=rank)
+                    own[some] = part.T
             warm = own if len(counts) else None
         return response, warm
 

@@ -94,6 +94,7 @@ class Substructures(Factor):
         """
         self._form, self._bcs, self._boundary, self._stays = form, bcs, boundary, surface
         self._prefix, self.comm, self.owner, self.is_made = prefix, comm, owner, False
+        self.copies = range(owner, owner + 1)
         self._inside: PETSc.Mat | None = None  # the factor of what lies inside
         self._local: Array = np.zeros((0, 0))  # right-hand sides that are being solved for
         self._places: list[Numbers] = []  # of each rank's boundary among all, on the owner
@@ -156,12 +157,12 @@ class Substructures(Factor):
 
     def solve_here(self, right: Array) -> Array:
         """Return the displacements of all boundaries, on the owner."""
-        return np.asarray(scipy.linalg.cho_solve((self._joint, True), right)) if self.answers else right
+        return np.asarray(scipy.linalg.cho_solve((self._joint, True), right)) if self.is_owner else right
 
     def scatter(self, found: Array, columns: int) -> Array:
         """Return this rank's part of solutions (owned, k); collective."""
         del columns
-        own = self.comm.scatter([found[at] for at in self._places] if self.answers else None, root=self.owner)
+        own = self.comm.scatter([found[at] for at in self._places] if self.is_owner else None, root=self.owner)
         self._local[self._boundary.local] += own - self._forces
         assert self._inside is not None
         return solved(self._inside, self._local)[: self._owned]

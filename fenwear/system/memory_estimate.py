@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fenwear.algebra.factor import entries
+from fenwear.algebra.factor import WORKING, entries
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.response import by_surface
 from fenwear.case import AUTO, CONDENSED
@@ -16,7 +16,6 @@ from fenwear.common.parallel import check_memory, memory_size
 from fenwear.system.both_bodies import Bodies
 
 NUMBER = 8  # bytes
-WORKING = 1.3  # of a factor: what it is made in
 DECIDES = f"'fine' where its contact is far enough from edges, else '{CONDENSED}', one solution for each of its nodes"
 NO_FACTOR = "nothing is factored"
 

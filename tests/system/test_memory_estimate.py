@@ -45,19 +45,41 @@ def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
         partial_slip_problem(load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=20"]))
 
 
+@pytest.mark.parametrize("way", ["spread", "copies"])
 @pytest.mark.mpi
-def test_a_factor_over_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A large factor is made over all ranks, with the same answer; one rank alone has nobody to share it with."""
+def test_a_factor_over_the_ranks(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A large factor is made over all ranks, and columns are dealt to ranks with copies: with the same answer."""
     strip = place_case(load_case("example1", COARSE)).bodies.strip
     normals = np.broadcast_to([0.0, 1.0], strip.surface.x.shape)
     expected = condense(strip, strip.surface.spread, normals)
     strip.free_factor()
-    monkeypatch.setattr(factor, "SPREAD", 0)
+    monkeypatch.setattr("fenwear.bodies.response.BLOCK", 8)
     monkeypatch.setattr("fenwear.bodies.condensation.by_surface", lambda _: False)
-    spread = condense(strip, strip.surface.spread, normals)
-    assert strip.factor.is_spread == (MPI.COMM_WORLD.size > 1)
-    for one, other in ((spread.response, expected.response), (spread.by_load, expected.by_load)):
+    monkeypatch.setattr("fenwear.bodies.condensation.BOUNDARY_SHARE", 0)
+    monkeypatch.setattr("fenwear.bodies.condensation.LONG", 1)
+    if way == "spread":
+        monkeypatch.setattr(factor, "SPREAD", 0)
+    found = condense(strip, strip.surface.spread, normals)
+    ranks = MPI.COMM_WORLD.size
+    assert strip.factor.is_spread == (ranks > 1 and way == "spread")
+    assert len(strip.factor.copies) == (1 if way == "spread" else ranks)
+    for one, other in ((found.response, expected.response), (found.by_load, expected.by_load)):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * np.abs(expected.response).max())
+
+
+@pytest.mark.mpi
+def test_solutions_without_a_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a factor does not fit the memory, iterations on all ranks give the same."""
+    strip = place_case(load_case("example1", COARSE)).bodies.strip
+    first, last = strip.stiffness.getOwnershipRange()
+    forces = np.sin(np.outer(np.arange(first, last), (1.0, 2.0)))
+    forces[strip.supported] = 0.0
+    expected = strip.solve(forces)
+    strip.free_factor()
+    strip.operator = "fine"
+    monkeypatch.setattr("fenwear.bodies.elasticity.fits", lambda *_: False)
+    np.testing.assert_allclose(strip.solve(forces), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert isinstance(strip.factor, factor.Iterative)
 
 
 def test_what_fits_and_what_does_not(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -107,8 +107,7 @@ def test_files_of_a_solid_have_its_surface(tmp_path: Path) -> None:
     assert (triangles["normal"][:, 2] < 0).all()  # the ball looks down
 
 
-@pytest.mark.parametrize("rough", [False, True])
-def test_a_grid_goes_on_from_its_files(tmp_path: Path, rough: bool) -> None:
+def test_a_grid_goes_on_from_its_files(tmp_path: Path) -> None:
     """On a contact grid, too, whatever mesh lies below it: a ball's own roundness is not in the file, its heights are.
 
     The grid ends within the meshed surface, and so does the file.
@@ -117,7 +116,7 @@ def test_a_grid_goes_on_from_its_files(tmp_path: Path, rough: bool) -> None:
     small = ("geometry.parameters.core_elements=0", "geometry.parameters.core=0", "geometry.parameters.across=3")
     heights = "punch.topography={rms='0.02 um', longest='0.4 mm'}"
     settings = (*small, *grid, "unset=wear.strip", "motion.positions=1", "run.integration='explicit'", *QUIET)
-    own = (*settings, heights) if rough else settings
+    own = (*settings, heights)
     whole = load_history(run("ball-on-flat", tmp_path / "whole", *own, "run.half_cycles=6"))
     export_worn(run("ball-on-flat", tmp_path / "first", *own, "run.half_cycles=4"), tmp_path / "surfaces")
     profile = f"punch.profile.file='{tmp_path}/surfaces/worn_punch.csv'"

@@ -176,7 +176,7 @@ def test_refused(run: Callable[..., Path], settings: tuple[str, ...], message: s
 def test_refused_without_memory(run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """What does not fit is said before it is tried."""
     folder = run(*BALL)
-    for module in ("bodies.mesh", "assembly.grids"):  # of the same run set up again
+    for module in ("bodies.distributed_mesh", "system.contact_grids"):  # of the same run set up again
         monkeypatch.setattr(f"fenwear.{module}.check_memory", lambda *_, **__: None)
     monkeypatch.setattr("fenwear.common.parallel.SMALL", 0)
     monkeypatch.setattr("fenwear.common.parallel.free_memory", lambda: 1e6)

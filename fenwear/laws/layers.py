@@ -49,7 +49,7 @@ RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
 PLASTIC = "plastic_depth"
 SOFT = 1.0  # softness beyond the hardness over that of the bodies
-MOST_FLOWS, CAPPED = 500, 1e-8  # iterations; pressure beyond the hardness, over it, that ends them
+MOST_FLOWS, CAPPED = 500, 1e-8  # iterations; pressure off the hardness, over it, that is rounding
 T = TypeVar("T")
 Regions = tuple[Mapping[str, Array], Mapping[str, Array]]
 
@@ -279,7 +279,7 @@ class Layers:
 
     def flowed(self, pressure: Array, gap: Array) -> Array:
         """Return what surfaces have flown (n,), mm, whose pressures were capped at the hardness, from the gap left."""
-        return np.where(pressure >= self.hardness, np.maximum(-gap, 0.0), 0.0)
+        return np.where(pressure >= (1 - CAPPED) * self.hardness, np.maximum(-gap, 0.0), 0.0)
 
     def flow(self, pressure: Array) -> Array:
         """Return by how much more the surfaces have to flow at pressures (m, n), mm."""

@@ -141,6 +141,7 @@ def base(name: str, changes: Mapping[str, Any]) -> Tables:
             "output.uncertainty": False,
             "output.figures_at": [],
             "output.fields_at": [],
+            "geometry.follow_wear": "never",
             **changes,
         },
     )
@@ -205,6 +206,7 @@ def plane(bodies: random.Random, dice: random.Random) -> Problem:
     unit = f"MPa^-{power:g}"
     changes = {
         "geometry.degree": bodies.choice([1, 2, 3]),
+        "geometry.follow_wear": bodies.choice(["never", 0.5]),
         "geometry.parameters.elements_along_contact": bodies.choice([4, 6]),
         "geometry.parameters.growth": 1.5,
         "contact.friction": dice.uniform(0.0, 0.3),

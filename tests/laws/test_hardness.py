@@ -10,7 +10,7 @@ from combinations import SMALL, STICK
 
 from fenwear import assemble, load_case, march
 from fenwear.common.errors import CaseError
-from fenwear.laws.layers import PLASTIC
+from fenwear.laws.layers import PLASTIC, Layers
 from fenwear.steps import Block, evolve
 
 LENGTHS = {
@@ -146,3 +146,10 @@ def test_a_curved_layer_with_stick() -> None:
     np.testing.assert_allclose(far.pressure, free.pressure, rtol=0, atol=1e-9 * largest)
     assert near.pressure.max() == pytest.approx(500, rel=1e-12)
     assert max(block.equilibrium_error.max() for block in (far, near)) < 1e-12
+
+
+def test_a_pressure_that_rounding_leaves_below_the_hardness_flows() -> None:
+    """The gap that is left where the pressure is the hardness: 1.5e-4 of a plastic depth was missing, by rounding."""
+    layers, hardness = Layers(3, hardness=40.0), 40.0
+    flowed = layers.flowed(hardness * np.array([1 - 2**-52, 0.99, 1.0]), np.array([-1e-6, -1e-6, 1e-6]))
+    np.testing.assert_array_equal(flowed, [1e-6, 0, 0])

@@ -29,7 +29,8 @@ PATH=$folder/venv/bin:$PATH XDG_CACHE_HOME=$folder/cache MPLCONFIGDIR=$folder/ca
 
 # Programs that fenwear works with, where pip installs them. The wheel of Tamaas 2.9 for Python 3.13 lacks its module.
 python3 -m pip --python "$folder/venv/bin/python" install --quiet --disable-pip-version-check \
-    umbridge openturns SurfaceTopography tamaas pytest hypothesis
+    umbridge openturns SurfaceTopography tamaas distributed pytest hypothesis
 PATH=$folder/venv/bin:$PATH XDG_CACHE_HOME=$folder/cache MPLCONFIGDIR=$folder/cache \
     "$folder/venv/bin/python" -m pytest --quiet -p no:cacheprovider "$checkout/tests/test_other_programs.py" \
-    "$checkout/tests/contact/test_grid_contact.py::test_pressures_are_those_of_tamaas"
+    "$checkout/tests/contact/test_grid_contact.py::test_pressures_are_those_of_tamaas" \
+    "$checkout/tests/studies/test_study.py::test_executors"

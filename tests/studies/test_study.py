@@ -126,7 +126,7 @@ def pool(_: Path) -> AbstractContextManager[Executor]:
 
 def dask(folder: Path) -> AbstractContextManager[Executor]:
     """Return the executor of a local cluster of dask."""
-    distributed = pytest.importorskip("distributed", reason="dask is in no image: one test is not worth its packages")
+    distributed = pytest.importorskip("distributed", reason="pip installs it: docker/fenwear test --wheel")
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=folder
     )

@@ -193,12 +193,6 @@ class RetardedCycle:
         since = self.durations.sum() - np.cumsum(self.durations)
         return np.asarray(np.exp(-since[:, None] / self.of.times) * self.taken / -np.expm1(-self.cycles))
 
-    @cached_property
-    def repeating(self) -> Array:
-        """Final creep from each v_i after each phase of cycles that repeat (phases, i)."""
-        found = self._kept[:, None] * self.lasting + self._given
-        return np.asarray(found @ self.of.compliances)
-
     def within(self, cycles: float) -> tuple[Array, Array]:
         """Return what adds by creep after each phase of the cycle whose middle an implicit step of so many ends in.
 

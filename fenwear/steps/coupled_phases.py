@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from fenwear.system import Tribosystem, heating_friction, with_reduced_heat
 FLAT = 1e-9  # mm: depths below it count as none
 MANY, LARGE = 300, 4000  # contact nodes, and pressures of all phases, above which heat is lagged
 SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns is not small
-EDGES, EDGES_AT_REST = 2, 20  # times that contact is solved for its own edges in a step, and in the steady state
+EDGES = 2  # times that contact is solved for its own edges in a step
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
     'set heat.conducting = "nominal", or use weaker dependences: contact, the conducting nodes and the coefficients '
@@ -194,8 +193,6 @@ class Coupled:
         start: ContactState,
         solve: SolveContact,
         passing: DepthEvolution | None = None,
-        *,
-        lagged: bool = False,
     ) -> Solved:
         """Return contact, and temperature at the start of its cycle, `cycles` cycles on in one implicit step.
 
@@ -208,19 +205,17 @@ class Coupled:
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
             passing: Depths from the pressures, where coefficients depend on depth or distance.
-            lagged: Whether contact of many nodes is solved at the heat of pressures that are known, again and again:
-                the factor without heat serves all of them, where one with heat is of all phases together.
 
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         self.held = None
         if self.system.edges is None:
-            return self._at_edges(temperature, cycles, start, solve, passing, lagged=lagged)
+            return self._at_edges(temperature, cycles, start, solve, passing)
         # Of the contact that was found before: nodes that open and close as edges move would never come to an end.
-        for _ in range(EDGES if passing is not None else EDGES_AT_REST):
+        for _ in range(EDGES):
             self._touching = start.pressure > 0
-            found = self._at_edges(temperature, cycles, start, solve, passing, lagged=lagged)
+            found = self._at_edges(temperature, cycles, start, solve, passing)
             start = found.contact
             if np.array_equal(start.pressure > 0, self._touching):
                 break
@@ -233,16 +228,14 @@ class Coupled:
         start: ContactState,
         solve: SolveContact,
         passing: DepthEvolution | None,
-        *,
-        lagged: bool,
     ) -> Solved:
         """Return what `solve` does, at edges of the contact that are known."""
         try:
-            return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
+            return self._solve(temperature, cycles, start, solve, passing, touching)
         except ConvergenceError:
             if not self.heat.dim:
                 raise
-        found = self._solve(temperature, cycles, start, solve, passing, _grazing, lagged=lagged)
+        found = self._solve(temperature, cycles, start, solve, passing, _grazing)
         self.system.remedies.note(GRAZING)
         return found
 
@@ -254,16 +247,14 @@ class Coupled:
         solve: SolveContact,
         passing: DepthEvolution | None,
         conducting: Callable[[NDArray[Any]], Array],
-        *,
-        lagged: bool,
     ) -> Solved:
         """Return the solution where nodes of these pressures conduct."""
         heat, constant, shape, contact = self.heat, self.system.constant_coefficients, start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
         # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
         depths = [] if passing is None else [passing.before.punch, passing.before.strip]
-        debris, first = partial(self._first_debris, start.pressure, passing), heat.conductances(start.pressure)
-        parts = self._parts(start.pressure, temperature, first, depths, debris)
+        lain = [self.system.layers.lies(passing.before)] if passing is not None and self._felt else []
+        parts = self._parts(start.pressure, temperature, heat.conductances(start.pressure), depths + lain)
         unknowns = _Unknowns.like(parts, pressure_scale(self.system, start.pressure), warm=self._warm)
 
         def advance(x: Array) -> tuple[Array, Solved, bool]:
@@ -281,30 +272,29 @@ class Coupled:
             if known is None or known[0] != key:
                 known = (key, heat.jump(temperature, cycles, conductances))
             end = known[1]
-            contact = self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling(self.mu), contact)
+            contact = self._in_step(end, contact, solve)
             state = end.state(self.mu * contact.pressure)
             same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
             worn_off = [] if passing is None else passing.depths(contact.pressure)
-            debris = partial(self._debris, contact.pressure, passing)
-            parts = self._parts(contact.pressure, state, conductances, worn_off, debris)
+            lying = [self._debris(contact.pressure, passing)] if passing is not None and self._felt else []
+            parts = self._parts(contact.pressure, state, conductances, worn_off + lying)
             return unknowns.joined(parts), Solved(contact, state, conductances), same and constant
 
         return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=self.system.team)
 
-    def _parts(
-        self, pressure: Array, state: Array, conductances: Array, depths: list[Array], debris: Callable[[], Array]
-    ) -> list[Array]:
+    def _parts(self, pressure: Array, state: Array, conductances: Array, depths: list[Array]) -> list[Array]:
         """Return the unknowns: pressures, and where coefficients depend on them temperatures, depths and debris."""
         parts: list[Array] = [pressure.ravel()]
         if self._warm:
             parts.append(self.surfaces(state, pressure, conductances).ravel())
-        parts += depths
-        if self._felt:
-            parts.append(debris())
-        return parts
+        return parts + depths
 
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
-        """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""
+        """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap.
+
+        Contact of many nodes is solved at the heat of pressures that are known, again and again: the factor without
+        heat serves all of them, where one with heat is of all phases together.
+        """
         shape = start.pressure.shape
         few = shape[1] <= MANY and shape[0] * shape[1] <= LARGE
         if few or not self.heat.dim:
@@ -335,22 +325,11 @@ class Coupled:
         """Return the temperatures (dim,) before, between and after the phases; arguments as of `CycleHeat.states`."""
         return self.heat.states(state, self.mu * pressure, conductances)
 
-    def _first_debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
-        """Return the thickness of the debris that is looked for from: what there was before, or would be in the end."""
-        if passing is not None:
-            return self.system.layers.lies(passing.before)
-        resting = self.system.passing(self.system.phases_wear).resting(pressure)
-        return resting if np.isfinite(resting).all() else np.zeros(pressure.shape[1])
-
-    def _debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
-        """Return the thickness of the debris at the end of a step, or in the end, at the conditions last taken."""
+    def _debris(self, pressure: Array, passing: DepthEvolution) -> Array:
+        """Return the thickness of the debris at the end of a step, at the conditions last taken."""
         assert self._passing is not None
-        if passing is None:
-            return self._passing.resting(pressure)
-        return (
-            self.system.layers.lies(passing.before)
-            + passing.cycles * self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
-        )
+        added = self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
+        return self.system.layers.lies(passing.before) + passing.cycles * added
 
     def _update(
         self,
@@ -391,11 +370,9 @@ class Coupled:
             self.mu = np.array([heating_friction(system, mu, phase) for phase, mu in enumerate(friction)])
 
     def _remembering(self, evolution: Evolution, passing: DepthEvolution | None) -> Sequence[ContactConditions]:
-        """Return the conditions of the phases with the states of laws: at the end of a step, or at rest."""
-        layers = self.system.layers
+        """Return the conditions of the phases with the states of laws at the end of a step."""
         if passing is None:
-            self.held = evolution.rest(self.held or layers.held(self.system.unworn()))
-            return evolution.through(self.held)[0]
-        before = layers.held(passing.before)
+            return evolution.conditions
+        before = self.system.layers.held(passing.before)
         self.held = evolution.implicit(before, passing.cycles)
         return evolution.around(self.held, (self.held - before).times(1 / passing.cycles))

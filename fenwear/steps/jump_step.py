@@ -59,7 +59,7 @@ class _Rate:
 
 
 @dataclass(frozen=True)
-class _Moment(Moment):
+class JumpMoment(Moment):
     """Depths, temperatures (dim,) and totals, and of the stage that they are the end of, its rate."""
 
     temperature: Array
@@ -67,15 +67,22 @@ class _Moment(Moment):
     rate: _Rate | None = None
 
 
-class Stepper(JumpLaw[_Moment]):
+class Stepper(JumpLaw[JumpMoment]):
     """Implicit steps of any number of cycles."""
 
     def __init__(
-        self, system: Tribosystem, tolerance: float, watch: Watch = unwatched, loading: Loading = as_given
+        self,
+        system: Tribosystem,
+        tolerance: float,
+        watch: Watch = unwatched,
+        loading: Loading = as_given,
+        *,
+        periodic: bool = False,
     ) -> None:
         self.system = system = with_reduced_heat(system)
         check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
+        self.periodic = periodic  # whether temperatures are those that repeat, at the end of a stage
         self._sizes = Sizes(system.layers, system.pair, system.creep.depth)
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
@@ -95,22 +102,22 @@ class Stepper(JumpLaw[_Moment]):
         by_friction = any(law.energy for law in system.sliding.wear)
         self._wear_follows = follows or (self._follows and by_friction)
 
-    def attempt(self, state: RunState, cycles: int) -> tuple[Attempt[_Moment], Estimate, list[HalfCycle]]:
+    def attempt(self, state: RunState, cycles: int) -> tuple[Attempt[JumpMoment], Estimate, list[HalfCycle]]:
         """Return a jump, an estimate of its error, and the last cycle.
 
         Raises:
             ConvergenceError: it did not converge.
         """
         self._begin = state
-        made = attempt(self, self._moment(state), cycles)
+        made = attempt(self, self.moment(state), cycles)
         return made, self._estimate(made), self._last_cycle
 
-    def state(self, moment: _Moment, half_cycle: int) -> RunState:
+    def state(self, moment: JumpMoment, half_cycle: int) -> RunState:
         """Return the state of a run at a moment."""
         contacts = parted(moment.contact)
         return RunState(half_cycle, moment.worn, contacts, self._temperature(moment.temperature), moment.totals)
 
-    def finer(self, made: Attempt[_Moment] | None, end: RunState) -> RunState:
+    def finer(self, made: Attempt[JumpMoment] | None, end: RunState) -> RunState:
         """Return where jumps of next to no length lead, from where they had led before the last attempt.
 
         Args:
@@ -119,21 +126,21 @@ class Stepper(JumpLaw[_Moment]):
         """
         fine = self._begin.finer
         assert fine is not None
-        before = self._moment(fine)
+        before = self.moment(fine)
         if made is None:
-            moment = self.apart(self._moment(end), before, self._moment(self._begin), 1.0)
+            moment = self.apart(self.moment(end), before, self.moment(self._begin), 1.0)
         else:
             moment = made.finer(self, made.begin if fine.worn is self._begin.worn else before)
         return self.state(moment, end.half_cycle)
 
-    def apart(self, base: _Moment, one: _Moment, other: _Moment, share: float) -> _Moment:
+    def apart(self, base: JumpMoment, one: JumpMoment, other: JumpMoment, share: float) -> JumpMoment:
         """Return a moment, and a share of the difference of two others."""
         contact = base.contact
         if len(contact.pressure) and len(one.contact.pressure) and len(other.contact.pressure):
             pressure = contact.pressure + share * (one.contact.pressure - other.contact.pressure)
             rigid = contact.rigid + share * (one.contact.rigid - other.contact.rigid)
             contact = replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
-        return _Moment(
+        return JumpMoment(
             self.system.layers.settled(base.worn + (one.worn - other.worn).times(share)),
             contact,
             base.time,
@@ -141,14 +148,14 @@ class Stepper(JumpLaw[_Moment]):
             base.totals + (one.totals - other.totals).times(share),
         )
 
-    def _estimate(self, made: Attempt[_Moment]) -> Estimate:
+    def _estimate(self, made: Attempt[JumpMoment]) -> Estimate:
         """Return the error of a jump."""
         worn, wrong = (made.begin.worn, made.end.worn), (made.whole.worn - made.end.worn).times(HALVES)
         estimate = self._sizes.estimate(worn, made, [wrong], HALVES * self._heat_difference(made))
         missed = self._missed(made) if self._wear_follows else 0.0
         return replace(estimate, depth=max(estimate.depth, self._through_difference(made), missed))
 
-    def _through_difference(self, made: Attempt[_Moment]) -> float:
+    def _through_difference(self, made: Attempt[JumpMoment]) -> float:
         """Return the largest difference of depths where coatings end, over the largest that the jump wears.
 
         Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
@@ -161,7 +168,7 @@ class Stepper(JumpLaw[_Moment]):
             found = max(found, apart / max(float((other - first).max()), 1e-300))
         return found
 
-    def _heat_difference(self, made: Attempt[_Moment]) -> float:
+    def _heat_difference(self, made: Attempt[JumpMoment]) -> float:
         """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
         exchange = self.system.exchange
         states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.own(None))
@@ -170,7 +177,7 @@ class Stepper(JumpLaw[_Moment]):
         apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
         return apart / max(rise, 1e-300)
 
-    def _missed(self, made: Attempt[_Moment]) -> float:
+    def _missed(self, made: Attempt[JumpMoment]) -> float:
         """Return the error of what a jump wears where coefficients change with depth or distance, relative.
 
         Its stages do not look at its begin: a coating that is worn through before the first of them would be missed.
@@ -187,7 +194,7 @@ class Stepper(JumpLaw[_Moment]):
         worn = replace(made.end.worn - made.begin.worn, between=NOTHING, carried=NOTHING)
         return self._sizes.area(simpson - worn) / max(self._sizes.area(worn), 1e-300)
 
-    def _rate(self, state: _Moment, half_cycles: float) -> WornDepths:
+    def _rate(self, state: JumpMoment, half_cycles: float) -> WornDepths:
         """Return what a cycle wears at the depths, temperatures and pressures of a moment."""
         system, exchange = self.system, self.coupled.heat.exchange
         pressures = state.contact.pressure
@@ -205,19 +212,20 @@ class Stepper(JumpLaw[_Moment]):
         if isinstance(self.contact, CondensedContact) and self.system.layers.hardness == np.inf:
             self.contact.inequality.close = share * min(self.tolerance, LOOSEST)
 
-    def _moment(self, state: RunState) -> _Moment:
+    def moment(self, state: RunState) -> JumpMoment:
+        """Return the moment of a state of a run."""
         temperature = self.coupled.heat.exchange.own(state.temperature).values
-        return _Moment(state.worn, all_phases(state.contacts), 0.0, temperature, state.totals)
+        return JumpMoment(state.worn, all_phases(state.contacts), 0.0, temperature, state.totals)
 
     def _temperature(self, values: Array) -> HeatState | None:
         """Return the temperatures of coordinates (dim,); None of none."""
         return self.coupled.heat.exchange.at(values) if len(values) else None
 
-    def settled(self, end: _Moment) -> _Moment:
+    def settled(self, end: JumpMoment) -> JumpMoment:
         """Return the end of a step, which may have overshot."""
         return replace(end, worn=self.system.layers.settled(end.worn))
 
-    def after(self, before: _Moment, stage: _Moment, cycles: float) -> _Moment:
+    def after(self, before: JumpMoment, stage: JumpMoment, cycles: float) -> JumpMoment:
         """Return the moment so many cycles as that of a stage later."""
         rate, contact = stage.rate, stage.contact
         assert rate is not None
@@ -226,7 +234,7 @@ class Stepper(JumpLaw[_Moment]):
             own = rate.wear.begun(before.worn, cycles).worn(contact.pressure).times(cycles)
             lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
         temperature = before.temperature + cycles * rate.heated
-        return _Moment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
+        return JumpMoment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
 
     def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
         """Return how depths follow in a stage where coefficients depend on them."""
@@ -244,7 +252,7 @@ class Stepper(JumpLaw[_Moment]):
             self._load = self.loading(self._done)
             self.contact.press(self._load)
 
-    def stage(self, before: _Moment, cycles: float, time: float, near: ContactState, digits: float) -> _Moment:
+    def stage(self, before: JumpMoment, cycles: float, time: float, near: ContactState, digits: float) -> JumpMoment:
         """Return the moment `cycles` cycles later, by the cycle whose middle it is.
 
         Plastic flow is no rate: all of it is there after as many cycles.
@@ -256,20 +264,21 @@ class Stepper(JumpLaw[_Moment]):
             near = self._solve(gap, self._of_first_phase(gap), (before.worn, cycles))
         solved = self.coupled.solve(
             before.temperature,
-            cycles - 0.5,
+            np.inf if self.periodic else cycles - 0.5,
             near,
             lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
             self._passing(before.worn, cycles),
-            lagged=True,
         )
         contact, begin = solved.contact, solved.temperature
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
+        if self.periodic:
+            before, heated = replace(before, temperature=begin), 0 * begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
         passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed * (1 / cycles))
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
         rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
-        return self.after(before, _Moment(worn, contact, time, begin, before.totals, rate), cycles)
+        return self.after(before, JumpMoment(worn, contact, time, begin, before.totals, rate), cycles)
 
     def _of_first_phase(self, gap: Array) -> ContactState | None:
         """Return the contact of the first phase alone, in every phase; None where all are found by factors at once.
@@ -320,7 +329,7 @@ class Stepper(JumpLaw[_Moment]):
         """Return what each phase of a cycle adds at its pressure (m, n)."""
         return [meter(pressure[k, :], self._mu[k], self.wear.some([k])) for k, meter in enumerate(self._meters)]
 
-    def ended(self, end: _Moment, cycles: float) -> None:
+    def ended(self, end: JumpMoment, cycles: float) -> None:
         """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""
         motion, found = self.system.motion, []
         reached = self._begin.half_cycle + round(cycles) * motion.half_cycles
@@ -353,7 +362,7 @@ class Stepper(JumpLaw[_Moment]):
         passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
         return passing.worn(pressures, now)
 
-    def _last_cycle_heat(self, end: _Moment) -> list[HalfCycleHeat | None]:
+    def _last_cycle_heat(self, end: JumpMoment) -> list[HalfCycleHeat | None]:
         """Return the heat of the cycle that ends a jump."""
         assert end.rate is not None
         if not self.coupled.heat.dim:

@@ -1,18 +1,20 @@
-"""The cyclic steady state in one inequality, without any time stepping.
+"""The cyclic steady state: the end of implicit steps of ever so many cycles, each one inequality.
 
-At the end the wear of a cycle is a rigid motion of the punch, H lambda, and the shape omega (worn
-depth, initial gap and the rigid motion of the first phase together) no longer changes:
+At the end the wear of a cycle is a rigid motion of the punch, H lambda, and the shape no longer changes but for it:
 
-    gap_k = S_k p_k + H a_k + omega + g_load >= 0,  p_k >= 0,  p_k gap_k = 0     for each phase,
-    beta~ (sum of S_k p_k^b) - H lambda >= 0,  omega <= a bound far above any elastic gap,
+    gap_k = S_k p_k + H a_k + omega >= 0,  p_k >= 0,  p_k gap_k = 0     for each phase,
+    beta~ (sum of S_k p_k^b) - H lambda >= 0,
 
-with the equilibrium of each phase; a of the first phase is zero by the choice of omega. Where the
-wear outruns the rigid motion for ever the surface opens without limit: there omega is at its bound.
+with the equilibrium of each phase. Where the motion outruns the wear for ever the surface opens without limit.
+
+It is the root of what cycles do to the state y, up to that motion, and found by the stages of a jump, z = y + N M(z),
+of N cycles each (`jump_step`): implicit Euler's steps with ever the same length, FAR over the rate of running in. What
+is left of the way to the end falls by about that factor in each of them (pseudo-transient continuation, C. T. Kelley,
+D. E. Keyes, SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states come to their ends within such a step.
 
 Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
-position touches it: there is no state that repeats. Debris that a strip carries to and fro, which does not wear itself,
-comes to rest on it: t (p), what a cycle feeds times its life, fills gap_k as it lies under the punch in position k.
+position touches it: there is no state that repeats.
 
 Where properties of materials depend on the temperature, state and bodies follow each other; see
 `fenwear.steps.temperature_properties`.
@@ -22,6 +24,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -32,18 +35,18 @@ from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 from fenwear.case.body_names import told_by_name
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, ConvergenceError
-from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.temperature import HeatState
-from fenwear.laws.wear import STIFF
+from fenwear.laws.wear import STIFF, WornDepths
 from fenwear.steps.block import Block
-from fenwear.steps.coupled_phases import Coupled, Solved, check_cycle_memory, end_temperatures
+from fenwear.steps.coupled_phases import end_temperatures
 from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.jump_method import FINE
+from fenwear.steps.jump_step import JumpMoment, Stepper
 from fenwear.steps.program_stages import at_step
 from fenwear.steps.run_state import RunState, beginning, pressure_scale
-from fenwear.steps.steady_inequality import OPEN, SteadyInequality, check_heat_memory, rigid_of_phases
 from fenwear.steps.temperature_properties import with_own_properties
 from fenwear.system import (
     Tribosystem,
@@ -51,8 +54,14 @@ from fenwear.system import (
     with_reduced_heat,
 )
 
+# Lengths of steps over the elastic gap of the mean pressure by its wear of a cycle; from afar they grow.
+FAR = 1e3
+NEAR = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+MOST, RESTING = 12, 1e-8  # steps that far; change of the shape in one over the elastic gap, that ends them
+DIGITS = 1e-9  # of contacts and heat
+APART = 1e-9  # of gaps by rigid motions: what is rounding
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
-ZERO = 1e-12  # of the largest: a velocity, or a pressure of a node that never touches, that is rounding
+ZERO = 1e-12  # of the largest: a velocity that is rounding
 JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
 BESIDE = 0.05  # of the cycles: how far the last two ends are apart between which they are interpolated
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
@@ -190,21 +199,42 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
     system.team.lead(lambda: _check_exists(system))
     prepared = system.team.serve(with_reduced_heat(system))  # as which a state of one rank names its bodies
     _check_sinks(prepared)
-    check_heat_memory(system)
-    check_cycle_memory(prepared)
+    end = _End(prepared)
 
     def found() -> SteadyState:
-        problem = SteadyInequality(prepared)
         try:
-            return _result(problem, *_solve(problem))
+            return end.found()
         except ConvergenceError as error:
-            if float(problem.wear.opening(np.full((problem.m, problem.n), problem.p_scale)).max()) == 0:
-                raise ConvergenceError(NOTHING_WEARS) from error
-            if _loads_oppose(prepared):
-                raise ConvergenceError(NO_ONE_MOTION) from error
-            raise
+            raise ConvergenceError(_why_none(prepared, error)) from error
 
     return replace(prepared.team.lead(found), system=system)
+
+
+def _why_none(system: Tribosystem, error: ConvergenceError) -> str:
+    """Return why there is no state, as far as it is known.
+
+    Raises:
+        ConvergenceError: states of laws have no end.
+    """
+    wear, shape = system.phases_wear, (len(system.motion.phases), len(system.pair.weights))
+    if float(wear.opening(np.full(shape, system.interface.pressure_scale)).max()) == 0:
+        return NOTHING_WEARS
+    system.rested([system.conditions(phase) for phase in range(len(system.motion.phases))])  # or tells what goes on
+    if _loads_oppose(system):
+        return NO_ONE_MOTION
+    if wear.cap < np.inf:
+        return _none_under_cap(system)
+    if system.layers.debris.present:  # it presses most where it is thickest, and comes from where it presses
+        return (
+            f"{error}; where much debris lies between, there may be several states, or none that is stable. Follow "
+            "it by `run`, or give the debris a shorter life"
+        )
+    if system.strip_wears or _uniform_wear_exists(system):
+        return str(error)
+    return (
+        f"{error}; no cyclic steady state exists: friction tips the punch so far that no pressures wear the whole "
+        "contact by a rigid motion. Reduce the friction, lower the pin or widen the contact"
+    )
 
 
 def _check_sinks(system: Tribosystem) -> None:
@@ -267,49 +297,10 @@ def _loads_oppose(system: Tribosystem) -> bool:
     return bool(along.status == 0 and -along.fun <= ALONG)
 
 
-def _solve(problem: SteadyInequality) -> tuple[Solved, Coupled]:
-    """Return contact of all phases, with heat the temperatures, and what they were found with."""
-    system = problem.system
-    try:
-        contact = problem.solve()
-    except ConvergenceError as error:
-        if capped := _no_state_under_cap(problem):
-            raise ConvergenceError(capped) from error
-        if system.layers.debris.present:  # it presses most where it is thickest, and comes from where it presses
-            raise ConvergenceError(
-                f"{error}; where much debris lies between, there may be several states, or none that is stable. Follow "
-                "it by `run`, or give the debris a shorter life"
-            ) from error
-        if system.strip_wears or _uniform_wear_exists(system):
-            raise
-        raise ConvergenceError(
-            f"{error}; no cyclic steady state exists: friction tips the punch so far that no pressures wear the whole "
-            "contact by a rigid motion. Reduce the friction, lower the pin or widen the contact"
-        ) from error
-    if (capped := _no_state_under_cap(problem)) and _any_shape_stays(problem, contact):
-        raise ConvergenceError(capped)
-    coupled = Coupled(system, problem.take)
-    heat = coupled.heat
-    if not heat.dim and system.constant_coefficients:
-        return Solved(contact, heat.initial(), heat.conductances(contact.pressure)), coupled
-    solved = coupled.solve(heat.initial(), np.inf, contact, lambda gap, coupling, _: problem.solve(gap, coupling))
-    return solved, coupled
-
-
-def _any_shape_stays(problem: SteadyInequality, contact: ContactState) -> bool:
-    """Return whether all that touches is pressed beyond a cap, so that what was found is one of many shapes."""
-    if any(law.per_area is not None for law in problem.system.sliding.wear):
-        return False
-    pressed = contact.pressure[contact.pressure > 0]
-    return bool(pressed.min(initial=np.inf) >= (1 - 1e-9) * problem.wear.cap)
-
-
-def _no_state_under_cap(problem: SteadyInequality) -> str:
-    """Return why there is no state where wear grows no more beyond a cap; "" where that is not why."""
-    found, mean, cap = problem.peak_without_cap, problem.p_scale, problem.wear.cap
-    if not cap < found:
-        return ""
-    laws = zip(("punch", "strip"), problem.system.sliding.wear, strict=True)
+def _none_under_cap(system: Tribosystem) -> str:
+    """Return why there is no state where wear grows no more beyond a cap."""
+    mean, cap = system.interface.pressure_scale, system.phases_wear.cap
+    laws = zip(("punch", "strip"), system.sliding.wear, strict=True)
     keys = [
         f"wear.{body}.{'pressure_cap' if law.per_area is None else 'touching_from'}"
         for body, law in laws
@@ -322,63 +313,140 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
     return (
         f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: beyond it wear grows no more, and {why}. The "
-        f"mean pressure is {mean:.4g} MPa, and the largest pressure without the cap is {found:.4g} MPa. Raise the cap, "
-        "or follow the wear by `run`"
+        f"mean pressure is {mean:.4g} MPa. Raise the cap, or follow the wear by `run`"
     )
 
 
-def _result(problem: SteadyInequality, solved: Solved, coupled: Coupled) -> SteadyState:
-    system, contact = problem.system, solved.contact
-    hardness, peak = system.layers.hardness, float(contact.pressure.max())
-    if peak > hardness:
-        raise ConvergenceError(
-            f"no cyclic steady state without plastic flow exists: its largest pressure, {peak:.4g} MPa, is above "
-            f"contact.hardness = {hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
+class _End:
+    """The end of ever so many cycles of bodies as they are; made on all ranks.
+
+    Args:
+        system: The bodies, with reduced heat.
+    """
+
+    def __init__(self, system: Tribosystem) -> None:
+        self.system, self.stepper = system, Stepper(system, DIGITS, periodic=True)
+        above = max(law.pressure_threshold for law in system.sliding.wear)
+        even = np.full((len(system.motion.phases), len(system.pair.weights)), system.interface.pressure_scale + above)
+        self._rate = float(system.phases_wear.opening(even).max()) / len(even)
+
+    def found(self) -> SteadyState:
+        """Return the state.
+
+        Raises:
+            ConvergenceError: a step did not converge, or what it changes is no rigid motion in the end.
+        """
+        wear = self.system.phases_wear
+        if wear.punch.linear and wear.strip.linear:
+            with suppress(ConvergenceError):
+                return self._state(self._resting(()))
+        return self._state(self._resting(NEAR))
+
+    def _resting(self, lengths: Sequence[float]) -> JumpMoment:
+        """Return the end of steps of these lengths, and then of FAR, when the shape rests but for a rigid motion."""
+        system, interface, begin = self.system, self.system.interface, beginning(self.system)
+        gap = interface.pressure_scale * interface.elastic_length
+        at = self.stepper.moment(replace(begin, worn=begin.worn + self._coatings))
+        for length in (*lengths, *(FAR,) * MOST):
+            then = self.stepper.stage(at, length * gap / self._rate, 0.0, at.contact, FINE)
+            touched = then.contact.pressure.max(axis=0) > 0
+            moved = _rigid_part(system, self._shape(then.worn), touched)
+            changed = self._shape(then.worn) - self._shape(at.worn)
+            if np.abs(changed - _rigid_part(system, changed, touched))[touched].max() <= RESTING * gap:
+                return then
+            at = then if system.coated else replace(then, worn=replace(then.worn, punch=then.worn.punch - moved))
+        raise ConvergenceError(f"the cyclic steady state did not converge in {MOST} steps")
+
+    @property
+    def _coatings(self) -> WornDepths:
+        """Depths at which all coatings are worn through."""
+        punch, strip = self.system.coatings
+        return replace(self.system.unworn().times(0.0), punch=punch, strip=strip)
+
+    def _shape(self, worn: WornDepths) -> Array:
+        """Return the gap that depths open, and what lies between and stays where it lies (n,), mm."""
+        system = self.system
+        if system.track_changes:
+            worn = replace(worn, carried=0 * worn.carried)
+        return system.gap(0, worn) - system.pair.initial_gap
+
+    def _state(self, end: JumpMoment) -> SteadyState:
+        """Return the state at the end of steps."""
+        system, contact, stepper = self.system, end.contact, self.stepper
+        hardness, peak = system.layers.hardness, float(contact.pressure.max())
+        if peak >= hardness:
+            raise ConvergenceError(
+                f"no cyclic steady state without plastic flow exists: its largest pressure reaches contact.hardness = "
+                f"{hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
+            )
+        wear = stepper.wear
+        weights, motion, worn = system.pair.weights, system.motion, wear.opening(contact.pressure)[0]
+        if worn.max() <= DIGITS * self._rate:
+            raise ConvergenceError(NOTHING_WEARS)
+        touched = (contact.pressure > 0).any(axis=0)
+        capped = contact.pressure[contact.pressure > 0] >= (1 - DIGITS) * wear.cap
+        per_area = any(law.per_area is not None for law in system.sliding.wear)
+        if (not per_area and capped.all()) or (len(contact.pressure) == 1 and capped.any()):
+            raise ConvergenceError(_none_under_cap(system))
+        shape = self._shape(end.worn)
+        closest = np.where(touched, shape, shape - contact.gap.min(axis=0))
+        closest = closest - _rigid_part(system, shape, touched)
+        depths = np.linalg.lstsq(system.rigid.rigid_normal[touched] / system.mode_lengths, worn[touched], rcond=None)[0]
+        depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
+        middle = slice(motion.positions // 2, None, motion.positions)
+        passing, rest = system.passing(wear, conditions=stepper.conditions), system.rested(stepper.conditions)
+        return SteadyState(
+            motion.stroke_directions,
+            contact.pressure[middle],
+            contact.pressure,
+            contact.gap[middle],
+            np.where(touched, closest, np.nan),
+            closest,
+            (contact.pressure[middle] > 0) @ weights,
+            worn,
+            dict(zip(system.rigid.mode_names, (depths / system.mode_lengths).tolist(), strict=True)),
+            contact.iterations,
+            0.0,
+            self._heat(end) if stepper.coupled.heat.dim else None,
+            coordinates=system.pair.punch.x,
+            system=system,
+            conductances=end.rate.conductances,
+            debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
+            crept=system.creep.depth(end.worn.crept),
+            states=system.layers.memory.by_name(system.layers.held(rest)),
         )
-    weights, motion, worn = system.pair.weights, system.motion, problem.wear.opening(contact.pressure)[0]
-    if worn.max() <= ZERO * problem.wear_scale:
-        raise ConvergenceError(NOTHING_WEARS)
-    passing = system.passing(problem.wear, conditions=problem.conditions)
-    omega = problem.x[problem.omega] * problem.gap_scale
-    touched = problem.x[problem.omega] < OPEN
-    beyond = np.where(touched, 0.0, contact.pressure)
-    if beyond.max() > ZERO * peak:  # their shape goes away from all others
-        raise ConvergenceError(NO_ONE_MOTION)
-    contact = replace(contact, pressure=contact.pressure - beyond)
-    moved = _rigid_part(system, omega - system.pair.initial_gap, touched) + system.pair.initial_gap
-    closest = np.where(touched, omega, omega - contact.gap.min(axis=0)) - moved
-    depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
-    depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
-    velocity = depths / problem.lengths
-    middle, crept = slice(motion.positions // 2, None, motion.positions), problem.crept(contact.pressure)
-    return SteadyState(
-        motion.stroke_directions,
-        contact.pressure[middle],
-        contact.pressure,
-        contact.gap[middle],
-        np.where(touched, closest, np.nan),
-        closest,
-        (contact.pressure[middle] > 0) @ weights,
-        worn,
-        {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
-        contact.iterations,
-        0.0,
-        _steady_heat(coupled, solved) if coupled.heat.dim else None,
-        coordinates=system.pair.punch.x,
-        system=system,
-        conductances=solved.conductances,
-        debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
-        crept=system.creep.depth(crept),
-        states={} if coupled.held is None else system.layers.memory.by_name(coupled.held),
-    )
+
+    def _heat(self, end: JumpMoment) -> SteadyHeat:
+        """Follow the temperatures through one cycle of the steady state."""
+        coupled, positions = self.stepper.coupled, self.system.motion.positions
+        heated = coupled.mu * end.contact.pressure
+        surfaces, after = end_temperatures(coupled.heat, end.temperature, heated, end.rate.conductances)
+        ends = surfaces[positions - 1 :: positions]  # the last phase of each half-cycle
+        return SteadyHeat(ends[:, 0], ends[:, 1], after)
 
 
-def _steady_heat(coupled: Coupled, solved: Solved) -> SteadyHeat:
-    """Follow the temperatures through one cycle of the steady state."""
-    heated, positions = coupled.mu * solved.contact.pressure, coupled.system.motion.positions
-    surfaces, end = end_temperatures(coupled.heat, solved.temperature, heated, solved.conductances)
-    ends = surfaces[positions - 1 :: positions]  # the last phase of each half-cycle
-    return SteadyHeat(ends[:, 0], ends[:, 1], end)
+def rigid_of_phases(system: Tribosystem) -> Array:
+    """Return what turns the rigid motions of each phase to those of the middle position (m, modes, modes).
+
+    A strip that is free to move and passes as a whole opens in each place the same gaps by other motions, as where it
+    tilts about a point that moves with it: H_k = H T_k. So wear that a motion follows in one place one follows in all.
+
+    Raises:
+        ConvergenceError: they open other gaps: to follow the wear takes H_k lambda_k of one shape in all phases.
+    """
+    middle, found = system.rigid.rigid_normal, []
+    for own in system.rigids:
+        here = own.rigid_normal
+        turned = np.linalg.lstsq(middle, here, rcond=None)[0]
+        back = here @ np.linalg.lstsq(here, middle, rcond=None)[0]
+        if max(np.abs(middle @ turned - here).max(), np.abs(back - middle).max()) > APART * np.abs(middle).max():
+            raise ConvergenceError(
+                "no cyclic steady state exists, and no shape stays. The rigid motions that follow the wear in one "
+                "position of the strip open the contact in another. This happens where only a strip on a hinge "
+                "moves. Follow the wear by `run`"
+            )
+        found.append(turned)
+    return np.array(found)
 
 
 def _uniform_wear_exists(system: Tribosystem) -> bool:
@@ -530,9 +598,8 @@ class _Way:
         """Yield the ends of the jumps of a run of so many cycles, which stop at some of them; collective."""
         phases = len(self.state.directions)
         ends = frozenset(phases * stop for stop in stops)
-        for block in jump_within(
-            self.system, RunLimits(until * phases, block=phases, stops=ends), tolerance=tolerance, start=start
-        ):
+        limits = RunLimits(until * phases, block=phases, stops=ends)
+        for block in jump_within(self.system, limits, tolerance=tolerance, start=start):
             yield _Passed.of(block, self.state)
 
     def leads(self, law: Callable[[_Passed, float], float], later: _Passed) -> float:

@@ -223,12 +223,6 @@ class Creep:
                 gap[phase] += member.opened(phase, own @ y)
         return CreepStage(self, gap, [by for by, _ in shares], crept, cycles, list(ratios), load)
 
-    def end(self, ratios: Sequence[Array]) -> CreepStage:
-        """Return what cycles that repeat do in the end; arguments as of `stage`."""
-        shares = [cycle.repeating for cycle in self.cycles]
-        gap = self._by_loads(shares, ratios, 1.0)
-        return CreepStage(self, gap, shares, self.beginning(), np.inf, list(ratios), 1.0)
-
     def lasting(self, pressure: Array, ratios: Sequence[Array], load: float) -> list[Array]:
         """Return the v_i of each member in all phases (m, size), mm, at pressures (m, n)."""
         return [
@@ -302,14 +296,14 @@ def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
 
 @dataclass(frozen=True)
 class CreepStage:
-    """Effect of creep on the contact of all phases in one implicit step, or in the end.
+    """Effect of creep on the contact of all phases in one implicit step.
 
     Attributes:
         creep: All that creeps.
         gap: That state and loads open (m, n), mm.
         shares: Of the elastic displacement of each phase in each phase (phases, i), of each member.
         crept: State at the start.
-        cycles: Length of the step; infinite for the end.
+        cycles: Length of the step.
         ratios: tau of each phase.
         load: Factor of all loads.
     """
@@ -337,11 +331,6 @@ class CreepStage:
             by_v, by_y = cycle.rate(self.cycles)
             found.append((by_v @ v + by_y[:, None] * y).ravel())
         return _joined(found)
-
-    def end(self, pressure: Array) -> Array:
-        """Return the state that cycles at pressures (m, n) come to in the end."""
-        displaced = self.creep.lasting(pressure, self.ratios, self.load)
-        return _joined([(cycle.lasting.T @ v).ravel() for cycle, v in zip(self.creep.cycles, displaced, strict=True)])
 
 
 def creep_of(

@@ -91,7 +91,7 @@ def test_names_of_laws_that_are_none() -> None:
     with pytest.raises(CaseError, match=r"contact\.law:"):
         load_case("example1", ["contact.law=dragged"])
     for name in ("coulomb", "auto", "two words"):
-        with pytest.raises(CaseError, match="expected a word that no law of fenwear has"):
+        with pytest.raises(CaseError, match=r"contact\.law"):
             register_contact_law(name, DraggedBack())
 
 

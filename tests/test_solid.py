@@ -59,7 +59,7 @@ def test_a_ball_that_leaves_its_flat() -> None:
 
 
 @pytest.mark.parametrize(("settings", "message"), [
-    (["punch.supports=[]"], "the punch is free to slide along x: hold its x somewhere and to slide along y"),
+    (["punch.supports=[]"], "the punch is free to slide along x and to slide along y"),
     (["punch.supports=[{at=[15, 0, 12], fix=['x', 'y']}]"], "spin about z"),
 ])  # fmt: skip
 def test_too_few_supports(settings: list[str], message: str) -> None:
@@ -74,10 +74,10 @@ def test_too_few_supports(settings: list[str], message: str) -> None:
     ("pin-on-disc", "strip.supports=[{on='strip_bottom', fix=['x', 'y']}]",
      "the strip is free to move along z and to tilt about x and to tilt about y, and"),
     ("ring-on-ring", "strip.supports=[]", r"strip\.supports: .* the strip is free to move along z, and"),
-    ("pin-on-disc", "contact.friction=0.5", r"punch\.loads: .* the punch tips over, free to tilt about x; expected"),
-    ("pin-on-disc", "punch.loads=[{on='punch_top', force=[0, 0, 100]}]", r"punch\.loads: .* the punch lifts off; exp"),
-    ("ball-on-flat", "motion.along=[0, 0, 1]", r"motion\.along: .* out of the contact: .* any way at right angles"),
-    ("ball-on-flat", "motion.along=[1, 0, 1]", r"motion\.along: .* out of the contact: along it is \(0\.707, 0, 0\)"),
+    ("pin-on-disc", "contact.friction=0.5", r"punch\.loads: .* the punch tips over, free to tilt about x"),
+    ("pin-on-disc", "punch.loads=[{on='punch_top', force=[0, 0, 100]}]", r"punch\.loads: .* the punch lifts off"),
+    ("ball-on-flat", "motion.along=[0, 0, 1]", r"motion\.along: .* out of the contact.* at right angles"),
+    ("ball-on-flat", "motion.along=[1, 0, 1]", r"motion\.along: .* out of the contact.* \(0\.707, 0, 0\)"),
 ])  # fmt: skip
 def test_what_nothing_balances(name: str, settings: str, message: str) -> None:
     """The body at fault is named, the modes in which it would go, and the key."""

@@ -62,7 +62,7 @@ def fixed_point(
         best = min(best, size)
         points, residuals = [*points[-depth:], x.ravel()], [*residuals[-depth:], residual]
         x = team.lead(lambda: _mixed(points, residuals, share).reshape(start.shape))  # noqa: B023
-    raise ConvergenceError(f"{failure} in {iterations} iterations")
+    raise ConvergenceError(f"{failure} ({iterations} iterations)")
 
 
 def _mixed(points: list[Array], residuals: list[Array], share: float) -> Array:

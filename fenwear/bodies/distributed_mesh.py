@@ -260,7 +260,7 @@ def write_msh(
         gmsh.write(str(path))
         if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
             path.unlink()
-            raise OutputError(path, "gmsh wrote only a part of it; is there room?")
+            raise OutputError(path, "gmsh wrote only a part of it. Free some space on the disk")
     return mesh.rows(), mesh.text()
 
 
@@ -432,7 +432,7 @@ def _parameters(geometry: Geometry, path: Path, known: Mapping[str, float]) -> d
         key = f"geometry.parameters.{name}"
         if name not in defined:
             has = f"{', '.join(defined) or 'none'}{did_you_mean(name, defined)}"
-            problems.append(InputError(key, f"{path.name} has no such parameter, but {has}"))
+            problems.append(InputError(key, f"{path.name} has no such parameter. It has {has}"))
         elif "elements" in name and value > MOST_ELEMENTS:
             problems.append(InputError(key, f"expected at most {MOST_ELEMENTS:,} elements, got {value:g}"))
     if problems:

@@ -143,10 +143,10 @@ def half_space(request: Request) -> HalfSpace:
     if elastic.law.kind == "axisymmetric":
         raise CaseError(InputError(key, "expected 'condensed' for rings: 'half-space' is of plane models and solids"))
     if elastic.surface.degree != 1:
-        message = f"expected 1 with {key} = 'half-space': a contact node then has as much of the surface as the others"
+        message = f"expected 1 with {key} = 'half-space': all contact nodes then have equal areas"
         raise CaseError(InputError("geometry.degree", message))
     if elastic.moved:
-        message = "expected a load with 'half-space', which knows of no supports: none may move it"
+        message = "expected a load: 'half-space' has no supports that could move it"
         raise CaseError(InputError(f"{elastic.body.name}.supports", message))
     surface = elastic.surface
     mean = surface.weights @ surface.outward

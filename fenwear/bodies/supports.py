@@ -22,7 +22,7 @@ from fenwear.files.mesh_file import ENTITIES
 
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
-SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about {0}: hold it against turning"
+SLIDE, SPIN = "slide along {0}", "spin about {0}"
 FLAT = 1e-6  # of the body: what lies in a plane
 WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
 STEEP = 0.02  # component of normals along z, below which all pressure acts across it: a cone of a degree
@@ -144,7 +144,7 @@ class Supports:
         missing = points[found == 0]
         if len(missing):
             place = ", ".join("(" + ", ".join(f"{c:g}" for c in p) + ")" for p in missing)
-            raise CaseError(InputError(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
+            raise CaseError(InputError(f"{key}.at", f"the {body.name} has no node at {place} mm. Name a node"))
         return to_parent[(distance < tolerance).any(axis=1)]
 
     def _size(self) -> float:
@@ -270,7 +270,7 @@ class Supports:
         away = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
         if away:
             name = self.body.name
-            message = f"the {name} is free to {' and to '.join(away)}, friction pulls it"
+            message = f"the {name} is free to {' and to '.join(away)}, where friction pulls it. Add a support"
             raise CaseError(InputError(f"{name}.supports", message))
         return (
             list((basis @ echelon).T.copy()),

@@ -128,8 +128,8 @@ def check_operators(case: Case) -> None:
     problems = [
         InputError(
             f"{name}.operator",
-            f"no operator {body.operator!r} is registered, known are {known}: those of one's own are made known in "
-            "Python, by fenwear.register_operator",
+            f"no operator {body.operator!r} is registered. Known are {known}. Register your own in Python, "
+            "by fenwear.register_operator",
         )
         for name, body in case.bodies.items()
         if body.operator not in (AUTO, CONDENSED, *OPERATORS)
@@ -172,8 +172,8 @@ def _decided(request: Request) -> SurfaceOperator | None:
         if elastic.reach is not None or elastic.mortar is None:
             raise
         elastic.operator, elastic.reading = CONDENSED, elastic.mortar()
-        elastic.taken = f"{key}: '{CONDENSED}' is taken: {error}"
+        elastic.taken = f"{key}: '{CONDENSED}' is used: {error}"
         return None
     elastic.operator = "fine"
-    elastic.taken = f"{key}: 'fine' is taken: polynomials leave {100 * found.unresolved:.2g} % of the compliance"
+    elastic.taken = f"{key}: 'fine' is used: polynomials leave {100 * found.unresolved:.2g} % of the compliance"
     return found

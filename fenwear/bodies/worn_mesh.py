@@ -114,8 +114,8 @@ def follow_wear(movable: MovableSurface, depth: Array, into: Array, held: Sequen
     ratio = mesh.comm.allreduce(float((_sizes(body) / before).min(initial=np.inf)), MPI.MIN)
     if ratio < LEAST:
         raise MeshQualityError(
-            f"the wear of the {body.name} has used up the elements at its contact: one is left with "
-            f"{max(ratio, 0.0):.0%} of its size. The depth is {depth.max():.3g} mm. Make the geometry higher "
+            f"the wear of the {body.name} has used up the elements at its contact: {100 * max(ratio, 0.0):.0f} % "
+            f"of the thinnest is left. The depth is {depth.max():.3g} mm. Make the geometry higher "
             "where it wears, let the contact contain the chamfer beside it, or reduce the wear"
         )
     owned = space.dofmap.index_map.size_local

@@ -286,8 +286,8 @@ def check_law(name: str) -> None:
     if name not in _LAWS:
         known = f"known are {', '.join(sorted(_LAWS))}" if _LAWS else "there is none"
         raise ValueError(
-            f"no law {name!r} is registered, {known}: laws of one's own are made known in Python, by "
-            "fenwear.register_law, and do not exist on the command line"
+            f"no law {name!r} is registered, {known}. Register your own in Python by fenwear.register_law. The "
+            "command line has none of them"
         )
 
 
@@ -327,8 +327,8 @@ def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: t
             raise ValueError("it gives complex numbers")
         values = found.astype(float)  # a copy of what may be the user's own
     except KeyError as error:
-        asked = f"asks for {error}, but is of {', '.join(sorted(given))}"
-        raise ValueError(f"{what} {asked}: expected it among what `of` names") from error
+        named = ", ".join(sorted(given))
+        raise ValueError(f"{what} needs {error}, and `of` names {named}. Add it to `of`") from error
     except Exception as error:  # a user's own code may raise anything
         raise ValueError(f"{what} fails: {error}") from error
     if values.shape not in ((), shape):

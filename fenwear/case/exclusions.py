@@ -18,12 +18,9 @@ from fenwear.case.wear_table import Dependence, Stick, depends_on
 if TYPE_CHECKING:
     from fenwear.case.schema import Case
 
-FINER = (
-    "with heat: a contact finer than the meshes warms a layer as thin as its own nodes are wide, whose temperatures "
-)
-FINER += "and expansion the meshes do not have"
-NO_HEAT = "depends on the temperature T, which a case without the table heat does not know"
-NO_DEBRIS = "depends on the thickness of debris, which a case without contact.third_body does not know"
+FINER = "with heat: a contact finer than the meshes heats a layer as thin as its node spacing, too thin for the meshes"
+NO_HEAT = "depends on the temperature T. Add the table heat"
+NO_DEBRIS = "depends on the thickness of debris. Add the table contact.third_body"
 POISSON = {"strain": "in plane strain", "axisymmetric": "in rings", "solid": "in solids"}
 
 
@@ -56,7 +53,7 @@ CHECKS = (
     ),
     Check(
         lambda c: c.setup.reproducible and c.heat and c.heat.operator == "full",
-        "setup.reproducible: expected heat.operator = 'reduced', whose steps every rank makes alike",
+        "setup.reproducible: expected heat.operator = 'reduced', whose steps are equal on all ranks",
     ),
     Check(
         lambda c: c.run.integration == "jump" and c.run.half_cycles < (1 if one_way(c) else 2),
@@ -89,7 +86,7 @@ CHECKS = (
     ),
     Check(
         lambda c: isinstance(c.motion, Cycle) and c.motion.course.rests and not c.sticks,
-        "motion.columns: expected a motion: the strip stays in its place in all rows",
+        "motion.columns: the strip moves in no row. Change a shift or a rotation from row to row",
     ),
     Check(
         lambda c: not c.passes and getattr(c.motion, "positions", 1) not in (None, 1, "middle"),
@@ -121,7 +118,7 @@ CHECKS = (
 AGAINST_STICK = (
     Check(
         lambda c: c.contact.transverse_friction != 0,
-        "contact.transverse_friction: expected 0, friction being against the slip that is found,",
+        "contact.transverse_friction: expected 0, as friction opposes the computed slip,",
     ),
     Check(
         lambda c: c.model.kind == "axisymmetric",
@@ -130,11 +127,11 @@ AGAINST_STICK = (
     ),
     Check(
         lambda c: c.heat and c.heat.operator == "full",
-        "heat.operator: expected 'reduced', whose heat each time step has as a matrix of its tractions,",
+        "heat.operator: expected 'reduced', as a time step needs temperatures as a matrix of its tractions,",
     ),
     Check(
         lambda c: c.heat and c.heat.coupling == "split",
-        "heat.coupling: expected 'implicit', each time step being found together with its heat,",
+        "heat.coupling: expected 'implicit', as a time step is solved together with its heat,",
     ),
     Check(one_way, "motion.kind: expected a motion to and fro, or a cycle,"),
     Check(
@@ -211,7 +208,7 @@ def operator_problems(case: Case) -> Iterator[str]:
             yield f"{name}.operator: expected '{CONDENSED}' {FINER}"
     if not case.grid:
         for name in rough:
-            yield f"grid: missing, but required with {name}.topography: the nodes that have its heights"
+            yield f"grid: missing, but required with {name}.topography, whose heights are those of its nodes"
         return
     for key, names, why in (
         ("operator", meshed, f"with {{}} = '{CONDENSED}', one solution for each node; or 'fine'"),
@@ -293,7 +290,7 @@ def program_problems(case: Case) -> Iterator[str]:
     for number, step in enumerate(program.steps):
         yield from step_problems(case, step, f"program.steps.{number}")
     if program.radius and not case.turns:
-        yield f"program.radius: expected a motion that turns, not motion.kind = '{motion.kind}', which does not turn"
+        yield f"program.radius: motion.kind = '{motion.kind}' does not turn. Remove the radius"
     if not program.radius and case.turns and any(step.distance for step in program.steps):
         yield (
             "program.radius: missing, but required where the strip turns and a step has a distance. Set the radius "
@@ -304,8 +301,8 @@ def program_problems(case: Case) -> Iterator[str]:
     if case.run.periodic_within and program.steps[-1].ramps:
         at = f"program.steps.{len(program.steps) - 1}.{program.steps[-1].ramps[0]}"
         yield (
-            f"run.periodic_within: expected a last step of the program that stays as it is: cycles do not repeat "
-            f"while {at} goes from one value to another"
+            f"run.periodic_within: cycles do not repeat while {at} changes from one value to another. Add a last step "
+            "with constant values"
         )
 
 
@@ -315,20 +312,21 @@ def step_problems(case: Case, step: Any, at: str) -> Iterator[str]:
     groups = sorted({load.on for body in case.bodies.values() for load in body.loads})
     for name in step.load_factors or {}:
         if name not in groups:
-            yield f"{at}.load_factors.{name}: no load of the case acts on it, but on {', '.join(groups) or 'none'}"
+            loaded = ", ".join(groups) or "none"
+            yield f"{at}.load_factors.{name}: no load of the case acts on this group. Loads act on {loaded}"
     for key in step.present("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
         known = key in type(motion).model_fields and not (key == "amplitude" and case.turns)
         if not known or isinstance(motion, Cycle):
             yield f"{at}.{key}: does not change with motion.kind = '{motion.kind}'"
     if step.distance and isinstance(motion, Cycle):
-        yield f"{at}.distance: expected cycles or time: nodes slide different ways in a cycle"
+        yield f"{at}.distance: expected cycles or time, as nodes slide different distances in a cycle"
     if step.motion and not isinstance(motion, Cycle):
         yield f"{at}.motion: does not change with motion.kind = '{motion.kind}': expected 'cycle'"
     elif step.motion:
         of_motion = step.motion.model_problems(case.model.kind, case.model.axes)
         yield from (f"{at}.{problem}" for problem in of_motion)
         if any(depends_on(value, "s") for value in case.coefficients.values()):
-            yield f"{at}.motion: expected no coefficient that depends on s: cycles slide different ways"
+            yield f"{at}.motion: expected no coefficient that depends on s, as cycles slide different distances"
     if step.present("ambient") and not case.heat:
         yield f"{at}.ambient: expected a case with the table heat"
 

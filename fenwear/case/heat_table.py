@@ -146,7 +146,7 @@ class Heat(Part):
         return {**data, "conductance": 0.0 if ruled else "perfect"}
 
     checks = (
-        Check(lambda s: s.track and s.present("inflow"), "inflow: expected none with heat.track, whose bulk comes in"),
+        Check(lambda s: s.track and s.present("inflow"), "inflow: expected none with heat.track, whose bulk enters"),
         Check(lambda s: s.track and s.operator != "reduced", "operator: expected 'reduced' with heat.track"),
         Check(
             lambda s: s.conductance_per_pressure and s.conductance != 0,

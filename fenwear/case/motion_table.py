@@ -34,6 +34,7 @@ PLACES = {f"{name}_{axis}": unit for name, unit in (("shift", "mm"), ("rotation"
           for axis in AXES}  # fmt: skip
 LOADS = {f"{name}_{axis}": unit for name, unit in (("force", "N"), ("moment", "N*mm")) for axis in AXES}
 COLUMNS = {**TIMES, **PLACES, **{f"punch_{name}": unit for name, unit in PLACES.items()}, **LOADS}
+MOST_POSITIONS = 200  # of the strip in a half-cycle: each has a factor of its own
 HALF_TURN = np.pi * (1 - 1e-9)  # rad: a longer way between two rows is another one back
 CLOSED = 1e-9  # of the largest shift and of 1 rad: how far a cycle may end from where it begins
 
@@ -214,7 +215,7 @@ class _About(Part):
 
 
 class _ToAndFro(Part):
-    positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
+    positions: Annotated[int, Field(ge=1, le=MOST_POSITIONS, strict=True)] | None = Field(
         default=None,
         description="positions of the strip under the punch in each half-cycle; 1: opposite each other throughout; by "
         "default 1 unless the strip wears or has a profile or topography, then as many as contact nodes "

@@ -119,9 +119,7 @@ def _check_order(table: CsvTable) -> None:
         if places[k] < places[k - 1]:
             raise table.wrong(f"row {lines[k]}: {name} runs backwards, from {places[k - 1]:g} to {places[k]:g}")
         if k > 1 and places[k] == places[k - 2]:
-            raise table.wrong(
-                f"row {lines[k]}: {name} = {places[k]:g} stands there three times; expected two for a jump"
-            )
+            raise table.wrong(f"row {lines[k]}: {name} = {places[k]:g} is given three times. Give it twice for a jump")
     if places[-1] == 0:
         raise table.wrong(f"{name} ends at 0; expected a longer table")
 
@@ -182,9 +180,7 @@ def held_at(case: Case, step: int | None = None) -> Held | None:
     acting = list(_acting(program.steps))[number]
     for key in ("speed", "angular_speed"):
         if acting.given.get(key, (1.0, 1.0))[1] == 0:
-            reason = (
-                f"nothing slides at the end of step {number + 1}, so that it has no state of its own: choose another"
-            )
+            reason = f"nothing slides at the end of step {number + 1}, so that it has no state. Choose another step"
             raise CaseError(InputError(f"program.steps.{number}.{key}", reason))
     at_end = _at(acting.of(case), acting.given, 1.0).model_copy(update={"program": None})
     return Held(number, count, at_end, acting.loads and acting.loads[1], acting.factors[1])
@@ -322,7 +318,7 @@ def check_length(case: Case) -> None:
         raise CaseError(
             InputError(
                 "run.half_cycles",
-                f"the program ends after {last:,} half-cycles, but {case.run.half_cycles:,} are to be run: "
-                "expected a further step, or no run.half_cycles",
+                f"the program ends after {last:,} half-cycles, but run.half_cycles is "
+                f"{case.run.half_cycles:,}. Add a step, or remove run.half_cycles",
             )
         )

@@ -187,7 +187,7 @@ def _take_away(data: dict[str, Any], unset: Any) -> None:
             del place[int(last)]
         else:
             find_keys(path)  # names the nearest where there is none
-            raise CaseError(InputError(UNSET, f"{path!r} is not given in the case that it is to be taken from"))
+            raise CaseError(InputError(UNSET, f"the case does not set {path!r}. Leave it out of unset"))
 
 
 def _inside(place: Any, name: str) -> Any:
@@ -264,7 +264,7 @@ def _on_meshes(data: Mapping[str, Any], given: Given) -> Mapping[str, Any]:
     geometry = data.get("geometry", {})
     wrong = next((key for key, value in fixed.items() if geometry.get(key, value) != value), "")
     if wrong:
-        raise CaseError(InputError(f"geometry.{wrong}", "expected none with meshes that are given, which stay as made"))
+        raise CaseError(InputError(f"geometry.{wrong}", "expected none with given meshes, which stay as they are"))
     return {**data, "geometry": {**geometry, **fixed}}
 
 

@@ -78,8 +78,8 @@ def find_template(name: str) -> Template:
     """
     names = template_names()
     if name in builtin_cases() and name not in names:
-        start = f"{name!r} is a built-in case: a file with base = {name!r} and what is other than there starts from it"
-        raise CaseError(InputError("new", f"{start}. There are templates of {', '.join(names)}"))
+        start = f"{name!r} is a built-in case. Write a file with `base = {name!r}` and the keys to change"
+        raise CaseError(InputError("new", f"{start}. Templates: {', '.join(names)}"))
     if name not in names:
         hint = did_you_mean(name, names, 0.5) or did_you_mean(name, [n for n in names if name and name in n], 0.0)
         raise CaseError(InputError("new", f"no template {name!r}. There are {', '.join(names)}{hint}"))
@@ -163,7 +163,7 @@ def _unknown(template: Template, setting: str) -> str:
         return f"expected dimension=value, got {setting!r}"
     names = list(template.dimensions)
     hint = did_you_mean(name.strip(), names, 0.5)
-    return f"{template.name} has no dimension {name.strip()!r}, only {', '.join(names)}{hint}"
+    return f"{template.name} has no dimension {name.strip()!r}. It has {', '.join(names)}{hint}"
 
 
 def all_text() -> str:
@@ -200,6 +200,6 @@ def write_case_of(name: str, path: Path, settings: Sequence[str] = ()) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise CaseError(InputError("-o", f"{path} exists already; expected a new file")) from None
+        raise CaseError(InputError("-o", f"{path} exists. Name another file, or remove this one")) from None
     except OSError as error:
         raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None

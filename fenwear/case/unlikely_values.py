@@ -102,8 +102,8 @@ def _without_effect(case: Case) -> list[str]:
     if heat is None or heat.conductance != "perfect" or "partition" not in heat.model_fields_set:
         return []
     return [
-        'heat.partition: does nothing where heat.conductance = "perfect": equal temperatures share the heat; leave '
-        "heat.conductance away, or 0, for a share that is given"
+        'heat.partition: has no effect where heat.conductance = "perfect", as equal temperatures share the heat. '
+        "Remove heat.conductance, or set it to 0, to prescribe the share"
     ]
 
 
@@ -157,7 +157,8 @@ def _out_of_range(case: Case, values: Mapping[str, object]) -> Iterator[tuple[st
                         key,
                         (
                             f"{key}: {value / usual.size:.4g}{unit}{as_read} is far outside the usual range of "
-                            f"{article} {usual.kind}, {low:g} to {usual.high:g}{unit} ({usual.reason})"
+                            f"{article} {usual.kind}, {low:g} to {usual.high:g}{unit} ({usual.reason}). "
+                            "Check the value and its unit"
                         ),
                     )
 
@@ -187,7 +188,7 @@ def _mixed_units(case: Case, but: Container[str]) -> Iterator[str]:
         if beside is not None and not str(values[key]).startswith(("0.0 ", "-0.0 ")):
             yield (
                 f"{key}: a number without a unit, read as {values[key]}, beside {beside} = "
-                f"{case.written.united[beside]!r}: give its unit"
+                f"{case.written.united[beside]!r}. Give its unit"
             )
 
 
@@ -196,7 +197,7 @@ def _laws_without_unit(case: Case) -> Iterator[str]:
     for key, law, unit in _dependences(case, ""):
         if unit and not law.unit:
             named = {"expression": "an expression", "regions": "values of regions"}.get(law.form, f"a {law.form}")
-            yield f'{key}: {named} without a unit, read in {unit}: give it, {{{law.form} = ..., unit = "{unit}"}}'
+            yield f'{key}: {named} without a unit, read in {unit}. Give it as {{{law.form} = ..., unit = "{unit}"}}'
 
 
 def _dependences(part: BaseModel | Mapping[str, Any], path: str) -> Iterator[tuple[str, Dependence, str]]:
@@ -232,8 +233,8 @@ def _mixed_temperatures(case: Case, values: Mapping[str, object]) -> Iterator[st
             )
         elif kelvins is not None and key in case.written.bare and value != 0:
             yield (
-                f"{key}: a number without a unit, read as {value:g} K, beside {kelvins} = {given[kelvins]!r}: "
-                "give its unit"
+                f"{key}: a number without a unit, read as {value:g} K, beside {kelvins} = {given[kelvins]!r}. "
+                "Give its unit"
             )
 
 
@@ -253,6 +254,6 @@ def _tables(case: Case) -> Iterator[str]:
             )
         elif initial >= ABSOLUTE and first < COLD:
             yield (
-                f"{key}: its table over T begins at {first:g} K, beside heat.initial of {initial:g} K: T is in kelvin; "
-                "are these degrees Celsius?"
+                f"{key}: its table over T begins at {first:g} K, beside heat.initial of {initial:g} K. T is in "
+                "kelvin. Add 273.15 to degrees Celsius"
             )

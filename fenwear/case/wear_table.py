@@ -397,7 +397,9 @@ class WearLaw(Part):
     """
 
     coefficient: constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
-        default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
+        default=None,
+        description="beta~, in (mm/s) MPa^-b (mm/s)^-a; with b = a = 1 also in other units of volume over load and "
+        'distance, such as "1e-5 mm^3/(N m)"',
     )
     archard: Annotated[Number, Field(ge=0)] | None = Field(
         default=None, description="Archard's K; beta~ = K / hardness"

@@ -69,7 +69,8 @@ def choose_law(system: Tribosystem) -> LawChoice:
     if share is None:
         why = "the cycle is a table" if system.motion.steps else "the strip slides one way"
         return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {why}")
-    by_text = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
+    size = f"{100 * share:.2g} % of the stroke" if share < 1 else f"{share:,.0f} times the stroke"
+    by_text = f"the bodies take up about {size} elastically"
     if share <= TAKEN_UP:
         return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {by_text}", share)
     against = system.case.against_stick
@@ -134,5 +135,5 @@ def check_decided(system: Tribosystem) -> None:
         if choice.law == GROSS:
             return
         text = choice.text.removeprefix("contact.law: ")
-    message = f"{text}, and one law is followed for all values here: set it, or 'gross-sliding' to leave stick out"
+    message = f"{text}. A study follows one law for all values. Set 'coulomb', or 'gross-sliding' to leave stick out"
     raise CaseError(InputError("contact.law", message))

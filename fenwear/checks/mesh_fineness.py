@@ -23,7 +23,7 @@ delta into its bore touches it along other normals, turned by delta sin psi / R.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import TypeAlias
@@ -54,6 +54,7 @@ ENOUGH = 4  # nodes from the middle of a contact to each of its ends: eight acro
 # Of the ready geometries, and of others that name them so: numbers of elements along the contact.
 COUNTS = ("elements_along_contact", "elements_along_flat", "across", "core_elements", "along", "around",
           "across_x", "across_y")  # fmt: skip
+LAYERS = ("drum_layers",)  # numbers of even elements over the strip's wall
 DEEPEST = 1.0  # half-widths of a contact that elements at it may reach into the body
 ALIKE = 2.0  # elements as deep as that many are long are as coarse one way as the other
 FARTHER = 2.0  # the same of elements off it, times the degree, from their distance and the half-width
@@ -97,7 +98,7 @@ def _width(zone: Zone, k: int, width: float) -> float:
 
 def _remedy(case: Case, net: ContactNet, zone: Zone, finer: float) -> str:
     """Return how to have enough nodes across the contact, with elements `finer` times smaller."""
-    counts = {name: count for name, count in _counts(case).items() if count > 0}
+    counts = {name: count for name, count in _counts(case, COUNTS).items() if count > 0}
     if not counts:
         each = net.surface.degree if net.surface.cell != "triangle" else 1
         return f"Make the elements at the contact {each * zone.spacing.min() / finer:.2g} mm long"
@@ -106,13 +107,13 @@ def _remedy(case: Case, net: ContactNet, zone: Zone, finer: float) -> str:
     return f"Set {' and '.join(keys)}"
 
 
-def _counts(case: Case) -> dict[str, float]:
-    """Return the numbers of elements along the contact that the geometry has as parameters, by their names."""
+def _counts(case: Case, names: Sequence[str]) -> dict[str, float]:
+    """Return those numbers of elements that the geometry has as parameters, by their names."""
     geometry = case.geometry
     try:
         path = find_geometry(geometry, case.folder)
         known = constants(path) if path.suffix == ".geo" else {}
-        return {name: float(geometry.parameters.get(name, known[name])) for name in COUNTS if name in known}
+        return {name: float(geometry.parameters.get(name, known[name])) for name in names if name in known}
     except (CaseError, OSError, ValueError):  # the file is gone, or what it gives is no number
         return {}
 
@@ -221,12 +222,12 @@ class HeatedLayer:
     Attributes:
         thickness: Of the layer, mm.
         height: Of the element there, mm.
-        needed: Height of one whose nodes are as far apart as the layer is thick, mm.
+        remedy: The advice for elements whose nodes are as far apart as the layer is thick; "" where they are.
     """
 
     thickness: float
     height: float
-    needed: float
+    remedy: str
 
 
 def heated_layer(system: ContactSetup) -> HeatedLayer | None:
@@ -246,8 +247,11 @@ def heated_layer(system: ContactSetup) -> HeatedLayer | None:
     heights = system.element_heights.strip[below] * (mesh.topology.dim if simplex else 1)
     layers = np.sqrt(_diffusivities(system)[below] * _passing(system, speed))
     worst = int(np.argmax(heights / layers))
-    layer = float(layers[worst])
-    return HeatedLayer(layer, float(heights[worst]), surface.degree * layer)
+    layer, height = float(layers[worst]), float(heights[worst])
+    finer = height / (surface.degree * layer)
+    keys = [f"Set `geometry.parameters.{name} = {math.ceil(n * finer)}`" for name, n in _counts(case, LAYERS).items()]
+    remedy = (keys or [f"Make them at most {height / finer:.3g} mm high"])[0]
+    return HeatedLayer(layer, height, remedy if finer > 1 else "")
 
 
 def _passing(system: ContactSetup, speed: float) -> float:

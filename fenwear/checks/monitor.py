@@ -29,9 +29,9 @@ def fineness_text(system: Tribosystem) -> str:
         return ""
     parts = [f"heat: {found.steps} steps in a half-cycle"]
     if found.change is not None:
-        parts.append(f"halving them changes contact temperatures by {found.change:.2g}")
+        parts.append(f"halving them changes contact temperatures by {100 * found.change:.2g} %")
     if found.difference is not None:
-        parts.append(f"contact temperatures and thermal gap are those of the whole mesh to {found.difference:.2g}")
+        parts.append(f"the basis changes contact temperatures and thermal gap by {100 * found.difference:.2g} %")
     return "; ".join(parts)
 
 
@@ -121,8 +121,9 @@ def unique_text(unique: Mask) -> str:
     if unique.all():
         return ""
     return (
-        f"contact.friction: friction is so large that contact may have no or several answers in {int((~unique).sum())} "
-        f"of {len(unique)} time steps. The one computed is that which Newton's method reached from the step before. "
+        f"contact.friction: friction is so large that contact may have no or several solutions in "
+        f"{int((~unique).sum())} of {len(unique)} time steps. The one computed is that which Newton's method reached "
+        "from the step before. "
         "Reduce `contact.friction`"
     )
 

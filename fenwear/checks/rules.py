@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from string import Formatter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from fenwear.checks.elastic_limits import TAKEN_UP, elastic_share, elastic_way, 
 from fenwear.checks.mesh_fineness import Fields
 from fenwear.checks.surface_ends import Chamfers, Limits, contact_chamfers, contact_limits, opened, thickness
 from fenwear.common.arrays import Array, Mask
-from fenwear.common.errors import CaseError, ConvergenceError
+from fenwear.common.errors import CaseError, ConvergenceError, readable
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import BROKEN, complementarity_error
 from fenwear.heat.heat_exchange import TERMS
@@ -354,7 +355,7 @@ def other_unit(seen: Seen) -> Fields:
 def high_elements(seen: Seen) -> Fields:
     """Return elements higher than the layer that heats up below a fast contact; collective."""
     layer = mesh_fineness.heated_layer(seen.system)
-    return {} if layer is None or layer.height <= layer.needed else vars(layer)
+    return {} if layer is None or not layer.remedy else vars(layer)
 
 
 def stroke_taken_up(seen: Seen) -> Fields:
@@ -417,6 +418,15 @@ def unstable_speed(seen: Seen) -> Fields:
     return {"speed": motion.mean_speed, "critical": critical, "ratio": motion.mean_speed / critical, "unit": unit}
 
 
+class _Readable(Formatter):
+    """Fills numbers into a message, without exponents where they are large."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        """Return a field as text."""
+        text = super().format_field(value, format_spec)
+        return readable(value, 4) if "e+" in text else text
+
+
 @dataclass(frozen=True)
 class Rule:
     """A check of a state and its message.
@@ -438,7 +448,7 @@ class Rule:
     def text(self, seen: Seen) -> str:
         """Return the message about a state; "" where all is well."""
         fields: Any = self.find(seen)
-        return f"{self.key}: {self.message}".format(**fields) if fields else ""
+        return _Readable().format(f"{self.key}: {self.message}", **fields) if fields else ""
 
 
 # The key that each balance depends on, and what to do where it is not fulfilled.
@@ -462,7 +472,7 @@ RULES: dict[str, Rule] = {
         other_unit,
         "geometry.file",
         "a mesh is read in mm, and this one may be in {unit}: {odd}. Give lengths in mm: in a .geo "
-        "`Mesh.ScalingFactor = {factor:g};` makes them so",
+        "add `Mesh.ScalingFactor = {factor:g};`",
         ("start", "system", "steady"),
     ),
     "hardness": Rule(
@@ -525,8 +535,8 @@ RULES: dict[str, Rule] = {
     "large": Rule(
         beyond_small_strain,
         "punch.loads",
-        "the {body} moves by up to {farthest:.2g} mm: where it is strained it stretches by {stretched:.2g} % and turns "
-        "by {turned:.2g} degrees. The linear theory, of small strains and rotations, is off by some {percent:.0f} % "
+        "the {body} moves by up to {farthest:.3g} mm: where it is strained it stretches by {stretched:.3g} % and turns "
+        "by {turned:.3g} degrees. The linear theory, of small strains and rotations, is off by some {percent:.0f} % "
         "there. Reduce the load or the approach, or use a program for large displacements",
         ("start", "first"),
     ),
@@ -560,7 +570,7 @@ RULES: dict[str, Rule] = {
         "run.half_cycles",
         "the {body} is worn through {when}: it has lost {depth:.4g} mm where it was {thick:.4g} mm thick. "
         "Results after "
-        "that are of no body. Reduce `run.half_cycles`, or make the {body} higher",
+        "that are invalid. Reduce `run.half_cycles`, or make the {body} higher",
         ("run",),
     ),
     "stroke": Rule(
@@ -585,7 +595,7 @@ RULES: dict[str, Rule] = {
         "geometry",
         "the strip's elements below the contact are up to {height:.3g} mm high. The layer that heats up while "
         "its material "
-        "passes is {thickness:.3g} mm thick, so the contact stays too cold. Make them at most {needed:.3g} mm high",
+        "passes is {thickness:.3g} mm thick, so the contact stays too cold. {remedy}",
         ("steady", "heat"),
     ),
     "speed": Rule(

@@ -20,8 +20,8 @@ def info_command(
         str,
         typer.Argument(
             metavar="KEY",
-            help="Explain this key of the case file, this table, or this ready geometry: bushing.geo; or list what a "
-            "file has: a mesh, a shape from CAD, a table, a height map.",
+            help="Explain this key or table of the case file, this built-in case, or this ready geometry: "
+            "bushing.geo; or list what a file has: a mesh, a shape from CAD, a table, a height map.",
             autocompletion=suggested_keys,
             show_default=False,
         ),
@@ -37,6 +37,10 @@ def info_command(
     geometries = ready_geometries()
     if key in geometries:
         answer({"geometry": asdict(geometries[key])}, geometries[key].text, as_json=as_json)
+    elif key in builtin_cases():
+        title = builtin_cases()[key]
+        hint = f"fenwear check {key} --full prints its keys; `base = {key!r}` in a file starts from them"
+        answer({"case": key, "title": title}, lambda: f"{key}: {title}\n    built-in case; {hint}", as_json=as_json)
     elif Path(key).is_file() or "/" in key:
         from fenwear.files.formats import listed_file
 

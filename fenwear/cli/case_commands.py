@@ -26,7 +26,6 @@ from fenwear.cli.application import (
     print_json,
     recorded,
     show,
-    show_results,
     suggested_tests,
     with_names,
 )
@@ -86,7 +85,7 @@ def run(
     if as_json:
         print_json(summary)
     elif not quiet:
-        show_results(first_screen(summary, directory), f"results in {directory}")
+        show(first_screen(summary, directory))
 
 
 @app.command("check")
@@ -150,9 +149,9 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
     from fenwear.heat.periodic_heat import cycle_memory
     from fenwear.laws.optimum import motion_words
     from fenwear.steps import stability_number
-    from fenwear.studies.run import position_warnings
+    from fenwear.studies.run import explicit_warnings, position_warnings
 
-    loaded, number = system.case, stability_number(system)
+    loaded, size = system.case, f"{system.bodies.unknowns:,} displacement degrees of freedom"
     system.passing(system.phases_wear)  # with a look at the life of debris, as at all other laws
     system.check_touching()
     warnings = [
@@ -163,6 +162,10 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
     ]
     warm, of_heat = _with_heat(system, heat_seconds)
     warnings += of_heat
+    if loaded.run.integration == "explicit":
+        number = stability_number(system)
+        size = f"{size}, wear step {100 * number:.3g} % of the explicit limit"
+        warnings += explicit_warnings(system, number)
     for warning in warnings:
         log(f"{WARNING}{warning}")
     if full:
@@ -171,13 +174,11 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
         log(fineness_text(warm))
         if loaded.run.integration == "jump":
             log(f"heat: jumps keep the maps of its steps in a cycle, about {memory_size(cycle_memory(warm.exchange))}")
-    log(f"the case is valid: {len(system.pair.x)} contact nodes, "
-        f"{system.bodies.unknowns:,} displacement degrees of freedom, "
-        f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+    log(f"the case is valid: {len(system.pair.x)} contact nodes, {size}")
     rigid = system.rigid
     for body, modes in (("punch", rigid.mode_names[: rigid.of_punch]), ("strip", rigid.mode_names[rigid.of_punch :])):
         if modes:
-            log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact has to balance it")
+            log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact pressure balances the loads")
 
 
 def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[str]]:

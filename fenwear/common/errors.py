@@ -26,6 +26,12 @@ def did_you_mean(word: str, known: Iterable[str], cutoff: float = 0.6) -> str:
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
+def readable(value: float, digits: int = 2) -> str:
+    """Return a number in some digits, without an exponent where it is large."""
+    text = f"{value:,.{digits}g}"
+    return f"{float(text):,.0f}" if "e+" in text else text
+
+
 def _shortened(text: str, length: int = 500) -> str:
     """Return a text that may repeat what a file holds, however long that is, as long as people read."""
     return text if len(text) <= length else f"{text[: length - 50]} ... ({len(text):,} characters)"

@@ -413,7 +413,9 @@ class CondensedContact:
             opened = self._opened_beside(found.pressure)
             if np.abs(opened - before).max() <= enough:
                 return found
-        raise ConvergenceError(f"{self.inequality.name}: friction that differs from node to node did not settle")
+        raise ConvergenceError(
+            f"{self.inequality.name} did not converge: friction differs much from node to node. Reduce contact.friction"
+        )
 
     def _opened_beside(self, pressure: Array) -> Array:
         """Return the gaps (m, n) that pressures (m, n) open by what friction differs from that of the products."""
@@ -430,7 +432,7 @@ class CondensedContact:
         rigid = np.matmul(begun[:, None, :], self._rigid_normals)[:, 0]
         self._offset[:, :n] = (gap + self._loads + rigid) / self._gap_scale
         if not math.isfinite(self._offset.sum()):  # nor is a sum with one that is not
-            raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
+            raise ConvergenceError(f"{self.inequality.name}: the gap overflows. Check loads and units")
         if coupling is not self._coupling:
             self._coupling = coupling
             self._forget()

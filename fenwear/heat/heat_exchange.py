@@ -422,9 +422,9 @@ class HeatExchange:
         mean = end / capacity
         raise HeatError(
             f"the heat has failed, not the contact: the bodies are at {mean:.4g} K in the mean after a half-cycle. "
-            f"Friction can warm them by {abs(friction) / capacity:.3g} K, all else to {coldest:.4g} "
-            f"to {hottest:.4g} K. "
-            'Set heat.operator = "full", lower heat.reduction_tolerance, or increase heat.steps'
+            f"Friction can warm them by {abs(friction) / capacity:.3g} K. Without it they are between {coldest:.4g} "
+            f"and {hottest:.4g} K. "
+            'Set heat.operator = "full", reduce heat.reduction_tolerance, or increase heat.steps'
         )
 
     def by_conductance(self, phase: int, state: HeatState, pressure: Array, conductance: Array) -> Array:

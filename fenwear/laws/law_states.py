@@ -342,7 +342,7 @@ class Evolution:
             now, last = self.memory.bounded(now + unit.solve(missing)), now
             if (now - last).small_against(scale, SETTLED):
                 return now
-        raise ConvergenceError(f"{self._named()} did not settle within a step of {cycles:.3g} cycles")
+        raise ConvergenceError(f"{self._named()} did not converge in a step of {cycles:.3g} cycles. Use smoother rates")
 
     def around(self, middle: Held, change: Held | None = None) -> list[ContactConditions]:
         """Return the conditions of the phases of the cycle that has these states in its middle.
@@ -447,7 +447,7 @@ class Evolution:
             apart, whole, gone = _most(np.array([missing, end, end - start]))
             if (apart <= AGREE * (whole + gone)).all():
                 return middle, end + missing / 3, z
-        raise ConvergenceError(f"{self._named()} change too fast within a half-cycle: expected rates that are smoother")
+        raise ConvergenceError(f"{self._named()} change too fast within a half-cycle. Use smoother rates")
 
 
 def _most(values: Array) -> Array:

@@ -306,8 +306,8 @@ class Layers:
         beyond = float(pressure_of(found).max()) / self.hardness - 1
         raise ConvergenceError(
             f"Plastic flow did not converge: after {MOST_FLOWS} iterations the largest pressure exceeds "
-            f"contact.hardness by {beyond:.2g} of it. Little else carries the load where the hardness is near the mean "
-            "pressure"
+            f"contact.hardness by {100 * beyond:.2g} %. Little else carries the load where the hardness is near "
+            "the mean pressure"
         )
 
     def bounded(self, worn: WornDepths) -> WornDepths:

@@ -104,7 +104,7 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
     if size > 0 and balanced(punch):
         loose = [k for k in every[rigid.of_punch :] if not balanced([*punch, k])] or every[rigid.of_punch :]
         freely = " and to ".join(motion_words(rigid.mode_names[k]) for k in loose)
-        message = f"{beginning}the strip is free to {freely}, and the punch pushes it away; hold it against that"
+        message = f"{beginning}the strip is free to {freely}, and the punch pushes it away. Add a support of it"
         raise CaseError(InputError("strip.supports", message))
     tips: list[int] = []
     lifted = [k for k in punch if _lifts(rigid.mode_names[k]) and not (size > 0 and balanced([k]))]
@@ -116,8 +116,8 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
     raise CaseError(
         InputError(
             key,
-            f"{beginning}{what}; expected a load that presses on it between the contact's edges, friction included"
-            + (", or supports against tilting (or no_turning_about)" if tips else ""),
+            f"{beginning}{what}. Press it between the contact's edges, friction included"
+            + (", or add supports against tilting (or no_turning_about)" if tips else ""),
         )
     )
 
@@ -211,11 +211,11 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
     rows, resultant = balance / size[:, None], rigid.resultant / size
     if law.threshold > 0 and _balanced_below(rows, resultant, law.threshold):
         raise ConvergenceError(
-            f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, so "
-            "that nothing wears and any of them stays"
+            f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, "
+            "and nothing wears"
         )
     if not np.isfinite(rate / even).all():
-        raise ConvergenceError("no optimum: the wear rates of the mean pressure are too large or too small for numbers")
+        raise ConvergenceError("no optimum: the wear rates of the mean pressure are too large or too small to compute")
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
     y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
     if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
@@ -228,8 +228,8 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
         pressure = pressure * zone
     if pressure.max(initial=0.0) > wear.cap:
         raise ConvergenceError(
-            f"no optimum: it would need {pressure.max():.4g} MPa, and beyond the pressure_cap of {wear.cap:.4g} MPa "
-            "wear grows no more"
+            f"no optimum: it would need {pressure.max():.4g} MPa, above the pressure_cap of {wear.cap:.4g} MPa, where "
+            "wear does not grow with pressure"
         )
     velocity = rate * y / lengths
     tilt = np.arctan2(_tangential(rigid, velocity), rigid.rigid_normal @ velocity)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fenwear.case.body_names import Names, by_roles
-from fenwear.common.errors import CaseError, InputError
+from fenwear.common.errors import CaseError, InputError, readable
 from fenwear.results.history import CASE, SUMMARY
 from fenwear.results.sheet import LINES, OF_CONTACT, UNCERTAINTY, Line, shown
 from fenwear.results.stored_history import in_current_names
@@ -133,7 +133,7 @@ def number_text(value: Any, digits: int = 5) -> str:
         return f"{value:,}"
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}"
-    return f"{value:,.{digits}g}".replace("-", "−")
+    return readable(value, digits).replace("-", "−")
 
 
 class Number(NamedTuple):
@@ -195,9 +195,9 @@ def states(summary: Mapping[str, Any]) -> list[str]:
     if change is None or math.isnan(change):
         stationary = "Stationary: not known."
     elif change < STATIONARY:
-        stationary = f"Stationary: pressures repeat from cycle to cycle, to {100 * change:.2g} % of the pressure scale."
+        stationary = f"Stationary: pressures repeat in each cycle, to {readable(100 * change)} % of the pressure scale."
     else:
-        stationary = f"Not stationary: pressures change by {100 * change:.2g} % of the pressure scale in a cycle."
+        stationary = f"Not stationary: pressures change by {readable(100 * change)} % of the pressure scale in a cycle."
     if rate is not None and math.isfinite(rate):
         grows = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / max(rate, 1e-300):.3g} s"
         decays = f"Stable: small disturbances of the final contact decay, to 1/e in {1 / max(-rate, 1e-300):.3g} s"

@@ -145,7 +145,7 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
 
 def _retries(summary: Mapping[str, Any]) -> list[str]:
     retries = summary.get("retries", {})
-    return [f"Where the usual way did not converge: {way}, {count} times." for way, count in retries.items()]
+    return [f"The first attempt did not converge, {count} times: {way}." for way, count in retries.items()]
 
 
 def _balances(summary: Mapping[str, Any], history: xarray.Dataset) -> list[str]:

@@ -181,7 +181,7 @@ def last_contact(directory: Path) -> Checkpoint:
 
 def damaged(directory: Path) -> CaseError:
     """Return the error of a checkpoint that cannot be read."""
-    what = f"the checkpoint in {directory} is damaged, or of an earlier version; expected to start again, without"
+    what = f"the checkpoint in {directory} is damaged, or of an earlier version. Start again without --resume"
     return CaseError(InputError("--resume", what))
 
 

@@ -75,7 +75,7 @@ def run_case_of(path: Path, settings: Sequence[str]) -> tuple[Case, Heat]:
     heat = heat_of(of_heat)
     given = [one.partition("=")[0].strip().partition(".")[2] for one in of_heat]
     problems = [
-        InputError(f"heat.{key}", f"plays no part in what follows from pressures; expected one of {', '.join(TAKEN)}")
+        InputError(f"heat.{key}", f"has no effect on flash temperatures; expected one of {', '.join(TAKEN)}")
         for key in given
         if key not in TAKEN
     ]

@@ -190,8 +190,8 @@ class Coulomb:
         """
         if any(law.pressure_threshold > 0 for law in system.sliding.wear):
             raise ConvergenceError(
-                "no one final shape exists with a pressure_threshold: slipping nodes keep any pressure below it, as "
-                "the way there has left it. Follow the wear by `run`"
+                "no unique final shape exists with a pressure_threshold: the pressure below it that slipping nodes "
+                "keep depends on the run before. Follow the wear by `run`"
             )
         system, found = with_what_grows(
             system,

@@ -29,8 +29,8 @@ SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns i
 EDGES = 2  # times that contact is solved for its own edges in a step
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
-    'set heat.conducting = "nominal", or use weaker dependences: contact, the conducting nodes and the coefficients '
-    "did not converge"
+    'contact, conducting nodes and coefficients did not converge. Set heat.conducting = "nominal", or use weaker '
+    "dependences"
 )
 
 # Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None for none, from a start.

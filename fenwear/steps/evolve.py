@@ -89,8 +89,8 @@ def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Bloc
         if gain < 1:
             raise
         raise type(error)(
-            f"{error}; within a half-cycle, friction heat raises the pressure by up to {gain:.3g} times "
-            f"itself: {NO_JUMPS}"
+            f"{error}. Within a half-cycle, friction heat raises the pressure by up to {gain:.3g} times itself. "
+            f"{NO_JUMPS}"
         ) from error
 
 

@@ -24,10 +24,10 @@ from fenwear.system import Tribosystem
 
 MAX_ITERATIONS = 200
 APART = (
-    'set heat.conducting = "nominal" or take more heat.steps: nodes open and close in turn, so that contact and heat '
-    "did not converge"
+    "contact and heat did not converge: nodes open and close in turn. "
+    'Set heat.conducting = "nominal", or increase heat.steps'
 )
-SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
+SPLIT_ADVICE = 'Reduce heat.relaxation, increase heat.steps, or set heat.coupling = "implicit"'
 WORTH_IT = 12  # iterations with the same conductances after which a costly response of their own pays
 CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implicit iterations
 
@@ -140,7 +140,7 @@ class ThermalContact:
             try:
                 contact = self._contact.solve(free, contact, wearing)
             except ConvergenceError as error:  # the heat of a pressure too far off opens all nodes
-                raise ConvergenceError(f"{error}; in iteration {iteration} of the split: {SPLIT_ADVICE}") from error
+                raise ConvergenceError(f"{error}; in iteration {iteration} of the split. {SPLIT_ADVICE}") from error
             before, volume = volume, gap_volume(self.system, free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
             if agreed(self.system.comm, bool(abs(volume - before) < tolerance * volume)):
@@ -148,7 +148,7 @@ class ThermalContact:
             if agreed(self.system.comm, not np.isfinite(volume)):
                 break
         raise ConvergenceError(
-            f"the operator split of heat and contact did not converge in {iteration} iterations: {SPLIT_ADVICE}"
+            f"the operator split of heat and contact did not converge in {iteration} iterations. {SPLIT_ADVICE}"
         )
 
     def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:

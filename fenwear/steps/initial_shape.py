@@ -101,7 +101,7 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
         if not (0 < factor < np.inf and 0 < share < np.inf):
             raise CaseError(InputError("--load", f"expected positive numbers FACTOR or FACTOR:SHARE, got {factor:g}"))
     if system.sticks and len(loads) > 1:
-        message = "each load has its own stick zone, which alone carries it in the end: give one load"
+        message = "each load has its own stick zone, which alone carries the load in the end. Give one load"
         raise CaseError(InputError("--load", message))
     systems = [system if factor == 1.0 else _under(system, factor) for factor, _ in loads]
     states: tuple[SteadyState | FinalShape, ...] = tuple(steady(one) for one in systems)
@@ -240,7 +240,7 @@ def _evened(systems: Sequence[Tribosystem], shares: Array, start: Array) -> Arra
         off = compliance.apply(rest * (carried.sum() / total.sum()))
         return depth + off, (depth, carried > 0), uneven < EVEN
 
-    failure = "no shape that all loads wear evenly was found: give loads that are less apart; it did not converge"
+    failure = "the shape that all loads wear evenly did not converge. Give loads that differ less"
     return _least(system, *fixed_point(advance, start, lambda *_: False, failure, team=system.team))
 
 
@@ -254,9 +254,7 @@ def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
     weights = system.pair.weights / system.pair.weights.sum()
     found = linprog(-(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None))
     if found.x is None:
-        raise ConvergenceError(
-            "no shape to machine: every rigid motion of the punch would have material added somewhere"
-        )
+        raise ConvergenceError("no shape to machine exists: material would have to be added somewhere in each")
     depth = shape - scale * (modes @ found.x)  # to the programme's tolerance, which a clipped depth would show
     touching = np.flatnonzero(where)[found.ineqlin.marginals < 0]
     return np.asarray(shape - depth + modes @ np.linalg.lstsq(modes[touching], depth[touching], rcond=None)[0])

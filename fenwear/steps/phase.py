@@ -263,7 +263,7 @@ class PhaseStep:
                 contact, after, heat = self._solve(at, gap, passing)
             except ConvergenceError as error:
                 largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
-                raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
+                raise ConvergenceError(f"{error}. Friction reaches {largest:.3g} times the pressure") from error
             at = replace(at, start=contact)
             return contact.pressure[0], (contact, after, heat, passing), False
 

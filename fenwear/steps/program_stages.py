@@ -178,7 +178,7 @@ def loading_of(system: Tribosystem, stage: Stage) -> Loading:
     mean = max(ends) * system.rigid.mean_pressure
     if system.layers.hardness <= mean:
         message = f"expected more than the mean pressure of {mean:.6g} MPa in program.steps.{stage.step}"
-        raise CaseError(InputError("contact.hardness", f"{message}: nothing softer carries the load"))
+        raise CaseError(InputError("contact.hardness", f"{message}, which no softer surface carries"))
     if ends == (1.0, 1.0):
         return as_given
     first, last = ends

@@ -108,7 +108,7 @@ def _parts(
     pressure, own = (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
     if system.passing_laws:
         raise CaseError(
-            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
+            InputError(system.passing_laws[0], "changes as long as it slides, so that no state grows or decays")
         )
     shape = (len(system.motion.phases), len(system.pair.weights))
     if pressure.shape != shape:
@@ -134,9 +134,7 @@ def _factors(
         tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit, worn=rest)
         cycle, rest = tangent @ cycle, lies_after(system, phase, pressure[phase], heat, state, rest)
     if not np.isfinite(cycle).all():
-        raise ConvergenceError(
-            "growth of disturbances in a cycle is beyond all numbers: wear, heat or load is too large"
-        )
+        raise ConvergenceError("the growth of disturbances in a cycle overflows. Reduce wear, heat or load")
     return np.asarray(np.linalg.eigvals(cycle), dtype=complex)
 
 
@@ -231,7 +229,7 @@ def repeating_temperatures(
         try:
             end = heat.jump(heat.initial(), np.inf, conductances)
         except scipy.linalg.LinAlgError:
-            raise ConvergenceError("no temperatures repeat: the bodies lose heat nowhere") from None
+            raise ConvergenceError("no temperatures repeat: the bodies lose no heat. Set heat.convection") from None
         states = [exchange.at(end.state(pressure))]
         for phase in range(len(pressure) - 1):
             states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])

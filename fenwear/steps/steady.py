@@ -66,8 +66,8 @@ JUMPS = 0.3  # tolerance of jumps over the distance that is looked for
 BESIDE = 0.05  # of the cycles: how far the last two ends are apart between which they are interpolated
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
 NOTHING_WEARS = (
-    "no cyclic steady state of its own exists: pressures below the pressure_threshold balance the loads, so that "
-    "nothing wears and any of them stays. Follow the wear by `run`"
+    "no unique cyclic steady state exists: pressures below the pressure_threshold balance the loads, and nothing "
+    "wears. Follow the wear by `run`"
 )
 NO_ONE_MOTION = (
     "no cyclic steady state exists: no single rigid motion follows the wear of all nodes under pressure. This happens "
@@ -307,13 +307,13 @@ def _none_under_cap(system: Tribosystem) -> str:
         if law.cap == cap
     ]
     why = (
-        "the mean pressure is beyond it, all that is pressed so wears alike, and any shape stays"
+        "the mean pressure is above it, so that all nodes wear at one rate in any shape"
         if cap <= mean
-        else "no pressures wear the contact by a rigid motion: where it lags behind they grow without end"
+        else "no pressures wear the contact by a rigid motion"
     )
     return (
-        f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: beyond it wear grows no more, and {why}. The "
-        f"mean pressure is {mean:.4g} MPa. Raise the cap, or follow the wear by `run`"
+        f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: above it wear does not grow with pressure, and "
+        f"{why}. The mean pressure is {mean:.4g} MPa. Raise the cap, or follow the wear by `run`"
     )
 
 

@@ -407,8 +407,8 @@ def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
     """
     if not zone.any():
         raise ConvergenceError(
-            "no final shape exists: every node slips in a cycle, so that wear never ends; expected a smaller "
-            "stroke or force, or contact.law = 'gross-sliding'"
+            "no final shape exists: every node slips in a cycle, so that wear never ends. Reduce the "
+            "stroke or the force, or set contact.law = 'gross-sliding'"
         )
     unworn = problem.unworn()
     gap = problem.opening(problem.interface.middle, unworn)

@@ -149,8 +149,8 @@ class CycleMap:
         """
         if np.abs(scipy.linalg.eigvals(self.through)).max() > 1 - NEUTRAL:
             message = (
-                "the bodies lose no heat: their final temperature depends on the way there, which `run` follows. "
-                "For `steady` hold a temperature or set a convection: any value will do, since in the end nothing slips"
+                "the bodies lose no heat, so their final temperature depends on the run before: use `run`. For "
+                "`steady` hold a temperature or set any convection, since in the end nothing slips"
             )
             raise CaseError(InputError("heat.convection", message))
         return JumpEnd(self.through, np.inf).state(self.source, self.source)
@@ -275,7 +275,7 @@ def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array
 
 CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step
 ENOUGH = 12  # iterations after which nodes that open and close no longer decide who conducts
-APART = "contact with stick and heat did not converge: expected more stick.steps, or less friction heat; tried"
+APART = "contact with stick and heat did not converge. Increase stick.steps, or reduce the friction heat"
 
 
 def coupled_step(

@@ -19,7 +19,7 @@ from fenwear.steps.stick_state import Imposed, StickState
 MOST = 60  # Newton steps
 IDLE = 0.5  # of a residual: steps that lessen it by less, all of a step's patience, go round
 HALVINGS = 6  # of a step that does not converge
-TOO_LARGE = "friction is so large that the step may have no or several answers; expected less friction"
+TOO_LARGE = "friction is so large that the step may have no or several solutions. Reduce contact.friction"
 
 
 class ManyAnswersError(ConvergenceError):
@@ -95,7 +95,7 @@ def _check_force(
     if abs(force) >= most * (1 - 1e-9):
         raise ConvergenceError(
             f"gross sliding starts: the tangential force {force:.6g} reaches mu P = {most:.4g}, and nothing else holds "
-            "the bodies; expected less force, or an imposed displacement"
+            "the bodies. Reduce the force, or impose a displacement"
         )
 
 
@@ -226,7 +226,7 @@ def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[Statu
     failed = f"the contact with stick did not converge in {iteration} Newton steps, residual {wrong:.3g}"
     if len(signs) > 1:
         raise ManyAnswersError(f"{failed}: {TOO_LARGE}")
-    raise ConvergenceError(f"{failed}: take more steps, or less friction")
+    raise ConvergenceError(f"{failed}. Increase stick.steps, or reduce contact.friction")
 
 
 def _solve(step: Step, status: ContactStatus) -> StatusSolution:

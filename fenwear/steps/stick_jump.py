@@ -40,7 +40,7 @@ from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords
 from fenwear.steps.stick_state import NO_HEAT, PartialSlipState
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
-TOO_LARGE = "wear of many cycles is too large for numbers: expected a smaller wear coefficient"
+TOO_LARGE = "wear of many cycles overflows. Reduce the wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 MOST_RUN_IN, CLOSED = 20, 1e-3  # cycles until one closes; its change of tractions, over all of them
 SHORTEST = 1 / 256  # of a cycle: the shortest part of one

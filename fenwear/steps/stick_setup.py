@@ -219,8 +219,8 @@ class Fineness:
         if self.enough:
             return ""
         return (
-            f"the time steps are too coarse: halving the {self.steps} of a half-cycle changes force or friction's work "
-            f"of the first cycle by {100 * self.change:.2g} %. Increase stick.steps"
+            f"stick.steps: time steps are too coarse. Halving the {self.steps} of a half-cycle changes force or "
+            f"friction work of the first cycle by {100 * self.change:.2g} %. Increase `stick.steps`"
         )
 
 

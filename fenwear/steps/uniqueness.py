@@ -27,7 +27,7 @@ from fenwear.heat.temperature import HeatState
 from fenwear.system import Tribosystem, heating_friction
 
 NO_JUMPS = (  # V_cr of R. A. Burton, and what becomes of the contact beyond it: hot bands that wear, cool and move
-    'hot bands come and go within few of them, which jumps cannot pass over: run.integration = "implicit" follows them'
+    'Hot bands appear and vanish within few half-cycles, too fast for jumps. Set run.integration = "implicit"'
 )
 LEVELS = 200  # pressures at which the steepest traction of friction is looked for
 FEW = 50  # contact nodes up to which all eigenvalues are found
@@ -119,12 +119,12 @@ def heat_warnings(gain: float | None, *, jumps: bool = False) -> list[str]:
     """
     if gain is None or gain < 1:
         return []
-    beyond = f"; {NO_JUMPS}" if jumps else ""
+    beyond = f". {NO_JUMPS}" if jumps else ""
     return [
-        "Thermoelastic feedback is strong: within one half-cycle, the heat of friction answers a change of pressure by "
-        f"{gain:.3g} times that change. Above 1 the contact may have several answers, and the start decides which one "
-        "is computed. Reduce friction, speed or the heat that flows into the contact. Shorter half-cycles follow how "
-        f"the contact breaks up{beyond}"
+        "Thermoelastic feedback is strong: within one half-cycle, friction heat adds "
+        f"{gain:.3g} times a change of pressure to this change. Above 1 the contact may have several solutions, and "
+        "the start decides which one is computed. Reduce friction, speed or the heat that flows into the contact"
+        f"{beyond}"
     ]
 
 

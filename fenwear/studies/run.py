@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.case import Case, OneWay, Reciprocating, Rotation, plausibility_warnings
+from fenwear.case.motions import MOST_POSITIONS
 from fenwear.checks import (
     HeatMonitor,
     Seen,
@@ -186,8 +187,8 @@ def preparation_of(case: Case) -> Preparation:
 def _way_on(reached: int | None) -> str:
     """Return how to resume after a fault of the disk, from a checkpoint of this half-cycle."""
     if reached is None:
-        return "there is no checkpoint to resume from: mend the cause, then start again in a new folder"
-    return f"mend the cause, then resume from the checkpoint of half-cycle {reached}: --resume"
+        return "there is no checkpoint to resume from. Mend the cause, then start again in a new folder"
+    return f"Mend the cause, then resume from the checkpoint of half-cycle {reached}: --resume"
 
 
 class NoLevel:
@@ -250,7 +251,7 @@ class _Run:
         self.unique: list[Mask] = []  # of time steps, whether their answer was the only one near
         if self.case.run.integration == "explicit" and not system.sticks:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
-            self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
+            self.warnings = explicit_warnings(system, self.numbers["wear_step_over_explicit_limit"])
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
         self.warnings += [*law_warnings(system), *Seen.of_system(system).warnings("system")]
         if self.case.leaves_positions and system.motion.positions > DEFAULT_POSITIONS:
@@ -385,7 +386,7 @@ class _Run:
             times = "once" if count == 1 else f"{count} times"
             which = block.half_cycle[block.retries > 0]
             self.log(
-                f"half-cycles {which[0]:,} to {which[-1]:,}: {name}, {times}, where the usual way did not converge"
+                f"half-cycles {which[0]:,} to {which[-1]:,}: {name}, {times}, as the first attempt did not converge"
             )
         self.remedies += block.remedies
 
@@ -441,7 +442,7 @@ class _Run:
             return f"no half-cycle was done; {self.directory} can be removed"
         reached = f"the results up to half-cycle {self.state.half_cycle} are in {self.directory}"
         if isinstance(failure, MeshQualityError):
-            return f"{reached}; to get further: start again with coarser elements at the contact, or a thicker body"
+            return f"{reached}. Start again with coarser elements at the contact, or a thicker body"
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
         return f"{reached}, to resume: --resume{how}"
 
@@ -493,6 +494,8 @@ class _Run:
         pressure, motion = all_phases(self.state.contacts).pressure, self.system.motion
         if last.heat is None or not len(pressure) or self.system.track_changes or self.system.sticks:
             return ""
+        if self.case.program is not None and self.case.program.steps[-1].ramps:
+            return "the last step of the program changes speed or loads, so that no state is stationary"
         surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
         phase = self.state.half_cycle % motion.half_cycles * motion.positions
         change = float(last.periodicity[-motion.half_cycles :].max())
@@ -519,9 +522,17 @@ def position_warnings(system: Tribosystem) -> list[str]:
         return stands
     wanted = int(np.ceil(motion.positions * spacing))
     return [
-        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its track will have steps. "
-        f"Set motion.positions = {wanted}, or use fewer elements along the contact"
+        f"motion.positions: positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart. Its track "
+        f"will have steps. {_with_positions(wanted)}"
     ]
+
+
+def _with_positions(number: int) -> str:
+    """Return the advice to take a number of positions of the strip, or a mesh that needs fewer."""
+    if number <= MOST_POSITIONS:
+        return f"Set `motion.positions = {number}`"
+    longer = f"Make elements at the contact {number / MOST_POSITIONS:.2g} times as long"
+    return f"{longer}, and set `motion.positions = {MOST_POSITIONS}`, the most"
 
 
 def _standing_profile(system: Tribosystem) -> list[str]:
@@ -537,9 +548,9 @@ def _standing_profile(system: Tribosystem) -> list[str]:
     elif isinstance(motion, Reciprocating):
         positions = system.motion.positions
         needed = math.ceil(slid * (positions if positions > 1 else math.pi / 2))  # in the middle they are far apart
-        wanted = f"Take one for each contact node: set motion.positions = {needed}"
+        wanted = _with_positions(needed)
     else:
-        wanted = "Give rows of the cycle that lie as near to each other as contact nodes"
+        wanted = "Give rows of the cycle as close to each other as contact nodes"
     return [
         f"{key}: the strip slides over {slid:.3g} contact nodes from position to position, and its uneven surface "
         f"stands still in each. The punch takes its imprint, where it should pass. {wanted}"
@@ -561,17 +572,20 @@ def _uneven(system: Tribosystem) -> bool:
     return bool(changes.max(initial=0.0) > EVEN * np.ptp(depth))
 
 
-def _warnings(number: float, growth: float | None) -> list[str]:
-    if number <= 1 and growth is not None:
+def explicit_warnings(system: Tribosystem, number: float) -> list[str]:
+    """Return the warnings of explicit steps of wear whose step is a number of times their limit; collective."""
+    if number > 1:
         return [
-            f"with heat, explicit steps of wear let disturbances of the contact grow by {growth:.3g} 1/s: the pressure "
-            'will not settle. Set run.integration = "implicit" or "jump"'
+            f"run.integration: the wear of a half-cycle is {number:.3g} times the limit of explicit steps. Pressures "
+            'will oscillate from node to node. Set `run.integration = "implicit"` or "jump", or use fewer elements '
+            "along the contact"
         ]
-    if number <= 1:
+    growth = explicit_growth(system)
+    if growth is None:
         return []
     return [
-        f"the wear of a half-cycle is {number:.3g} times the limit of explicit steps: pressure will oscillate from "
-        'node to node. Set run.integration = "implicit" or "jump", or use fewer elements along the contact'
+        f"run.integration: with heat, explicit steps of wear let disturbances of the contact grow by {growth:.3g} 1/s. "
+        'Pressures will not settle. Set `run.integration = "implicit"` or "jump"'
     ]
 
 

@@ -393,7 +393,7 @@ def _shared_out(
                 yield future.result()
     except BrokenExecutor as error:
         raise InterruptedRunError(
-            "a process of the study has ended, perhaps for lack of memory: expected fewer processes at once"
+            "a process of the study has ended, perhaps for lack of memory. Reduce --processes"
         ) from error
     finally:
         for future in waiting:

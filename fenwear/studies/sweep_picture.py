@@ -55,7 +55,7 @@ def sweep_figure(dataset: xarray.Dataset) -> Figure:
         values = _cycle_largest(at_first[name])
         factor, unit = FACTORS.get(values.attrs["units"], (1.0, "")) if name in MICROMETRES else (1.0, "")
         unit = unit or values.attrs["units"]
-        name_of = values.attrs["long_name"]
+        name_of = values.attrs["long_name"].partition(":")[0]
         ax.set_title(name_of[:1].upper() + name_of[1:], loc="left")
         label = f"{values.attrs['long_name'].split(' of ')[0]} ({unit})" if unit else values.attrs["long_name"]
         if second and (at_first.sizes[second] > LINES or of_fretting):

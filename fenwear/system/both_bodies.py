@@ -160,8 +160,8 @@ class Bodies:
             ]
             if parts:
                 texts.append(
-                    f"{body.body.name}.loads: {' and '.join(parts)} act where supports hold that very motion: the "
-                    "contact does not feel them; load a group that is free to move that way"
+                    f"{body.body.name}.loads: {' and '.join(parts)} act where supports hold this motion, so the "
+                    "contact does not carry them. Load a group that is free to move that way"
                 )
         return texts
 

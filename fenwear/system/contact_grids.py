@@ -59,7 +59,7 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
     surfaces = punch.surface, strip.surface
     (axis, side), (other, opposite) = (facet_side(surface) for surface in surfaces)
     if axis != other or side == opposite:
-        raise CaseError(InputError("grid", "expected contact surfaces that look at each other along one axis"))
+        raise CaseError(InputError("grid", "expected contact surfaces that face each other along one axis"))
     level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
     own = _grid(case.grid, punch.surface, axis, level)
     _check_memory(punch.body.mesh.comm, own, sliding)
@@ -123,12 +123,10 @@ def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> Non
     place = grid.flat[int(np.abs(least[:, 0]).argmax())]
     there = " and ".join(f"{'xyz'[axis]} = {at:.3g} mm" for axis, at in zip(grid.axes, place, strict=True))
     message = (
-        f"finer than the elements of both condensed bodies, as at {there}: pressures that turn from node to node are "
+        f"finer than the elements of both condensed bodies, as at {there}: pressures oscillating from node to node "
+        "would not be resolved. Use fewer grid nodes, a smaller grid.size, smaller elements there, or "
+        "punch.operator or strip.operator = 'fine'"
     )
-    message += (
-        "felt by neither; expected fewer nodes, smaller elements there, a smaller grid.size around finer ones, or "
-    )
-    message += "punch.operator or strip.operator = 'fine', for which elements may be as coarse as they like"
     reasons = [one.taken for one in (punch, strip) if one.taken]
     raise CaseError(InputError("grid.nodes", message + (f" ({'; '.join(reasons)})" if reasons else "")))
 

@@ -48,7 +48,7 @@ def register_contact_law(name: str, law: Any) -> None:
     """
     own = isinstance(LAWS.get(name), str) or name == AUTO
     if not name.replace("-", "_").isidentifier() or own:
-        raise CaseError(InputError("contact.law", f"expected a word that no law of fenwear has, got {name!r}"))
+        raise CaseError(InputError("contact.law", f"expected a name that no built-in law has, got {name!r}"))
     LAWS[name] = law
     CONTACT_LAWS.add(name)
 

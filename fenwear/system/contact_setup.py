@@ -283,7 +283,7 @@ class ContactSetup:
             contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries, alike=self._alike
         )
         if found.hardness <= mean:
-            message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
+            message = f"expected more than the mean pressure of {mean:.6g} MPa, which no softer surface carries"
             raise CaseError(InputError("contact.hardness", message))
         return found
 
@@ -543,7 +543,7 @@ class ContactSetup:
             ConvergenceError: a pressure_threshold or a pressure_cap leaves no optimum.
         """
         if self.motion.steps:
-            message = "is a table of changing directions and loads: no one pressure is the optimum of all; see `steady`"
+            message = "directions and loads change within a cycle, so no optimum exists. Use `fenwear steady`"
             raise CaseError(InputError("motion.kind", message))
         if self.sticks:
             message = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"

@@ -110,8 +110,8 @@ def check_stays(middle: ContactPair, sliding: Sliding) -> None:
         out = abs(along @ normal) / np.linalg.norm(normal)
         if out > OUT_OF_SURFACE:
             way = ", ".join(f"{part:.3g}" for part in along - (along @ normal) / (normal @ normal) * normal + 0.0)
-            hint = f"along it is ({way})" if out < 1 - OUT_OF_SURFACE else "along it is any way at right angles to that"
-            raise CaseError(InputError("motion.along", f"the strip would move out of the contact: {hint}"))
+            hint = f"Set ({way})" if out < 1 - OUT_OF_SURFACE else "Set a direction at right angles to it"
+            raise CaseError(InputError("motion.along", f"the strip would move out of the contact. {hint}"))
     if not any(sliding.field.turn) or sliding.motion.reach > 0:
         return
     velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
@@ -119,7 +119,7 @@ def check_stays(middle: ContactPair, sliding: Sliding) -> None:
     if out.mean() > OUT_OF_SURFACE or out.max() > FACET:
         raise CaseError(
             InputError(
-                "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
+                "motion.axis", "the strip's contact surface would turn out of the contact. Set its axis of revolution"
             )
         )
 
@@ -139,7 +139,7 @@ def _check_steps_stay(middle: ContactPair, motion: Motion) -> None:
         if leaves:
             message = (
                 f"from row {number + 1} to row {number + 2} the strip's surface does not slide along itself: it would "
-                "open the contact, or go into the punch. Expected turns about the middle of round surfaces "
-                "(motion.centre), and shifts along flat ones; the load brings bodies together"
+                "open the contact, or overlap the punch. Turn round surfaces about their middle (motion.centre), and "
+                "shift flat ones along themselves. The load brings bodies together"
             )
             raise CaseError(InputError("motion.rows", message))

@@ -188,8 +188,8 @@ class Tribosystem(ContactSetup):
         raise CaseError(
             InputError(
                 "punch.supports",
-                f"they carry all of the load of {given:.4g} N: none of it reaches the contact. Expected a punch that "
-                "is free to come down, or a support that is moved `by` an approach in place of the load",
+                f"the supports carry all of the load of {given:.4g} N, and none of it reaches the contact. Free the "
+                "punch along the contact's normal, or move a support `by` an approach in place of the load",
             )
         )
 

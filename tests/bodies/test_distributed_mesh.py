@@ -174,7 +174,7 @@ def test_pins(parameters: dict[str, float], points: set[tuple[float, float]]) ->
     [
         (
             {"punch_with": 60},
-            "geometry.parameters.punch_with: .* has no such parameter, but .*growth.*; did you mean .punch_width.",
+            "geometry.parameters.punch_with: .* has no such parameter.*growth.*; did you mean .punch_width.",
         ),
         ({"pin_height_1": 101}, "a pin is off the punch"),
         ({"pin_height_1": 0}, "a pin is off the punch"),

@@ -272,13 +272,13 @@ def test_a_contact_decides() -> None:
     pressures = [one.phase_contact([0]).solve(one.gap(0, one.unworn())).pressure[0] for one in (fine_of, asked)]
     assert np.array_equal(*pressures)
     assert [line.split(":")[:2] for line in fine_of.bodies.solved_by] == [
-        [f"{name}.operator", " 'fine' is taken"] for name in ("punch", "strip")
+        [f"{name}.operator", " 'fine' is used"] for name in ("punch", "strip")
     ]
     assert not asked.bodies.solved_by
     edges = assemble(load_case("example1-lz40", ["grid.nodes=81"]))
     said = edges.bodies.solved_by
     assert [edges.bodies.punch.operator, edges.bodies.strip.operator] == ["condensed", "fine"]
-    assert "'condensed' is taken" in said[0]
+    assert "'condensed' is used" in said[0]
     assert "polynomials" in said[0]
     by_hand = assemble(
         load_case("example1-lz40", ["grid.nodes=81", "punch.operator='condensed'", "strip.operator='fine'"])

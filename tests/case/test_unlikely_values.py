@@ -60,7 +60,11 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
         (["heat.initial='20 degC'"], "strip.temperatures.0.temperature", "0 K, which is -273.15 degC"),
         (["heat.ambient=20"], "heat.ambient", "read as 20 K, beside"),
         ([TABLE % (20, 400)], "contact.friction", "spans 20 to 400 K, which does not contain heat.initial, 0 K"),
-        (["heat.initial='20 degC'", TABLE % (20, 400)], "contact.friction", "are these degrees Celsius?"),
+        (
+            ["heat.initial='20 degC'", TABLE % (20, 400)],
+            "contact.friction",
+            "begins at 20 K, beside heat.initial of 293.15 K",
+        ),
     ],
 )
 def test_doubts(settings: list[str], key: str, expected: str) -> None:

@@ -101,4 +101,4 @@ def test_a_basis_that_cannot_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     (told,) = (text for text in Seen.of_system(system).warnings("heat") if "whole mesh" in text)
     assert told.startswith("heat.reduction_tolerance: ")
     assert "heat.reduction_difference = 0.002" in told
-    assert f"those of the whole mesh to {fineness.difference:.2g}" in fineness_text(system)
+    assert f"{100 * fineness.difference:.2g} %" in fineness_text(system)

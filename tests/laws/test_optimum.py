@@ -148,7 +148,7 @@ def test_no_optimum(assembled: Callable[..., Tribosystem]) -> None:
     (block,) = march(light, 2)
     assert np.isnan(block.optimum_distance).all()
     capped = assembled("example1", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}")
-    with pytest.raises(ConvergenceError, match=r"would need 2\d.* beyond the pressure_cap of 20 MPa"):
+    with pytest.raises(ConvergenceError, match=r"would need 2\d.* pressure_cap of 20 MPa"):
         capped.optimum(1)
     assert (
         np.ptp(assembled("example2", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}").optimum(1).pressure)

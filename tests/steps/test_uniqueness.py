@@ -139,9 +139,9 @@ def test_a_run_and_the_steady_state_say_so(fenwear: Callable[..., Any], tmp_path
     for command in (("check",), ("steady",), ("run", "--set", "run.half_cycles=1", "-o", str(tmp_path / "out"))):
         name, *more = command
         done = fenwear(name, NAME, *small, *more, "--set", "contact.friction=0.45", "--set", "output.report=false")
-        assert "the contact may have several answers" in done.stderr
+        assert "several solutions" in done.stderr
     done = fenwear("check", NAME, *small)
-    assert "several answers" not in done.stderr
+    assert "several solutions" not in done.stderr
 
 
 def last_cycles(system: Tribosystem) -> dict[str, tuple[Array, Array]]:
@@ -227,7 +227,7 @@ def test_of_a_program_the_worst_stage_is_told(tmp_path: Path) -> None:
         assert system.exchange.fineness is not None
         told.append(system.exchange.fineness.difference)
     assert difference == pytest.approx(max(told), rel=1e-6)
-    assert any("several answers" in text for text in summary["warnings"])
+    assert any("several" in text for text in summary["warnings"])
 
 
 def test_implicit_steps_follow_hot_bands() -> None:

@@ -1,7 +1,8 @@
 """What is rejected together though each by itself is fine: inputs, the key of the error, and why; read by the docs.
 
 Physics: no such thing or state exists. Model: the equations, or a way to solve them, are of something else, and the
-message names what to use instead. test_refusals.py gives each input of `LOADED` to the program, and looks for the key.
+message names what to use instead. test_refusals.py gives each input of `LOADED` and `PLACED` to the program, and looks
+for the key.
 """
 
 from __future__ import annotations
@@ -128,31 +129,38 @@ LOADED = (
             'a closed track with `heat.operator = "full"`: its bulk is one of the numbers that the basis has'),
     Refusal(PLANE, ("wear.punch={archard=1e-4, hardness='2 GPa', pressure_exponent=2}",), "wear.punch.archard", PHYSICS,
             "`archard` and `energy`, laws of p v, with other exponents"),
+    Refusal(BALL, ("model.plane=strain",), "model.plane", PHYSICS, "a state of the plane in solids or rings"),
+    Refusal(PLANE, ("wear.punch={per_area=1e-8, pressure_cap=20}",), "wear.punch.per_area", PHYSICS,
+            "wear per contact area, whose pressure is given, with bounds of pressure"),
+)  # fmt: skip
+
+# These are rejected where the bodies are brought opposite each other.
+PLACED = (
+    Refusal(RING, ("grid.nodes=33",), "grid", MODEL,
+            "`grid` in rings: their forces are of whole circles, no kernel of a half-space is"),
+    Refusal(PLANE, ("geometry={file='solid_blocks.geo'}",), "geometry.file", PHYSICS, "volumes in a plane model"),
 )  # fmt: skip
 
 # Of these a solver knows, or a mesh: by the test that provokes them, "" where none does.
 ELSEWHERE = (
     (PHYSICS, "a load where its own motion is held: no force comes to the contact",
      "test_approach.py::test_a_load_on_a_held_group"),
-    (MODEL, "`grid` in rings: their forces are of whole circles, no kernel of a half-space is", ""),
     (PHYSICS, "a cycle that moves the strip into or off the punch",
      "steps/test_table.py::test_loads_that_no_contact_can_carry"),
     (MODEL, '`operator = "half-space"` on elements of degree 2, whose nodes have unequal areas',
      "bodies/test_surface_operators.py::test_bodies_that_are_no_half_space"),
     (PHYSICS, "a half-space and supports that move it: it is held far away", ""),
-    (PHYSICS, "volumes in a plane model", ""),
-    (MODEL, "a body that is free along the surface's normal where this is not z: turn the geometry", ""),
+    (MODEL, "a body that is free along the surface's normal where this is not z: turn the geometry",
+     "test_solid.py::test_a_free_body_whose_contact_does_not_face_z"),
     (PHYSICS, "a part that nothing holds",
      "bodies/test_connected_parts.py::test_a_part_that_neither_touches_nor_is_held"),
-    (PHYSICS, "a state of the plane in solids or rings", ""),
-    (PHYSICS, "wear per contact area, whose pressure is given, with bounds of pressure", ""),
     (PHYSICS, "an end where loads press to either side in turn",
      "steps/test_table.py::test_a_ring_pressed_to_either_side_has_no_steady_state"),
     (PHYSICS, "an end where the strip wears to and fro",
      "steps/test_positions.py::test_no_steady_state_where_the_track_deepens"),
     (PHYSICS, "an end of laws of depth or distance", "studies/test_sensitivity.py::test_laws_that_pass_are_refused"),
     (PHYSICS, "an end of creep without end", "steps/test_creep.py::test_growth_without_an_end"),
-    (PHYSICS, "an end of wear between bodies that are held apart", ""),
+    (PHYSICS, "an end of wear between bodies that are held apart", "test_refusals.py::test_no_end_of_held_bodies"),
     (PHYSICS, "an end whose loads no wear balances",
      "steps/test_steady.py::test_friction_can_tip_the_punch_out_of_any_steady_state"),
     (PHYSICS, "an end beyond `pressure_cap`", "steps/test_steady.py::test_cap_that_holds_nothing"),
@@ -161,19 +169,23 @@ ELSEWHERE = (
     (PHYSICS, "an end where only a strip's turning about a hinge that slides with it could follow the wear: each place "
      "wears a facet of its own, deeper for ever",
      "steps/test_free_strip.py::test_no_shape_stays_under_a_strip_on_a_hinge"),
-    (MODEL, "`flash` of a cycle that is a table: kernels of sources have one way to and fro", ""),
-    (MODEL, "`flash` of a test program with stick, whose last cycle is done again", ""),
+    (MODEL, "`flash` of a cycle that is a table: kernels of sources have one way to and fro",
+     "test_refusals.py::test_flash_of_cycles_without_a_kernel"),
+    (MODEL, "`flash` of a test program with stick, whose last cycle is done again",
+     "test_refusals.py::test_flash_of_cycles_without_a_kernel"),
     (MODEL, "`flash` where the strip turns about a point near to the contact",
      "results/test_flash_temperatures.py::test_refused_turning_about_the_contact"),
     (MODEL, "a reduced basis whose temperatures grow of themselves", ""),
-    (MODEL, "`contact.lubrication` whose share changes during the cycle, with a layer that closes by a law", ""),
+    (MODEL, "`contact.lubrication` whose share changes during the cycle, with a layer that closes by a law",
+     "test_refusals.py::test_a_share_that_changes_with_a_layer"),
     (PHYSICS, "an end of partial slip with a threshold, which depends on the way there",
      "steps/test_steady.py::test_pressures_below_the_threshold_have_no_end_of_their_own"),
     (PHYSICS, "an end of partial slip where all slips",
      "steps/test_final_shape.py::test_a_force_shrinks_the_zone_under_a_prescribed_approach"),
     (PHYSICS, "steady quantities with laws of depth or distance",
      "studies/test_sensitivity.py::test_laws_that_pass_are_refused"),
-    (MODEL, "run-in and critical speeds with properties of T: rates of small disturbances of bodies that stay", ""),
+    (MODEL, "run-in and critical speeds with properties of T: rates of small disturbances of bodies that stay",
+     "test_refusals.py::test_no_rates_with_properties_of_the_temperature"),
     (PHYSICS, "an end of bodies that lose no heat",
      "steps/test_stick_heat.py::test_what_does_not_go_with_heat_is_told"),
     (MODEL, "stick with a strip that passes under a grid of over 3,000 nodes: both grids move against each other, "
@@ -184,5 +196,5 @@ ELSEWHERE = (
 
 def reasons() -> dict[str, list[str]]:
     """Return the reasons of each kind, each once."""
-    pairs = [*((one.kind, one.reason) for one in LOADED), *(row[:2] for row in ELSEWHERE)]
+    pairs = [*((one.kind, one.reason) for one in (*LOADED, *PLACED)), *(row[:2] for row in ELSEWHERE)]
     return {kind: list(dict.fromkeys(text for of, text in pairs if of == kind)) for kind in KINDS}

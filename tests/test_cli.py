@@ -85,7 +85,7 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     rest = capsys.readouterr().out
     assert "after about 7 ± 1 cycles" in rest
     assert "196.0 s in all: " in rest
-    assert "the way there 196.0 s" in rest
+    assert "running-in 196.0 s" in rest
 
 
 def test_steady_that_is_found_is_reported_whatever_follows(

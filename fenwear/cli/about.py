@@ -47,12 +47,12 @@ def info_command(
         text, content = on_root(MPI.COMM_WORLD, lambda: listed_file(Path(key)))
         answer(content, lambda: text, as_json=as_json)
     elif key:
-        found = find_keys(key)
-        texts = [k.text() for k in found]
+        keys = find_keys(key)
+        texts = [k.text() for k in keys]
         if key == "geometry.file":
             texts.append("ready ones (fenwear info NAME lists their parameters):")
             texts += [f"  {name:22} {geometry.title}" for name, geometry in geometries.items()]
-        answer({"keys": [asdict(k) for k in found]}, lambda: "\n".join(texts), as_json=as_json)
+        answer({"keys": [asdict(k) for k in keys]}, lambda: "\n".join(texts), as_json=as_json)
     else:
         stack = {"versions": versions(), "cases": builtin_cases(), "kept": disk_cache.summary()}
         answer(stack, lambda: _stack_text(**stack), as_json=as_json)

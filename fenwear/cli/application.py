@@ -147,7 +147,7 @@ def clear(output: Path | None, *, resume: bool) -> None:
     on_root(MPI.COMM_WORLD, lambda: clear_directory(output))
 
 
-def show_results(found: str | dict[str, Any], where: str) -> None:
+def show_results(results: str | dict[str, Any], where: str) -> None:
     """Print what was asked for, a text or a JSON object, and say to standard error where the rest is.
 
     On several ranks that comes first: mpirun takes the begin of a long line, of which it has not had the end when
@@ -156,10 +156,10 @@ def show_results(found: str | dict[str, Any], where: str) -> None:
     first = MPI.COMM_WORLD.size > 1
     if first:
         log(where)
-    if isinstance(found, str):
-        show(found)
+    if isinstance(results, str):
+        show(results)
     else:
-        print_json(found)
+        print_json(results)
     if not first:
         log(where)
 
@@ -199,6 +199,6 @@ def check_removed(arguments: Sequence[str]) -> None:
         CaseError: names it, and what takes its place.
     """
     words = [word.partition("=")[0] for word in arguments]
-    found = [word for at, word in enumerate(words) if word in REMOVED and (at == 0 or word.startswith("-"))]
-    if found:
-        raise CaseError([InputError(word, REMOVED[word]) for word in found])
+    removed = [word for at, word in enumerate(words) if word in REMOVED and (at == 0 or word.startswith("-"))]
+    if removed:
+        raise CaseError([InputError(word, REMOVED[word]) for word in removed])

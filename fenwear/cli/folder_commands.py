@@ -98,11 +98,11 @@ def flash_command(
     from fenwear.results.flash_temperatures import dataset, flash_temperatures, numbers, text
     from fenwear.results.hdf5 import write
 
-    found = flash_temperatures(directory, settings)
-    folder, names = output or directory / "flash", found.heating.placed.names
+    temperatures = flash_temperatures(directory, settings)
+    folder, names = output or directory / "flash", temperatures.heating.placed.names
 
     def keep() -> None:
-        maps = dataset(found)
+        maps = dataset(temperatures)
         drawn = flash_figures(maps)
         name_bodies(drawn.values(), names)
         with writing(folder):
@@ -112,7 +112,7 @@ def flash_command(
                 save(figure, folder / f"{name}.png", DPI)
 
     on_root(MPI.COMM_WORLD, keep)
-    result = numbers(found) if as_json else names.with_names(text(found, str(directory)))
+    result = numbers(temperatures) if as_json else names.with_names(text(temperatures, str(directory)))
     show_results(result, f"maps and pictures in {folder}")
 
 

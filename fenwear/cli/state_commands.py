@@ -71,26 +71,26 @@ def steady_command(
         system = with_reduced_heat(system, keep=True, fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    found = {**({"of": of_step} if of_step else {}), **_state_json(state), **_forces(state), **_gain(system, state)}
+    results = {**({"of": of_step} if of_step else {}), **_state_json(state), **_forces(state), **_gain(system, state)}
     if not as_json:  # the way to it may take longer
-        show(_steady_text(case, state, found))
+        show(_steady_text(case, state, results))
     if accuracy:
-        found |= _unless_failed("its uncertainty", lambda: _uncertain(state), dict[str, Any]())
+        results |= _unless_failed("the uncertainty", lambda: _uncertain(state), dict[str, Any]())
     way = time.perf_counter()
-    rate = _unless_failed("its stability", lambda: growth_rate(state.system, state), math.nan)
+    rate = _unless_failed("the stability", lambda: growth_rate(state.system, state), math.nan)
     short, cycles = len(state.system.motion.phases) <= FOLLOWED, None
     if rate < 0 and short:
-        cycles = _unless_failed("the way there", lambda: running_in(state.system, state, 0.01), cycles)
+        cycles = _unless_failed("the running-in", lambda: running_in(state.system, state, 0.01), cycles)
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     seconds["in_all"] = time.perf_counter() - begin
-    found |= {
+    results |= {
         "growth_rate_per_s": rate,
         "cycles_to_1_percent": None if cycles is None else round(cycles.cycles),
         "cycles_to_1_percent_uncertainty": None if cycles is None else round(cycles.uncertainty),
         "seconds": state.seconds,
         "all_seconds": seconds,
     }
-    answer(found, lambda: _way_text(rate, short, cycles, seconds), as_json=as_json)
+    answer(results, lambda: _way_text(rate, short, cycles, seconds), as_json=as_json)
 
 
 def _gain(system: Tribosystem, state: SteadyState) -> dict[str, Any]:
@@ -141,7 +141,7 @@ def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
     try:
         return compute()
     except (CaseError, ConvergenceError) as error:
-        log(f"warning: the state is found, {name} is not: {error}")
+        log(f"warning: {name} of the steady state was not computed: {error}")
         return missing
 
 
@@ -167,8 +167,8 @@ def _show_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
     """Show the shape to which partial slip wears."""
     from fenwear.checks import Seen
 
-    found, numbers = final_of(system)
-    numbers["warnings"] = Seen.of_final(found).warnings()
+    final, numbers = final_of(system)
+    numbers["warnings"] = Seen.of_final(final).warnings()
     for warning in numbers["warnings"]:
         log(f"warning: {warning}")
     answer(numbers, lambda: f"end of the wear of {name} in partial slip\n{final_text(numbers)}", as_json=as_json)
@@ -186,34 +186,34 @@ def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
     from fenwear.surfaces.sliding_chart import sliding_chart
 
     system.check_touching()
-    found, case = system.contact_law.end(system), system.case
-    problem = found.system.law_state.problem
+    final, case = system.contact_law.end(system), system.case
+    problem = final.system.law_state.problem
     solid = case.model.kind == "solid"
     pair, weights = problem.interface.middle.pair, problem.weights
     x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
-    scar, seen = x[found.depth > 0], np.einsum("id,id->i", pair.normal, approach(problem.interface.middle.rigid))
+    scar, seen = x[final.depth > 0], np.einsum("id,id->i", pair.normal, approach(problem.interface.middle.rigid))
     size, worn, unit = ("stick_area", "worn_volume", "mm3") if solid else ("stick_width", "worn_area", "mm2")
     of_size = "mm2" if solid else "mm"
     numbers = {
-        f"{size}_{of_size}": found.size,
-        f"{size}_within_{of_size}": found.within,
+        f"{size}_{of_size}": final.size,
+        f"{size}_within_{of_size}": final.within,
         "scar_from_mm": float(scar.min()) if len(scar) else None,
         "scar_to_mm": float(scar.max()) if len(scar) else None,
-        "largest_depth_mm": float(found.depth.max()),
-        "largest_depth_between_mm": found.deepest,
-        f"{worn}_{unit}": float(weights @ found.depth),
-        f"{worn}_between_{unit}": found.volume,
-        "largest_pressure_MPa": float(found.pressure.max()),
-        "normal_force_N": case.model.thickness * float((weights * found.pressure) @ seen),
-        **coordinates(found.system),
-        "pressure": found.pressure.tolist(),
-        "depth": found.depth.tolist(),
+        "largest_depth_mm": float(final.depth.max()),
+        "largest_depth_between_mm": final.deepest,
+        f"{worn}_{unit}": float(weights @ final.depth),
+        f"{worn}_between_{unit}": final.volume,
+        "largest_pressure_MPa": float(final.pressure.max()),
+        "normal_force_N": case.model.thickness * float((weights * final.pressure) @ seen),
+        **coordinates(final.system),
+        "pressure": final.pressure.tolist(),
+        "depth": final.depth.tolist(),
     }
-    if found.temperature is not None:
+    if final.temperature is not None:
         degrees = degrees_of(case)
-        for body, values in zip(("punch", "strip"), degrees.of(found.temperature), strict=True):
+        for body, values in zip(("punch", "strip"), degrees.of(final.temperature), strict=True):
             numbers[f"temperature_{body}_{degrees.unit}"] = values.tolist()
-    return found, numbers
+    return final, numbers
 
 
 def final_text(numbers: dict[str, Any]) -> str:
@@ -226,7 +226,7 @@ def final_text(numbers: dict[str, Any]) -> str:
             name, _, unit = key.rpartition("_")
             value, within = numbers[key], numbers.get(f"{name}_within_{unit}", 0.0)
             ends = numbers.get(f"{name}_between_{unit}", (value - within, value + within) if within else ())
-            rows.append((line.heading, [shown(one, line) for one in (value, *ends)]))
+            rows.append((line.heading, [shown(number, line) for number in (value, *ends)]))
     for key, values in numbers.items():
         if key.startswith("temperature_"):
             _, body, unit = key.split("_")
@@ -249,8 +249,8 @@ def _forces(state: SteadyState) -> dict[str, Any]:
     from fenwear.steps.steady_cycle import cycle_of_state
 
     known, records = quantities_of(state.system), cycle_of_state(state)
-    found = {name: known[name].compute(records).tolist() for name in (*SIZES, *CARRIED) if name in known}
-    return {**found, **nominal_pressure(state.system, state.system.normal_force)}
+    values = {name: known[name].compute(records).tolist() for name in (*SIZES, *CARRIED) if name in known}
+    return {**values, **nominal_pressure(state.system, state.system.normal_force)}
 
 
 def coordinates(system: Tribosystem) -> dict[str, Any]:
@@ -262,7 +262,7 @@ def coordinates(system: Tribosystem) -> dict[str, Any]:
     return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
-def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
+def _steady_text(case: str, state: SteadyState, results: dict[str, Any]) -> str:
     """Return a state as a table, a column for each sliding direction."""
     from fenwear.results.quantity import degrees_of
     from fenwear.results.registry import quantities_of
@@ -271,11 +271,11 @@ def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
 
     system, lines, degrees = state.system, LINES | OF_CONTACT, degrees_of(state.system.case)
     known = quantities_of(system)
-    keys = {name: known[name].key for name in (*SIZES, *CARRIED) if name in found}
-    rows = [(lines[key].heading, [shown(one, lines[key]) for one in found[name]]) for name, key in keys.items()]
+    keys = {name: known[name].key for name in (*SIZES, *CARRIED) if name in results}
+    rows = [(lines[key].heading, [shown(entry, lines[key]) for entry in results[name]]) for name, key in keys.items()]
     wear, surface = 1e3 * state.wear_per_cycle, system.pair.weights * (state.wear_per_cycle > 0)
     in_all = {
-        "nominal pressure: load over the projected area (MPa)": found.get("nominal_pressure"),
+        "nominal pressure: load over the projected area (MPa)": results.get("nominal_pressure"),
         "pressure scale: integral of p² over integral of p (MPa)": pressure_scale(system, state.phase_pressure),
         "wear per cycle, mean (µm)": float(surface @ wear) / (float(surface.sum()) or 1.0),
         "wear per cycle, largest (µm)": float(wear.max()),
@@ -286,7 +286,7 @@ def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
             in_all[f"largest temperature of the {body}'s contact ({degrees.shown})"] = float(degrees.of(warm).max())
     rows += [(label, [value]) for label, value in in_all.items() if value is not None]
     title = f"cyclic steady state of {case} ({state.iterations} Newton iterations)"
-    of_step = [f"of {found['of']}"] if "of" in found else []
+    of_step = [f"of {results['of']}"] if "of" in results else []
     if state.passes:
         of_step.append(f"material properties updated {state.passes} times to these temperatures")
     return "\n".join([title, *of_step, columns_text([system.direction_words[d] for d in state.directions], rows)])
@@ -295,13 +295,13 @@ def _steady_text(case: str, state: SteadyState, found: dict[str, Any]) -> str:
 def _way_text(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float]) -> str:
     """Return how the state is reached, and where the time went."""
     if math.isnan(rate):
-        text = "its stability and the way there are not known, see the warning"
+        text = "stability and running-in are not known: see the warning"
     elif rate > 0:
         text = (
             f"unstable: disturbances grow at {rate:.3g} 1/s. A run moves away from this state; it may be one of several"
         )
     elif not followed:
-        text = 'the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so'
+        text = 'running-in is not computed for cycles of many steps: use `run` with run.integration = "jump"'
     elif cycles is None:
         text = "pressure within 1 % of the pressure scale: not found within ten million cycles from the initial shape"
     else:
@@ -310,7 +310,7 @@ def _way_text(rate: float, followed: bool, cycles: RunningIn | None, seconds: di
         about = f"after about {number:,} ± {wrong:,} cycles"
         text = f"pressure within 1 % of the pressure scale {about} from the initial shape"
     setup, state, way, in_all = (_duration(one) for one in seconds.values())
-    return f"{text}\n{in_all} in all: meshes and operators {setup}, steady state {state}, the way there {way}"
+    return f"{text}\n{in_all} in all: meshes and operators {setup}, steady state {state}, running-in {way}"
 
 
 def _duration(seconds: float) -> str:
@@ -349,27 +349,29 @@ def optimum_command(
             "they hold the punch along the contact's normal: no rigid motion follows the wear, and no pressure stays"
         )
         raise CaseError(InputError("punch.supports", reason))
-    found = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
+    optima = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
     x = system.pair.x.tolist()
     data: dict[str, Any] = {
-        name: {**one.velocity, "x": x, "pressure": one.pressure.tolist(), "chi": one.tilt.tolist()}
-        for name, one in found.items()
+        name: {**optimum.velocity, "x": x, "pressure": optimum.pressure.tolist(), "chi": optimum.tilt.tolist()}
+        for name, optimum in optima.items()
     }
-    answer(data | ({"of": of_step} if of_step else {}), lambda: _optimum_text(system, found, of_step), as_json=as_json)
+    answer(data | ({"of": of_step} if of_step else {}), lambda: _optimum_text(system, optima, of_step), as_json=as_json)
 
 
-def _optimum_text(system: ContactSetup, found: dict[str, Optimum], of_step: str) -> str:
+def _optimum_text(system: ContactSetup, optima: dict[str, Optimum], of_step: str) -> str:
     """Return the optima of both directions as a table, with the pressure and the angle at both ends of the contact."""
     from fenwear.results.sheet import columns_text
 
-    states = list(found.values())
-    rows = [(f"{name} ({_unit(name)}/s)", [one.velocity[name] for one in states]) for name in states[0].velocity]
+    states = list(optima.values())
+    rows = [
+        (f"{name} ({_unit(name)}/s)", [optimum.velocity[name] for optimum in states]) for name in states[0].velocity
+    ]
     for end in (0, -1):
         names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
         at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
-        rows.append((f"pressure at {at} mm (MPa)", [float(one.pressure[end]) for one in states]))
-        rows.append((f"angle chi at {at} mm (degrees)", [math.degrees(one.tilt[end]) for one in states]))
-    return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(found), rows)])
+        rows.append((f"pressure at {at} mm (MPa)", [float(optimum.pressure[end]) for optimum in states]))
+        rows.append((f"angle chi at {at} mm (degrees)", [math.degrees(optimum.tilt[end]) for optimum in states]))
+    return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(optima), rows)])
 
 
 @app.command("shape")

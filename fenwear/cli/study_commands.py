@@ -61,17 +61,17 @@ def _options(
     """Return how a study computes its runs; print its batch file instead where that is asked for."""
     from fenwear.studies.study import batch_file, parse_part
 
-    found = parse_part(part)
+    chosen = parse_part(part)
     if script not in ("", "slurm"):
         raise CaseError(InputError("--script", f"expected slurm, got {script!r}"))
     if script:
-        if found is None or output is None:
+        if chosen is None or output is None:
             raise CaseError(
                 InputError("--script", "expected the number of parts, as --part 1/8, and a folder, as -o DIR")
             )
-        show(batch_file(sys.argv[1:], found[1]))
+        show(batch_file(sys.argv[1:], chosen[1]))
         raise typer.Exit
-    return {"folder": output, "part": found, "resume": resume, "collect": collect, "processes": processes}
+    return {"folder": output, "part": chosen, "resume": resume, "collect": collect, "processes": processes}
 
 
 @app.command("verify")
@@ -87,14 +87,14 @@ def verify_command(
     if list_cases:
         _show_titles(verification.titles(), only)
         return
-    found, directory = verification.verify(cases, paper, output, log if as_json else print)
+    outcome, directory = verification.verify(cases, paper, output, log if as_json else print)
     page = f"page in {directory}/verification.html"
     if as_json:
-        show_results(found, page)
+        show_results(outcome, page)
     else:
         log(page)
-    if not found["agree"]:
-        log(f"does not agree: {', '.join(found['differing'])}")
+    if not outcome["agree"]:
+        log(f"does not agree: {', '.join(outcome['differing'])}")
         raise typer.Exit(1)
 
 
@@ -111,9 +111,9 @@ def validate_command(
     if list_cases:
         _show_titles(gallery.titles(), only)
         return
-    found, directory = gallery.validate(only, output, log if as_json else print, "short" if short else "full")
+    outcome, directory = gallery.validate(only, output, log if as_json else print, "short" if short else "full")
     if as_json:
-        show_results(found, f"figures in {directory}")
+        show_results(outcome, f"figures in {directory}")
     else:
         log(f"figures in {directory}")
 
@@ -165,11 +165,11 @@ def sensitivity_command(
 
     how = _options(output, part, script, resume=resume, collect=collect, processes=processes)
     loaded = load(case, settings)
-    found, folder = study_reports.run_sensitivity(
+    derivatives, folder = study_reports.run_sensitivity(
         loaded, Path(case).stem, quantities, keys, spread, log, differences=differences, **how
     )
-    text = "\n\n".join(one.text() for one in found)
-    show_results(study_reports.as_json(found) if as_json else text, f"results in {folder}")
+    text = "\n\n".join(table.text() for table in derivatives)
+    show_results(study_reports.as_json(derivatives) if as_json else text, f"results in {folder}")
 
 
 @app.command("calibrate")
@@ -242,10 +242,10 @@ def life_command(
 
     how = _options(output, part, script, resume=resume, collect=collect, processes=processes)
     loaded = load(case, settings)
-    found, folder = study_reports.run_life(
+    lives, folder = study_reports.run_life(
         loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, log, **how
     )
-    show_results(found.as_json() if as_json else found.text(), f"results in {folder}")
+    show_results(lives.as_json() if as_json else lives.text(), f"results in {folder}")
 
 
 @app.command("sweep")

@@ -142,6 +142,9 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style
     _sliding(axes[1], fields, float(x.mean()), low, width)
     named = {"contact": GREEN, "held": RED, "loaded": BLUE}
     handles = [Line2D([], [], color=colour, linewidth=2.5, label=name) for name, colour in named.items()]
+    heights = [min(0.75 * look.width * ax.viewLim.height / ax.viewLim.width, 4.2) for ax in axes]
+    figure.set_figheight(sum(heights) + 1.5)
+    axes[0].get_gridspec().set_height_ratios(heights)
     figure.legend(handles=handles, loc="outside upper right", frameon=False, ncols=len(named), fontsize="small")
     figure.set_layout_engine("compressed")  # the axes keep their aspect
     return figure
@@ -255,20 +258,25 @@ class View:
         return np.asarray(aside & ((seen >= box[:, 0]) & (seen <= box[:, 1])).all(axis=1))
 
 
-def draw_pictures(directory: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
+def draw_pictures(directory: Path, formats: Sequence[str] = ("png",), *, complete: bool = True) -> list[Path]:
     """Draw the bodies at every half-cycle with fields; return the files.
+
+    Args:
+        directory: The folder of a run.
+        formats: Of the files.
+        complete: Draw all; else one field at the last half-cycle, of planes and rings alone, which takes half a second.
 
     Raises:
         DrawingError: a part of the stack is missing, or a file of fields cannot be read.
     """
     folder, paths = directory / FIGURES, list[Path]()
     try:
-        datasets = [load(path) for path in field_files(directory)]
-        if not datasets:
+        datasets = [load(path) for path in field_files(directory)[0 if complete else -1 :]]
+        if not datasets or not (complete or datasets[0].attrs.get("model") != "solid"):
             return []
         view, names = common_view(datasets), names_in(directory)
         folder.mkdir(exist_ok=True)
-        for field in view.ranges:
+        for field in list(view.ranges)[0 if complete else -1 :]:
             for data in datasets:
                 png = folder / f"bodies_{field}_{int(data.attrs['half_cycle']):06d}.png"
                 figure = bodies_figure(data, field, view)

@@ -74,6 +74,7 @@ TEXTS = {
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
     "creep": "Wear and creep of each body: (a) largest depth and (b) volume, over the time.",
+    "coating": "(a) Share of the scar in which the coating is worn through and (b) least coating left over the {axis}.",
     "scar": "Largest worn depth, and size of the scar at 1 % and 5 % of it, over the {axis}. Of a surface: length "
     "along the sliding and width across.",
     "friction": "(a) Normal force and (b) friction force of each half-cycle and (c) work of friction from the start, "

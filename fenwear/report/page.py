@@ -55,7 +55,7 @@ def write_report(
     Args:
         directory: The folder of the run.
         log: Called with a message where pictures of the bodies cannot be drawn.
-        complete: Draw the pictures of the bodies, too, which takes longer.
+        complete: Draw all pictures of the bodies, which takes longer.
         look: Width and axis of the figures.
         formats: Of the files, "png", "pdf" and "svg".
 
@@ -66,11 +66,10 @@ def write_report(
     with writing(directory):
         wanted = read_case(directory).get("output", {}).get("figures_at", ())
         paths = draw_figures(directory, wanted, look, formats)
-        if complete:
-            try:
-                paths += draw_pictures(directory, formats)
-            except DrawingError as error:
-                log(f"warning: {error}")
+        try:
+            paths += draw_pictures(directory, formats, complete=complete)
+        except DrawingError as error:
+            log(f"warning: {error}")
         report = directory / REPORT
         write_text(report, page(directory, look))
         return [*paths, report]

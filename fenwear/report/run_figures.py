@@ -146,6 +146,10 @@ COURSES = {
             Line("heat_carried", "carried out by the strip"),
         ), 1e-3, "free"),
     )),
+    "coating": Course("worn_through_of_scar", (
+        Panel("coating worn through (% of the scar)", (Line("worn_through_of_scar{}"),), 100.0),
+        Panel("least coating left (µm)", (Line("least_coating{}"),), 1e3),
+    )),
     "roughness": Course("roughness", (
         Panel("roughness (µm)", (Line("roughness_Sa{}", "mean, {}"),
                                  Line("roughness_Sq{}", "root mean square, {}", "--")), 1e3),
@@ -201,8 +205,11 @@ def levels(history: xarray.Dataset) -> dict[str, tuple[float, str]]:
     found = {"energy_ratio": (GROSS, "gross sliding above,\npartial slip below")}
     if is_conforming(history):
         mean, width = mean_pressure(history), nominal_width(history)
-        found |= {"largest_pressure": (mean, f"mean {mean:.4g}"), "pressure": (mean, f"mean {mean:.4g} MPa")}
-        found |= dict.fromkeys(("contact_width", "contact_area"), (width, f"nominal {width:.4g}"))
+        found |= dict.fromkeys(("largest_pressure", "pressure"), (mean, f"mean {mean:.4g} MPa"))
+        found |= {
+            "contact_width": (width, f"nominal {width:.4g} mm"),
+            "contact_area": (width, f"nominal {width:.4g} mm²"),
+        }
     return found
 
 

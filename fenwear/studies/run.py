@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.case import Case, OneWay, Reciprocating, Rotation, plausibility_warnings
-from fenwear.case.motions import MOST_POSITIONS
+from fenwear.case.motion_table import MOST_POSITIONS
 from fenwear.checks import (
     HeatMonitor,
     Seen,

@@ -63,6 +63,7 @@ def test_pictures(tmp_path: Path) -> None:
     _write(tmp_path, 1)
     _write(tmp_path, 2)
     paths = draw_pictures(tmp_path)
+    assert [path.name for path in draw_pictures(tmp_path, complete=False)] == ["bodies_temperature_000002.png"]
     names = {f"bodies_{field}{end}" for field in ("von_mises", "temperature") for end in ("_000001.png", "_000002.png")}
     assert {path.name for path in paths} == names
     for path in paths:

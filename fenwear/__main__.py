@@ -89,7 +89,7 @@ def _start(arguments: list[str], petsc_options: list[str]) -> int:
 
 
 def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
-    """Return what stands before and behind `--`."""
+    """Return the arguments before and behind `--`."""
     at = arguments.index("--") if "--" in arguments else len(arguments)
     return arguments[:at], arguments[at + 1 :]
 

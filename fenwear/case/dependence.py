@@ -272,7 +272,7 @@ def states_of_law(name: str) -> dict[str, State]:
 
 
 def variables_of_law(name: str) -> frozenset[str]:
-    """Return what a registered law depends on, by its states, too; nothing where there is none."""
+    """Return the variables of a registered law and of its states; none of an unknown law."""
     states = states_of_law(name)
     return frozenset({*(_LAWS[name].of if name in _LAWS else ()), *(one for s in states.values() for one in s.of)})
 

@@ -154,7 +154,7 @@ AGAINST_STICK = (
 
 
 def case_problems(case: Case) -> list[str]:
-    """Return what does not go together in a case: a key and what it expects, each."""
+    """Return the problems of a case: each a key and the expected value."""
     found = [check.message for check in CHECKS if check.wrong(case)]
     if case.sticks:
         found += [f"{problem} with contact.law = 'coulomb'" for problem in case.against_stick]

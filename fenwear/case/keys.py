@@ -150,7 +150,7 @@ def _below(field: FieldInfo, parts: list[Any], path: str, kind: str) -> Iterator
 
 
 def _container(annotation: Any) -> str:
-    """Return what stands between a key and those in it: a name of a table, a number of a list, or nothing."""
+    """Return the step from a key to those in it: a name of a table, a number of a list, or nothing."""
     origins = {get_origin(a) for a in (annotation, *get_args(annotation))}
     return ".NAME" if dict in origins else ".N" if tuple in origins else ""
 

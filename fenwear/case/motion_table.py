@@ -383,7 +383,7 @@ class Cycle(Part):
         return course_of(self.columns, self.rows, self.order, self.period, in_space=in_space)
 
     def model_problems(self, kind: str, axes: tuple[str, ...]) -> list[str]:
-        """Return what of it a model of this kind, with these axes, has no place for."""
+        """Return the problems of the motion in a model of this kind with these axes."""
         problems = [
             f"motion.columns: expected no column {name} in a model that is {kind}"
             for name in self.column_names

@@ -160,7 +160,7 @@ def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
 
 
 def held_at(case: Case, step: int | None = None) -> Held | None:
-    """Return what acts at the end of a step of a case's program; None without a program.
+    """Return the loads and motion at the end of a step of a case's program; None without a program.
 
     Args:
         step: Its number from 0; by default the last.

@@ -191,7 +191,7 @@ def _take_away(data: dict[str, Any], unset: Any) -> None:
 
 
 def _inside(place: Any, name: str) -> Any:
-    """Return what a table has of this name, or a list at this number; None without."""
+    """Return the entry of a table by its name, or of a list by its number; None without one."""
     if isinstance(place, list):
         return place[int(name)] if name.isdigit() and int(name) < len(place) else None
     return place.get(name) if isinstance(place, dict) else None

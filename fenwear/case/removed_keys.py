@@ -18,7 +18,7 @@ REMOVED: dict[str, str] = {
 
 
 def replacement(key: str, word: object = None) -> str | None:
-    """Return what to do in place of a removed key, or of one of its words; None where neither was removed.
+    """Return the replacement of a removed key, or of one of its words; None where neither was removed.
 
     Args:
         key: Its path in the case file.

@@ -83,7 +83,7 @@ TEMPERATURES = ("heat.initial", "heat.ambient", "*.temperatures.*.temperature")
 
 
 def plausibility_warnings(case: Case) -> list[str]:
-    """Return what is to be said of the values of a case, each with its key."""
+    """Return the warnings of unlikely values of a case, each with its key."""
     values = dict(_leaves(case, ""))
     far = dict(_out_of_range(case, values))
     return [
@@ -97,7 +97,7 @@ def plausibility_warnings(case: Case) -> list[str]:
 
 
 def _without_effect(case: Case) -> list[str]:
-    """Return what is said of keys that others leave nothing to decide."""
+    """Return the warnings of keys without effect."""
     heat = case.heat
     if heat is None or heat.conductance != "perfect" or "partition" not in heat.model_fields_set:
         return []

@@ -174,7 +174,7 @@ class Dependence(_State):
         return any(one != given[0] for one in given)
 
     def scale(self, unit: str) -> float:
-        """Return what turns its values into a unit.
+        """Return the factor that converts the values to a unit.
 
         Raises:
             ValueError: its own unit is of another kind.

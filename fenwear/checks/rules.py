@@ -57,7 +57,7 @@ class Made:
     largest: dict[str, float] = field(default_factory=dict)
 
     def error(self, name: str, missing: Array, terms: Array) -> Array:
-        """Return what is missing in a balance (k,) over its largest term (k, ...) of all half-cycles so far."""
+        """Return the error of a balance (k,) over its largest term (k, ...) of all half-cycles so far."""
         self.largest[name] = max(self.largest.get(name, 1e-300), float(np.abs(terms).max()))
         return np.abs(missing) / self.largest[name]
 
@@ -625,6 +625,6 @@ RULES: dict[str, Rule] = {
 
 
 def remarks(seen: Seen, *kinds: str) -> dict[str, str]:
-    """Return what is to be said of a state, by the rules' names; collective."""
+    """Return the warnings of a state, by the rules' names; collective."""
     chosen = {name: rule.text(seen) for name, rule in RULES.items() if set(kinds or (seen.kind,)) & set(rule.of)}
     return {name: text for name, text in chosen.items() if text}

@@ -255,7 +255,7 @@ def _clipped_by_grid(punch: ElasticBody, grid: RegularGrid, rim: Rim) -> tuple[M
 
 
 def opened(system: Tribosystem, worn: WornDepths) -> float:
-    """Return what depths worn off both bodies open in the middle position: mm² in a plane, mm³ of rings and solids."""
+    """Return the gap that worn depths open in the middle position: mm² in a plane, mm³ of rings and solids."""
     return float(system.pair.weights @ system.pair.opening(worn.punch, worn.strip))
 
 

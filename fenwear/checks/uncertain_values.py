@@ -50,7 +50,7 @@ class Value:
     weights: Array = field(default_factory=lambda: np.zeros(0))
 
     def towards(self, other: Value, share: float) -> Value:
-        """Return what lies at a share of the way to another one on the same nodes."""
+        """Return the value at a share of the way to another one on these nodes."""
         number = self.number + share * (other.number - self.number)
         return replace(self, number=number, along=self.along + share * (other.along - self.along))
 

@@ -39,7 +39,7 @@ from fenwear.system import Tribosystem, with_reduced_heat
 
 
 def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
-    """Return what steps and basis of the heat contribute to the numbers of a run's end; none without heat; collective.
+    """Return the contributions of steps and basis of the heat to a run's end; none without heat; collective.
 
     Args:
         last: The last half-cycles.
@@ -178,7 +178,7 @@ def uncertainty(case: Case, last: Block) -> Uncertainty:
 
 
 def of_mesh(values: Values, coarse: Values, ratio: float) -> Contribution:
-    """Return what is left to the limit of small elements, from the same numbers on some times as large ones."""
+    """Return the distance to the limit of small elements, by the numbers on elements some times as large."""
     return {
         quantity: SAFETY * value.apart(coarse[quantity]) / (ratio ** order_of(quantity, value) - 1)
         for quantity, value in values.items()
@@ -240,7 +240,7 @@ def _apart(one: Values, other: Values, factor: float) -> Contribution:
 
 
 def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
-    """Return what steps of half-cycles leave: in depths, of first order, half of what the wear of one has changed.
+    """Return the error of half-cycles as steps: in depths, of first order, half of the change by the wear of one.
 
     The sums of explicit and of implicit steps differ by the wear of the first half-cycle less that of the last one, and
     lie on either side of the wear that continues within the steps. Pressure and temperature are half a half-cycle late.

@@ -226,7 +226,7 @@ def _check_stick(system: Tribosystem, *, full: bool) -> None:
 
 
 def check_text(system: Tribosystem) -> tuple[str, list[str]]:
-    """Return what a system with stick comes to in its first cycle, and the warnings; collective.
+    """Return the first cycle of a system with stick in words, and the warnings; collective.
 
     Raises:
         CaseError: a property of the geometry is wrong.

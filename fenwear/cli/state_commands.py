@@ -137,7 +137,7 @@ def _state_json(state: SteadyState) -> dict[str, Any]:
 
 
 def _unless_failed(name: str, compute: Callable[[], T], missing: T) -> T:
-    """Return what is computed from a state that is found, or what stands for it where that fails; collective."""
+    """Return a result of a steady state, or its replacement where the computation fails; collective."""
     try:
         return compute()
     except (CaseError, ConvergenceError) as error:

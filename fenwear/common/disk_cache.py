@@ -55,7 +55,7 @@ def limit() -> int:
 
 
 def files() -> list[tuple[Path, int]]:
-    """Return what is kept and its sizes (bytes), the longest unused first."""
+    """Return the kept files and their sizes (bytes), the longest unused first."""
     dated = []
     for path in folder().glob("*.*"):
         with suppress(OSError):  # removed meanwhile
@@ -64,7 +64,7 @@ def files() -> list[tuple[Path, int]]:
 
 
 def summary() -> dict[str, Any]:
-    """Return what `fenwear info` says of it.
+    """Return the numbers of the cache for `fenwear info`.
 
     Raises:
         CaseError: the limit is no number.
@@ -76,7 +76,7 @@ def summary() -> dict[str, Any]:
 
 @cache
 def _surroundings() -> str:
-    """Return what else decides the last bits of results: the versions of all parts, and the number of threads."""
+    """Return the surroundings that decide the last bits of results: versions of all parts, number of threads."""
     from fenwear.common.stack import versions
 
     sources = hashlib.blake2b(digest_size=20)
@@ -88,7 +88,7 @@ def _surroundings() -> str:
 
 
 def known(comm: MPI.Comm, parts: Callable[[], Iterable[object]], *, fresh: bool = False) -> Kept:
-    """Return what is kept of these parts on these ranks; collective.
+    """Return the kept results of these parts on these ranks; collective.
 
     Args:
         comm: The ranks.

@@ -116,6 +116,6 @@ class Remedies:
         self._noted[name] += 1
 
     def take(self) -> Counter[str]:
-        """Return what was noted since the last time; mostly nothing."""
+        """Return the remedies noted since the last call; mostly none."""
         noted, self._noted = self._noted, Counter()
         return noted

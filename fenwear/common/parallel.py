@@ -59,7 +59,7 @@ def all_together(comm: MPI.Comm) -> None:
 
 
 def agreed(comm: MPI.Comm, found: T) -> T:
-    """Return what rank 0 has found, on every rank: what decides over further collective calls; collective."""
+    """Return the value of rank 0 on every rank, by which further collective calls are decided; collective."""
     return Team.of(comm).lead(lambda: found)
 
 
@@ -74,7 +74,7 @@ def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def once(comm: MPI.Comm, known: dict[K, T], key: K, find: Callable[[], T]) -> T:
-    """Return what every rank knows by a key, else find it and keep it; collective."""
+    """Return the value that every rank has under a key, else compute and keep it; collective."""
     if not comm.allreduce(int(key in known), MPI.MIN):
         known[key] = find()
     return known[key]
@@ -219,7 +219,7 @@ class Team:
             return None, error
 
     def _answer(self, number: int | None, method: str, arguments: tuple[Any, ...]) -> bytes:
-        """Return what this rank has done for rank 0, which waits for it, in a form that reaches it."""
+        """Return the result of this rank for rank 0, which waits for it, packed."""
         result, failure = self._done(number, method, arguments)
         try:
             return self._crossed((result, failure and self._crossing(failure)))
@@ -227,7 +227,7 @@ class Team:
             return self._packed((None, error))
 
     def _crossed(self, content: Any) -> bytes:
-        """Return what crosses ranks, packed.
+        """Return the packed content for other ranks.
 
         Raises:
             RanksError: it cannot be.
@@ -259,7 +259,7 @@ class Team:
         return self._unpacked(self.comm.bcast(None))
 
     def _packed(self, content: Any) -> bytes:
-        """Return what crosses ranks; parts as their numbers."""
+        """Return the content for other ranks, with parts as their numbers."""
         file = io.BytesIO()
         _Packer(file, self._number).dump(content)
         return file.getvalue()

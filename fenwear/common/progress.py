@@ -18,7 +18,7 @@ Log = Callable[[str], None]
 
 
 def now_and_then(log: Log) -> Log:
-    """Return what logs a line unless it has logged one in the last seconds."""
+    """Return a log that leaves out lines within seconds of the last one."""
     reported = [-LINE_SECONDS]
 
     def tell(line: str) -> None:

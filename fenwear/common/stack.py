@@ -109,7 +109,7 @@ def compiling() -> Iterator[None]:
 
 
 def lacks_to_compile() -> str | None:
-    """Return what there is not that forms are compiled with; None where all is there."""
+    """Return the missing part of the compiler of forms; None where all is there."""
     import shlex
     import sysconfig
 

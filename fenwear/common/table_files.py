@@ -144,7 +144,7 @@ class Table:
         return value
 
     def listing(self) -> str:
-        """Return what was read, in lines."""
+        """Return the content that was read, in lines."""
         columns = ", ".join(f"{head.name} ({head.unit or '1'})" for head in self.heads)
         how = f"{self.encoding}, {self.separator}, {self.decimal}"
         lines = [f"{self.path.name}: {len(self.rows)} rows of {columns}; {how}"]
@@ -294,7 +294,7 @@ def _heading_at(body: Sequence[tuple[int, str]], known: Collection[str], *, keys
 
 
 def _separator(line: str) -> str:
-    """Return what stands between the cells of a heading."""
+    """Return the separator of the cells of a heading."""
     bare = re.sub(r"[(\[][^)\]]*[)\]]|\"[^\"]*\"", "", line)
     return next((one for one in "\t;," if one in bare), " ")
 

@@ -170,7 +170,7 @@ def _parsed(given: str) -> pint.Unit | None:
 
 
 def _reason(given: str, units: Sequence[str], unit: str) -> str:
-    """Return what is wrong with a unit, and how it is written."""
+    """Return the reason why a unit is rejected, and how to write it."""
     if _SCALES.search(given):
         return ", a hardness: 1 HV is 9.81 MPa, other scales have tables (ASTM E140)"
     known = [parsed for one in units if (parsed := _parsed(one)) is not None]

@@ -826,7 +826,7 @@ class _Resolver:
         return self.known[at]
 
     def labelled(self, word: str, scope: str, entry: _Entry, one: _Set) -> Ints:
-        """Return what labels name."""
+        """Return the numbers of the labelled nodes or elements."""
         placed = self.whole.placed.get(scope)
         kind = "node" if word == "nset" else "element"
         labels = np.zeros(0, np.int64) if entry.labels is None else entry.labels

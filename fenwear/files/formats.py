@@ -41,7 +41,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def read_mesh(path: Path) -> MeshFile:
-    """Return what the mesh file of another program holds.
+    """Return the mesh and sets of another program's file.
 
     Raises:
         CaseError: it cannot be read, or it has no elements of which bodies are made.
@@ -59,7 +59,7 @@ TABLES = (".csv", ".txt", ".dat", ".tsv")
 
 
 def listed_file(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return what a file holds, as lines and as an object of JSON.
+    """Return the content of a file, as lines and as an object of JSON.
 
     Raises:
         CaseError: it cannot be read, or is of no known kind.

@@ -353,7 +353,7 @@ def deformed(data: xarray.Dataset, body: str, view: View) -> Array:
 
 
 def section(data: xarray.Dataset, body: str, field: str, view: View) -> tuple[Array, NDArray[np.int64], Array, Array]:
-    """Return what is seen of a body: points (n, 2), triangles (t, 3), values (n,), and outlines (m, 2, 2)."""
+    """Return the visible section of a body: points (n, 2), triangles (t, 3), values (n,), outlines (m, 2, 2)."""
     cells, values, x = data[f"{body}_cells"].values, data[f"{body}_{field}"].values, deformed(data, body, view)
     if data.attrs.get("model") == "solid":
         import pyvista

@@ -127,7 +127,7 @@ def _on_surfaces(history: xarray.Dataset, chosen: Sequence[int], look: Style) ->
 
 
 def _along_lines(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
-    """Return what lies along the contact of planes and rings, and in planes their profiles."""
+    """Return the figures along the contact of planes and rings, and in planes their profiles."""
     drawn: dict[str, Figure] = {}
     if model_of(history) == "plane":
         drawn["profiles"] = profile_figure(history, chosen, look)

@@ -165,7 +165,7 @@ class Number(NamedTuple):
 
 
 def answers(summary: Mapping[str, Any]) -> list[Number]:
-    """Return what a run was made for: how much is worn and where, pressures and temperatures, with uncertainties."""
+    """Return the main results of a run, with uncertainties: wear and its place, pressures, temperatures."""
     given = summary.get(UNCERTAINTY, {})
     numbers, sources = flat(summary), {source: flat(own) for source, own in given.get("contributions", {}).items()}
     uncertain = flat({key: value for key, value in given.items() if key not in NO_NUMBERS})

@@ -80,7 +80,7 @@ OF_CYCLES = (
 
 
 def fields_of(history: xarray.Dataset) -> dict[str, Field]:
-    """Return what a history has at the nodes of a contact, by the variable."""
+    """Return the fields that a history has at the nodes of a contact, by the variable."""
     warm = temperature_unit(history)
     found = [
         Field("pressure", "punch", "contact pressure", "MPa", colours="YlGnBu"),
@@ -95,7 +95,7 @@ def fields_of(history: xarray.Dataset) -> dict[str, Field]:
 
 
 def between_of(history: xarray.Dataset) -> dict[str, Field]:
-    """Return what lies between the surfaces: debris, plastic depth, coatings, and states that laws remember."""
+    """Return the fields between the surfaces: debris, plastic depth, coatings, and states that laws remember."""
     found = {}
     for name, values in history.data_vars.items():
         variable = str(name)

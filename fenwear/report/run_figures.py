@@ -279,7 +279,7 @@ UNITS_ACTED = {"mm s-1": " (mm/s)", "rad s-1": " (rad/s)", "K": " (K)", "degC": 
 
 
 def program_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
-    """Return what acted over the run: the load, the speed and the ambient temperature, where they change."""
+    """Return the figure of load, speed and ambient temperature over the run, where they change."""
     shown = [name for name in ACTED if name in history and _changes(history[name])]
     if "load" in shown and "load_factor" in shown:  # the same twice
         shown.remove("load_factor")

@@ -156,7 +156,7 @@ def one_way(data: xarray.Dataset) -> bool:
 
 
 def strip_moves(data: xarray.Dataset) -> str:
-    """Return what the strip does, of a history or of fields: it moves, or it turns."""
+    """Return "strip moves" or "strip turns", of a history or of fields."""
     return "strip turns" if "clockwise" in direction_words(data).values() else "strip moves"
 
 

@@ -96,7 +96,7 @@ def _temperatures(system: Tribosystem, state: RunState) -> dict[str, fem.Functio
 
 
 def _arrays_of(system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> dict[str, Any]:
-    """Return what a checkpoint has besides temperatures."""
+    """Return the arrays of a checkpoint without temperatures."""
     grid, track = system.pair.punch.grid, None if state.temperature is None else state.temperature.track
     plain = replace(state, temperature=None, memory=None, finer=None)
     growing = grid.numbers if grid is not None and grows(system) else None
@@ -280,7 +280,7 @@ def pack(value: Any, path: str, into: dict[str, Any]) -> None:
 
 
 def unpack(kind: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
-    """Return what was put under a path, of this type."""
+    """Return the object stored under a path, of this type."""
     start, kinds = f"{path}." if path else "", get_args(kind)
     if isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind)

@@ -97,7 +97,7 @@ class Course:
 
 
 def past_of(course: Course, along: Array, now: float) -> Past:
-    """Return what gives, for times before an instant, places of the strip now less those then, and heat over now's."""
+    """Return, for times before an instant, the strip's displacement since then, and the heat then over that now."""
     here, speed = course.place(np.array([now])), float(course.speed(np.array([now]))[0])
 
     def past(before: Array) -> tuple[Array, Array]:

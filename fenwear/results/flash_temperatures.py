@@ -107,7 +107,7 @@ class Conductor:
 
 
 def conductors(placed: ContactSetup, case: Case, heat: Heat, touching: Mask) -> list[Conductor]:
-    """Return what punch and strip are of where they touch.
+    """Return the conducting materials of punch and strip where they touch.
 
     Args:
         placed: The bodies.
@@ -255,7 +255,7 @@ def _still(past: Past, before: Array) -> tuple[Array, Array]:
 
 
 def _shared(heat: Heat, heating: Heating, sides: Sequence[HeatedSide], friction: Array) -> Array:
-    """Return what of the heat goes into the punch (t, m, n), mW/mm²."""
+    """Return the part of the heat that enters the punch (t, m, n), mW/mm²."""
     if heat.conductance == 0 and heat.conductance_per_pressure is None:
         return heat.partition * friction
     if heat.conductance_per_pressure is not None:
@@ -281,7 +281,7 @@ def _shared(heat: Heat, heating: Heating, sides: Sequence[HeatedSide], friction:
 def _bulks(
     case: Case, heat: Heat, heating: Heating, both: Sequence[Conductor]
 ) -> tuple[tuple[Bulk, Bulk] | None, list[str]]:
-    """Return what the finite bodies add, None where one of them has no steady state, and what is said; collective.
+    """Return the rise by the finite bodies, None where one has no steady state, and the warnings; collective.
 
     Of a strip that goes one way the meshed part is none of its own: it is as warm as it comes, `heat.inflow`.
     """

@@ -383,7 +383,7 @@ class HistoryWriter:
         }
 
     def _bytes(self, rows: int) -> int:
-        """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""
+        """Return the most bytes that so many rows add: whole chunks, and for each variable some nodes of an index."""
         sizes, total = self._sizes(), 0
         for one in self._variables.values():
             inner = tuple(sizes[d] for d in one.dims[1:])

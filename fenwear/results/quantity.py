@@ -91,7 +91,7 @@ class InTable:
 
 
 def numbers(records: Any, of: str, known: Iterable[Quantity]) -> dict[str, float]:
-    """Return what a table of summary.json has of the last half-cycle or cycle, by its keys."""
+    """Return the numbers of the last half-cycle or cycle for a table of summary.json, by its keys."""
     own = [one for one in known if one.of == of]
     values = computed(records, own)
     return {one.key: float(np.asarray(values[one.name])[-1] if one.dims else values[one.name]) for one in own}

@@ -137,7 +137,7 @@ def of_a_body(body: str) -> tuple[Quantity, ...]:
 
 
 def of_a_plane_body(body: str) -> tuple[Quantity, ...]:
-    """Return what the wear of a body comes to in a cross-section."""
+    """Return the quantities of a body's wear in a cross-section."""
 
     def over_thickness(which: str) -> Callable[[Any], Array]:
         return lambda b: getattr(b, which).of(f"volume_{body}") / b.system.bodies.punch.thickness
@@ -360,7 +360,7 @@ OF_CONTACT = {
 
 
 def body_numbers(records: Block, body: str, known: Iterable[Quantity]) -> dict[str, float]:
-    """Return what is worn off a body at the end of a run, and what else is of it; none of a body that stays."""
+    """Return the wear and other numbers of a body at the end of a run; none of a body that does not wear."""
     own = numbers(records, body, known)
     return own | _diameters(own)
 

@@ -143,7 +143,7 @@ def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
 
 
 def _carried(part: Block, name: str) -> dict[str, Any]:
-    """Return what a named contact carries, rubs and warms to."""
+    """Return the load, friction and temperatures of a named contact."""
     system, degrees = part.system, degrees_of(part.system.case)
     own = system.pair.punch.nodes_of(name)
     area = system.bodies.punch.thickness * system.pair.weights
@@ -224,7 +224,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
 
 
 def sheet_of(last: Block) -> dict[str, Any]:
-    """Return what the registry has for the tables of a summary, and for its top."""
+    """Return the numbers of the registry for the tables of a summary, and for its top."""
     known = list(quantities_of(last.system).values())
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
     sliding |= numbers(last, "sliding", known)

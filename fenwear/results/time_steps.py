@@ -122,7 +122,7 @@ def of_solids() -> list[Quantity]:
 
 
 def _step_columns(system: Tribosystem) -> dict[str, Column]:
-    """Return what of time steps does not change in a run."""
+    """Return the columns of time steps that do not change in a run."""
     pair, position = system.pair, system.law_state.problem.interface.middle
     none = Column((STEP,), np.arange(1, most(system) + 1), {"units": "1", "long_name": "time step of the half-cycle"})
     if pair.punch.dim == 3:
@@ -141,7 +141,7 @@ def _step_columns(system: Tribosystem) -> dict[str, Column]:
 
 
 def attributes(system: Tribosystem) -> dict[str, Any]:
-    """Return what a history says of a law that resolves half-cycles; nothing of others."""
+    """Return the attributes of a history of a law that resolves half-cycles; none of others."""
     if not system.sticks:
         return {}
     problem = system.law_state.problem
@@ -283,7 +283,7 @@ OF_CYCLE = tuple(
 
 
 def extremes(block: Block) -> dict[str, float]:
-    """Return what is largest over the time steps of a block, by the names of a run's extremes; nothing without them."""
+    """Return the largest values over the time steps of a block, by the names of a run's extremes."""
     if not block.system.sticks:
         return {}
     weights = block.system.law_state.problem.weights
@@ -376,7 +376,7 @@ OF_TABLE = (
 
 
 def _table_columns(placed: ContactSetup) -> dict[str, Column]:
-    """Return what each place slides in each step of a table, and the tracks of the strip's material."""
+    """Return the sliding of each place in each step of a table, and the tracks of the strip's material."""
     if not placed.slides_many_ways:
         return {}
     ways = placed.ways
@@ -439,5 +439,5 @@ def quantities(system: Tribosystem) -> list[Quantity]:
 
 
 def columns(system: Tribosystem) -> dict[str, Column]:
-    """Return what of time steps and of tables does not change in a run."""
+    """Return the columns of time steps and of tables that do not change in a run."""
     return {**(_step_columns(system) if system.sticks else {}), **_table_columns(system)}

@@ -137,7 +137,7 @@ class Calibration:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return what --json prints and calibration.json holds."""
+        """Return the object that --json prints and calibration.json holds."""
         found = {
             "unknowns": [
                 {"key": one.key, "value": one.value, "unit": one.unit, "standard_error": one.standard_error,

@@ -80,7 +80,7 @@ def hardly_known(keys: Sequence[str], data: Sequence[DataSet], own: Array) -> li
 
 
 def known_together(keys: Sequence[str], correlation: Array, at_bound: Sequence[str]) -> list[str]:
-    """Return what is to be said of unknowns that are known."""
+    """Return the remarks on unknowns that the data determine."""
     lines = [
         f"{keys[i]} and {keys[j]} are known together better than alone: correlation {correlation[i, j]:.3f}"
         for i in range(len(keys))

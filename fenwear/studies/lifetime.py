@@ -62,7 +62,7 @@ class Lives:
     values: tuple[float, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Return what --json prints and life.json holds."""
+        """Return the object that --json prints and life.json holds."""
         rows = zip(self.quantities, self.values, strict=True)
         lives = [{"quantity": one.text, "unit": one.unit or "cycles", "value": value} for one, value in rows]
         return {"lives": finite(lives)}
@@ -119,7 +119,7 @@ class Lifetime:
         return self.unit or ("cycles" if self.quantity.startswith("cycles") or " until " not in self.quantity else "")
 
     def as_json(self) -> dict[str, Any]:
-        """Return what --json prints and life.json holds."""
+        """Return the object that --json prints and life.json holds."""
 
         def row(one: Estimate, name: str) -> dict[str, Any]:
             return {name: one.level, "value": one.value, "interval_95": [one.low, one.high]}

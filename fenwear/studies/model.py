@@ -118,7 +118,7 @@ class Model:
         return any(material.dependent for material in self.case.materials.values())
 
     def stick_left_out(self) -> list[str]:
-        """Return what is to be said of stick that the case leaves out, with an estimate of it."""
+        """Return the warning of stick that the case leaves out, with an estimate."""
         return Seen.of_system(self.system()).warnings("system")
 
     def _check_stays(self) -> None:
@@ -392,7 +392,7 @@ def edge_moved(run: Sequence[Snapshot]) -> bool:
 
 
 def cycle_of(end: Block | SteadyCycle) -> Totals:
-    """Return what all half-cycles of the last cycle add to the totals."""
+    """Return the totals of the last cycle."""
     adds, strokes = end.adds, end.system.motion.half_cycles
     return Totals(*(rows[-strokes:].sum(axis=0) for rows in (adds.sums, adds.energy, adds.pressure)))
 

@@ -146,7 +146,7 @@ class Quantity:
         return float(depth.max()) if self.at is None else self._at_place(snapshot, depth, on_strip=False)
 
     def _at_place(self, snapshot: Snapshot, values: Array, *, on_strip: bool) -> float:
-        """Return what nodal values (n,) are at its place.
+        """Return nodal values (n,) at the place of the quantity.
 
         Raises:
             CaseError: it is beside the contact.
@@ -272,7 +272,7 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
 
 
 def _unknown(text: str, word: str) -> str:
-    """Return what is to be said of a text that names no quantity."""
+    """Return the error of a text that names no quantity."""
     if registered_name(word, at_a_place=False):
         return f"{word} is one number; a place applies to wear, pressure and other values at nodes, got {text!r}"
     listed = [*registry.names_known(), *registry.LARGEST, *OLD_NAMES, *WHOLE]
@@ -296,7 +296,7 @@ def registered_name(word: str, *, at_a_place: bool) -> str:
 
 
 def registered(name: str, body: str = "punch") -> Registered:
-    """Return what the registry has of a name; of the strip where the strip has its own."""
+    """Return the entry of the registry of a name; that of the strip where the strip has one."""
     name = "moved_z" if name == APPROACH else name
     names = (f"{name}_strip", name) if body == "strip" else (name, f"{name}_punch")
     return next(found for one in names if (found := registry.known(one)).name)

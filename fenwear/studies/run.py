@@ -506,7 +506,7 @@ class _Run:
 
 
 def level_of(case: Case) -> RunLevel | NoLevel:
-    """Return what ends a run at a level of a quantity."""
+    """Return the level of a quantity that ends a run."""
     if not case.run.until:
         return NoLevel()
     from fenwear.studies.run_until import RunLevel  # with all that studies need
@@ -515,7 +515,7 @@ def level_of(case: Case) -> RunLevel | NoLevel:
 
 
 def position_warnings(system: Tribosystem) -> list[str]:
-    """Return what is to be said of the positions of a strip that wears, or that is uneven."""
+    """Return the warnings of the positions of a strip that wears, or that is uneven."""
     spacing, motion = system.position_spacing, system.motion
     stands = _standing_profile(system)
     if stands or not system.track_changes or spacing <= FAR_APART:
@@ -536,7 +536,7 @@ def _with_positions(number: int) -> str:
 
 
 def _standing_profile(system: Tribosystem) -> list[str]:
-    """Return what is to be said of an uneven strip that slides by: in each position it stands still."""
+    """Return the warning of an uneven strip that slides by: in each position it stands still."""
     slid = system.position_spacing or float(system.path.max()) / system.pair.punch.spacing()
     rough = bool(system.pair.strip.heights.any())
     if not system.case.passes or slid <= 1 or not (rough or _uneven(system)):

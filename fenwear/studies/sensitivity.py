@@ -140,7 +140,7 @@ class Sensitivity:
     derivatives: tuple[Derivative, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Return what --json prints: NaN as null."""
+        """Return the object that --json prints, NaN as null."""
         rows = [{**asdict(row), "error_of": row.error_of} for row in self.derivatives]
         found = {**asdict(self), "derivatives": rows}
         return dict(finite(found))

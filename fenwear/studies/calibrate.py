@@ -240,10 +240,10 @@ def _calibrated(problem: LeastSquares, progress: Log) -> Calibration:
     z: Array = np.zeros(len(problem.unknowns))
     _begin(problem, z)
     problem.check_influence(problem.jacobian(z), z)
-    progress("approach to the fit")
+    progress("first fit: each run finds its own jumps")
     z = problem.approach(z)
     if _begin(problem, z):  # the jumps of the start are too long or too short for the end
-        progress("fit on the jumps of its end")
+        progress("last fit: all runs jump as the end of the first fit")
     result = problem.fit(start=z)
     if not result.success:
         raise ConvergenceError(

@@ -379,7 +379,8 @@ class LeastSquares:
 
         def residual(both: Array) -> Array:
             found = self.whitened(self.with_baselines(both) - self.observed)
-            self._tell(f"{self.evaluations:,} runs, root mean square of the residuals {np.sqrt(np.mean(found**2)):.3g}")
+            size = np.sqrt(np.mean(found**2))
+            self._tell(f"{self.evaluations:,} runs so far: root mean square of the residuals {size:.3g} sigma")
             return found
 
         result = least_squares(

@@ -160,7 +160,7 @@ def test_first_peaks_have_their_size(history: xarray.Dataset) -> None:
         top = pressure_top(data, chosen)
         for ax in lines_figure(data, [fields_of(data)["pressure"]], chosen).axes:
             assert ax.get_ylim()[1] <= top
-            told = [line for line in ax.lines if f"(to {np.max(line.get_ydata()):.3g})" in str(line.get_label())]
+            told = [line for line in ax.lines if f"(to {np.max(line.get_ydata()):.3g} MPa)" in str(line.get_label())]
             assert len(told) >= beyond
             assert all(np.max(line.get_ydata()) <= top for line in ax.lines if line not in told)
 

@@ -34,7 +34,7 @@ ANSWERS = ("worn_volume_mm3", "largest_depth_", "largest_pressure_MPa", "largest
 SHOWN_FIRST = ("worn_volume_mm3", "largest_depth_mm", "largest_pressure_MPa", "mean_pressure_MPa",
                "largest_temperature_")  # fmt: skip
 STATIONARY = 1e-3  # change in a cycle below which pressures repeat
-ROUNDED = 1e-5  # of a number: what its five digits leave out, the least uncertainty that is given
+CERTAIN, BELOW = 1e-3, "below 0.1 %"  # of a number: uncertainties that are not given as a number
 # What is no line of the sheet, which has words for the others.
 LABELS = {
     "half_cycles": "half-cycles done",
@@ -145,7 +145,7 @@ class Number(NamedTuple):
         label: In words.
         unit: In which it is read.
         text: Its text.
-        uncertainty: As text; "" where it is not known.
+        uncertainty: As text, "± 0.05" or that it is small; "" where it is not known.
         sources: Largest sources of the uncertainty.
     """
 
@@ -179,9 +179,8 @@ def answers(summary: Mapping[str, Any]) -> list[Number]:
         most = [f"{s.replace('_', ' ')} {100 * part / within:.0f} %" for part, s in parts if part > SMALL * within > 0]
         line, digits, text = ALL_LINES[key], 5, ""
         if within and value:
-            within = max(within, ROUNDED * abs(value))
             digits = min(max(2 + math.floor(math.log10(abs(value) / within)), 2), 5)
-            text = number_text(shown(float(f"{within:.1e}"), line))
+            text = BELOW if within < CERTAIN * abs(value) else f"± {number_text(shown(float(f'{within:.1e}'), line))}"
         label, read = f"{words_of(key)}, {of}" if of else words_of(key), number_text(shown(value, line), digits)
         rows.append(Number(path, value, label, line.unit, read, text, ", ".join(most)))
     return rows
@@ -216,8 +215,10 @@ def first_screen(summary: Mapping[str, Any], directory: Path) -> str:
     wide = max((len(row.label) for row in first), default=0)
     lines = [f"{summary['half_cycles']:,} half-cycles: {summary['stop']}"]
     for row in first:
-        within = f" ± {row.uncertainty}" if row.uncertainty else ""
-        lines.append(f"  {row.label:{wide}}  {row.text}{within} {row.unit}")
+        number = f"{row.text} {row.unit} (uncertainty {BELOW})"
+        if row.uncertainty != BELOW:
+            number = " ".join(part for part in (row.text, row.uncertainty, row.unit) if part)
+        lines.append(f"  {row.label:{wide}}  {number}")
     lines += [f"Uncertainty from the {s.replace('_', ' ')}: {why}" for s, why in given.get("untold", {}).items()]
     if any(row.uncertainty for row in first):
         lines += [f"To lower the uncertainty: {'; '.join(sorted(set(given['remedies'].values())))}"]

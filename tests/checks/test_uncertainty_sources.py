@@ -192,6 +192,7 @@ def test_run_tells_it(fenwear: Callable[..., Any], tmp_path: Any) -> None:
     assert len(screen) <= 10
     rows = {line.split("  ")[1]: line for line in screen if line.startswith("  ")}
     assert re.search(r" ± \S+ µm$", rows["largest worn depth, punch"])
+    assert rows["worn volume, punch"].endswith("mm³ (uncertainty below 0.1 %)")
     assert len(rows) == 4  # and a temperature with heat
     assert screen[-1] == f"Report: {tmp_path}/a/report.html. All numbers: fenwear sheet {tmp_path}/a"
     sheet = fenwear("sheet", tmp_path / "a").stdout

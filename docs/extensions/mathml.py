@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 
+# docutils puts a low line over what \overline{...} covers; browsers do not stretch it. The style sheet draws the line.
+OVERLINE = re.compile(r'<mover accent="false">(.*?)<mo accent="true">_</mo>\s*</mover>', re.DOTALL)
+
+
+def _mathml(tex: str, *, block: bool) -> str:
+    """Return a formula as MathML."""
+    return OVERLINE.sub(r'<mrow class="overline">\1</mrow>', tex2mathml(tex, as_block=block))
+
 
 def _inline(writer: Any, node: nodes.math) -> None:
-    writer.body.append(tex2mathml(node.astext()))
+    writer.body.append(_mathml(node.astext(), block=False))
     raise nodes.SkipNode
 
 
 def _block(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>\n')
+    writer.body.append(f'<div class="math">{_mathml(node.astext(), block=True)}</div>\n')
     raise nodes.SkipNode
 
 

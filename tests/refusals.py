@@ -176,7 +176,7 @@ ELSEWHERE = (
     (MODEL, "`flash` where the strip turns about a point near to the contact",
      "results/test_flash_temperatures.py::test_refused_turning_about_the_contact"),
     (MODEL, "a reduced basis whose temperatures grow of themselves", ""),
-    (MODEL, "`contact.lubrication` whose share changes during the cycle, with a layer that closes by a law",
+    (MODEL, "`contact.lubrication` whose share follows the temperature, with a layer that closes by a law",
      "test_refusals.py::test_a_share_that_changes_with_a_layer"),
     (PHYSICS, "an end of partial slip with a threshold, which depends on the way there",
      "steps/test_steady.py::test_pressures_below_the_threshold_have_no_end_of_their_own"),

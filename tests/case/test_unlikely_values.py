@@ -42,18 +42,18 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
         (
             ["wear.punch.coefficient={expression='4e-8 * (1 + p / 50)'}"],
             "wear.punch.coefficient",
-            'an expression without a unit, read in mm^3/(N*mm): give it, {expression = ..., unit = "mm^3/(N*mm)"}',
+            'an expression without a unit, read in mm^3/(N*mm). Give it as {expression = ..., unit = "mm^3/(N*mm)"}',
         ),
         (
             ["wear.punch.coefficient={table=[[0, 1e-9], [9, 2e-9]], of='s'}", "wear.punch.pressure_exponent=1.5"],
             "wear.punch.coefficient",
             "a table without a unit, read in MPa^-1.5",
         ),
-        (["materials.steel.young={expression='2e5 - T'}"], "materials.steel.young", "read in MPa: give it"),
+        (["materials.steel.young={expression='2e5 - T'}"], "materials.steel.young", "read in MPa."),
         (
             ["contact.third_body={share=0.5, life={expression='3 + p'}}"],
             "contact.third_body.life",
-            "read in mm: give it",
+            "read in mm.",
         ),
         (["motion.amplitude=2"], "motion.amplitude", "read as 2.0 mm, beside motion.angular_frequency = '10 rad/s'"),
         (["heat.initial='20 degC'", "heat.ambient=20"], "heat.ambient", "20 K without a unit, which is -253.15 degC"),

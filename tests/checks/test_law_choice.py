@@ -30,7 +30,7 @@ ACROSS = "contact.transverse_friction=0.1"
 @pytest.mark.parametrize(
     ("settings", "law", "reason"),
     [
-        (("motion.amplitude='3 um'",), "coulomb", "% of the stroke"),
+        (("motion.amplitude='3 um'",), "coulomb", "times the stroke"),
         (("motion.amplitude='300 um'", WIDE), "gross-sliding", "% of the stroke"),
         (
             ("motion.amplitude='3 um'", "contact.transverse_friction=0.1"),

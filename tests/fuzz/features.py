@@ -27,6 +27,7 @@ class Scales:
         one_way: Whether the strip's material leaves the contact.
         solid: Whether bodies are solids.
         power: Of the pressure in the law of wear.
+        friction: Coefficient.
     """
 
     pressure: float
@@ -39,6 +40,7 @@ class Scales:
     one_way: bool
     solid: bool
     power: float
+    friction: float
 
     @property
     def depth(self) -> float:
@@ -100,10 +102,11 @@ def _creep(body: str) -> Callable[[Random, Scales], Changes]:
 
 
 def _friction(dice: Random, s: Scales) -> Changes:
+    mu = s.friction
     if s.heat and dice.random() < 0.5:
-        return {"contact.friction": {"table": [[0.0, 0.25], [5.0, 0.2]], "of": "T"},
+        return {"contact.friction": {"table": [[0.0, mu], [5.0, 0.8 * mu]], "of": "T"},
                 "contact.friction_temperature": dice.choice(["mean", "punch", "strip", "hotter"])}  # fmt: skip
-    return {"contact.friction": {"table": [[0.0, 0.3], [s.pressure, 0.2], [3 * s.pressure, 0.15]], "of": "p"}}
+    return {"contact.friction": {"table": [[0.0, mu], [s.pressure, 0.7 * mu], [3 * s.pressure, 0.5 * mu]], "of": "p"}}
 
 
 def _law(dice: Random, s: Scales) -> Changes:

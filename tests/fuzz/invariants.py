@@ -542,6 +542,7 @@ def _scales(made: Problem) -> Scales:
         one_way=made.kind in ("rings", "curved", "passing", "block"),
         solid=made.kind in SOLIDS,
         power=power,
+        friction=made.tables["contact"]["friction"],
     )
 
 

@@ -215,8 +215,9 @@ def _ends(coated: CoatedBody, depths: Array, cycles: Array) -> tuple[Mask, Array
     at: Array = np.zeros(depths.shape[1])
     for k in range(len(depths) - 1):
         now = (depths[k] < coated.thickness) & (depths[k + 1] >= coated.thickness)
-        left, grown = coated.thickness - depths[k], coated.measure(depths[k + 1]) - depths[k]
-        share = np.divide(left, grown, out=np.ones_like(left), where=grown > 0)
+        left, beyond = coated.thickness - depths[k], depths[k + 1] - coated.thickness
+        longer = np.divide(beyond, coated.ratio, out=np.zeros_like(left), where=coated.ratio > 0)  # by the coating
+        share = np.divide(left, left + longer, out=np.ones_like(left), where=now)
         at = np.where(now, cycles[k] + share * (cycles[k + 1] - cycles[k]), at)
         ended |= now
     return ended, at

@@ -19,6 +19,7 @@ from fenwear.results.registry import known, quantities_of
 from fenwear.results.stored_history import current_names, load_history
 from fenwear.results.summary import nominal_pressure
 from fenwear.steps import evolve
+from fenwear.steps.run_state import beginning
 from fenwear.steps.steady_cycle import cycle_of_state
 from fenwear.studies import Model, evaluate, parse_quantity, read_data
 from fenwear.studies.run import run_case
@@ -120,6 +121,21 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
     found = computed(block, layer_results.of_coated("punch"))
     assert found["worn_through_of_scar"] == pytest.approx([0.5])
     assert found["worn_through_of_surface"] == pytest.approx([0.1])
+
+
+@pytest.mark.parametrize("ratio", [10.0, 0.1])
+def test_when_a_coating_is_worn_through(ratio: float) -> None:
+    """Stiff bodies on an even layer: after 2.4 half-cycles everywhere, however much faster or slower the base wears in the third."""
+    stiff = [f"materials.{name}.young='1e9 MPa'" for name in ("steel", "composite")]
+    stiff.append("contact.layer={kind='linear', stiffness='1e3 N/mm^3'}")
+    depth = 1e-8 * 1e4 / 600 * 3  # of a half-cycle of 3 mm, mm
+    coating = f"wear.punch.coating={{thickness={2.4 * depth!r}, coefficient=1e-8}}"
+    small = ["geometry.degree=1", "geometry.parameters.elements_along_contact=4", "run.half_cycles=4"]
+    system = assemble(load_case("example2", [*small, *stiff, coating, f"wear.punch.coefficient={ratio * 1e-8!r}"]))
+    (block,) = evolve(system)
+    found = layer_results.worn_through(block, beginning(system), {})
+    assert found["punch_coating_first_through_half_cycle"] == pytest.approx(2.4, rel=1e-3)
+    assert found["punch_coating_last_through_half_cycle"] == pytest.approx(2.4, rel=1e-3)
 
 
 def test_a_steady_state_has_forces_and_torque() -> None:

@@ -22,13 +22,11 @@ class PressureLaw:
         exponent: b.
         threshold: Below it nothing wears, MPa.
         cap: Beyond it wear grows no more, MPa.
-        beyond: Share of the pressure beyond the cap that adds to q: 0 but on the way to a solution.
     """
 
     exponent: float = 1.0
     threshold: float = 0.0
     cap: float = np.inf
-    beyond: float = 0.0
 
     @classmethod
     def of(cls, law: WearLaw, share: float | None = 1.0) -> PressureLaw:
@@ -52,19 +50,13 @@ class PressureLaw:
         """Return q^b (...), MPa^b, of pressures."""
         if self.linear:
             return pressure
-        return np.maximum(self._felt(pressure) - self.threshold, 0.0) ** self.exponent
+        return np.maximum(np.minimum(pressure, self.cap) - self.threshold, 0.0) ** self.exponent
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivatives to the pressures (...), MPa^(b-1)."""
         if self.linear:
             return np.ones_like(pressure)
         floor = 1e-9 * max(float(pressure.max(initial=0.0)), 1e-300)  # b < 1: the slope at p = 0 is infinite
-        above = np.maximum(self._felt(pressure) - self.threshold, floor)
-        wears = np.where((pressure >= self.threshold) | (self.threshold == 0), 1.0, 0.0)
-        wears = np.where(pressure <= self.cap, wears, self.beyond)
+        above = np.maximum(np.minimum(pressure, self.cap) - self.threshold, floor)
+        wears = ((pressure >= self.threshold) | (self.threshold == 0)) & (pressure <= self.cap)
         return wears * self.exponent * above ** (self.exponent - 1)
-
-    def _felt(self, pressure: Array) -> Array:
-        """Return min(p, cap), and a share of what is beyond."""
-        below = np.minimum(pressure, self.cap)
-        return below + self.beyond * (pressure - below) if self.beyond else below

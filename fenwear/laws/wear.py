@@ -236,11 +236,6 @@ class PhasesWear:
         """The lowest pressure beyond which the wear of a body grows no more, MPa; infinite without."""
         return min(self.punch.law.cap, self.strip.law.cap)
 
-    def softened(self, share: float) -> PhasesWear:
-        """Return the wear where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
-        punch, strip = (replace(one, law=replace(one.law, beyond=share)) for one in (self.punch, self.strip))
-        return replace(self, punch=punch, strip=strip)
-
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""
         chosen = list(phases)

@@ -119,14 +119,9 @@ class Debris:
     present: bool = True
 
     @property
-    def of_state(self) -> bool:
-        """Whether its life depends on more than the place."""
-        return isinstance(self.life, Dependence)
-
-    @property
     def varies(self) -> bool:
         """Whether what is lost changes with more than the place."""
-        return self.of_state or self.edge_life < np.inf
+        return isinstance(self.life, Dependence) or self.edge_life < np.inf
 
     def lost(self, conditions: ContactConditions) -> Array:
         """Return what is lost over the sliding distance, of what is there (n,), 1/mm.

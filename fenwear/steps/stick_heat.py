@@ -30,7 +30,7 @@ from fenwear.case import Case
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.heat_exchange import TERMS, HeatExchange
+from fenwear.heat.heat_exchange import HeatExchange
 from fenwear.heat.passage import Passage
 from fenwear.heat.periodic_heat import JumpEnd
 from fenwear.heat.prepare import prepare_exchange
@@ -160,13 +160,6 @@ class CycleMap:
         now = self.through @ after + self.source - after
         missing = after - before - cycles / 2 * (rate + now)
         return JumpEnd(self.through, cycles).state(missing, np.zeros_like(missing))
-
-
-def balance_error(terms: Array) -> float:
-    """Return what is missing in a balance of heat (k, 8) of all steps together, over its largest term."""
-    friction, debris, stored, convected, held, carried = terms.sum(axis=0)[: len(TERMS)]
-    largest = max(np.abs(terms[:, : len(TERMS)]).sum(axis=0).max(), 1e-300)
-    return float(abs(friction - debris - stored - convected - held - carried) / largest)
 
 
 def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat | None:

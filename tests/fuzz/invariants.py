@@ -10,10 +10,10 @@ balances: load, force and moment, volume worn by what was metered and by depth o
 heat by source, by body and by sink, energy, complementarity. Most are asked, too, whether all quantities are those of
 the same problem in other sizes of length, stress, time and temperature and, where bodies are symmetric, of its mirror
 image. Some are asked whether they go on from their checkpoint to the same state, whether bodies made anew for them
-alone lead to the same, and whether jumps come to the depths of the march at every node. A few are asked whether their
-error falls with the mesh, whether two ranks find what one does, whether a slice of a solid is the plane, and a sector
-the ring. What holds with any feature is asked with up to four of them (`features.py`). Bounds are those of rounding,
-but for jumps (their tolerance) and meshes (their own change).
+alone lead to the same, whether a folder of results holds it, and whether jumps come to the depths of the march at every
+node. A few are asked whether their error falls with the mesh, whether two ranks find what one does, whether a slice of
+a solid is the plane, and a sector the ring. What holds with any feature is asked with up to four of them
+(`features.py`). Bounds are those of rounding, but for jumps (their tolerance) and meshes (their own change).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from features import OF_BODIES, OF_PHYSICS, Scales, drawn
 from images import Sizes, apart, mirrored, number, scaled
 from pool import verdicts
 
-from fenwear import evolve, load_case, make_case, to_dataset
+from fenwear import evolve, load_case, make_case, run_case, to_dataset
 from fenwear.case import Case
 from fenwear.case.templates import fill_in, find_template
 from fenwear.common.errors import FenwearError
@@ -192,7 +192,7 @@ INTEGRATIONS = ("explicit", "implicit")
 SHARED = 40  # seeds in a row of the same bodies
 # How many of the problems are asked what, of those that may be: without features, and with features.
 RARE = {"jumps": 0.1, "refinement": 0.02, "ranks": 0.002, "sector": 0.02, "slice_of_solid": 0.02}
-OFTEN = {"scale": 1.0, "mirror": 0.5, "restart": 0.25, "afresh": 0.02}
+OFTEN = {"scale": 1.0, "mirror": 0.5, "restart": 0.25, "afresh": 0.02, "written": 0.04}
 
 
 def _coefficient(dice: random.Random) -> str:
@@ -707,6 +707,14 @@ def afresh(problem_: Problem, whole: Result) -> list[Finding]:
     return _compare("afresh", whole, run(problem_.tables, bench=Bench()), EXACT)
 
 
+def written(problem_: Problem, whole: Result) -> list[Finding]:
+    """Whether a run into a folder has the same history there, and warns of no balance."""
+    with tempfile.TemporaryDirectory() as folder:
+        summary, path = run_case(make_case(problem_.tables), "x", Path(folder) / "x", lambda _: None, progress="none")
+        found = _compare("written", whole, whole._replace(history=load_history(path)), EXACT)
+    return found + [Finding(f"warned: {text}", 1.0, 0.0) for text in summary["warnings"] if "balance" in text]
+
+
 def jumps(problem_: Problem, whole: Result) -> list[Finding]:
     """Whether jumps come to the depths of a march, at every node."""
     how = ("explicit", 24) if problem_.kind in ("stick", "sphere") else ("implicit", 60)
@@ -863,7 +871,8 @@ def slice_of_solid(problem_: Problem, whole: Result) -> list[Finding]:
 
 
 ASKS: dict[str, Callable[[Problem, Result], list[Finding]]] = {
-    ask.__name__: ask for ask in (scale, mirror, restart, afresh, jumps, refinement, ranks, sector, slice_of_solid)
+    ask.__name__: ask
+    for ask in (scale, mirror, restart, afresh, written, jumps, refinement, ranks, sector, slice_of_solid)
 }
 
 

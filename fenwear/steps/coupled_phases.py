@@ -79,12 +79,14 @@ class DepthEvolution:
         cycles: Its length.
         wear: Wear of a cycle at pressures (m, n), at the last coefficients.
         half_cycles: Done since the start of the run, at its end.
+        follows: Whether coefficients depend on depths, states or distance.
     """
 
     before: WornDepths
     cycles: float
     wear: Callable[[Array], WornDepths]
     half_cycles: float
+    follows: bool = False
 
     def depths(self, pressure: Array) -> list[Array]:
         """Return the depths of punch and strip at its end, at these pressures."""
@@ -192,7 +194,7 @@ class Coupled:
         cycles: float,
         start: ContactState,
         solve: SolveContact,
-        passing: DepthEvolution | None = None,
+        passing: DepthEvolution,
     ) -> Solved:
         """Return contact, and temperature at the start of its cycle, `cycles` cycles on in one implicit step.
 
@@ -204,7 +206,7 @@ class Coupled:
             cycles: Their number; infinitely many give the periodic temperature.
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
-            passing: Depths from the pressures, where coefficients depend on depth or distance.
+            passing: Depths from the pressures.
 
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
@@ -227,7 +229,7 @@ class Coupled:
         cycles: float,
         start: ContactState,
         solve: SolveContact,
-        passing: DepthEvolution | None,
+        passing: DepthEvolution,
     ) -> Solved:
         """Return what `solve` does, at edges of the contact that are known."""
         try:
@@ -245,15 +247,15 @@ class Coupled:
         cycles: float,
         start: ContactState,
         solve: SolveContact,
-        passing: DepthEvolution | None,
+        passing: DepthEvolution,
         conducting: Callable[[NDArray[Any]], Array],
     ) -> Solved:
         """Return the solution where nodes of these pressures conduct."""
         heat, constant, shape, contact = self.heat, self.system.constant_coefficients, start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
         # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
-        depths = [] if passing is None else [passing.before.punch, passing.before.strip]
-        lain = [self.system.layers.lies(passing.before)] if passing is not None and self._felt else []
+        depths = [passing.before.punch, passing.before.strip] if passing.follows else []
+        lain = [self.system.layers.lies(passing.before)] if self._felt else []
         parts = self._parts(start.pressure, temperature, heat.conductances(start.pressure), depths + lain)
         unknowns = _Unknowns.like(parts, pressure_scale(self.system, start.pressure), warm=self._warm)
 
@@ -264,7 +266,9 @@ class Coupled:
             if not constant:
                 surfaces = now[1] if self._warm else np.zeros(0)
                 depths = now[:-1] if self._felt else now
-                worn = None if passing is None else replace(passing.before, punch=depths[-2], strip=depths[-1])
+                worn = passing.before
+                if passing.follows:
+                    worn = replace(worn, punch=depths[-2], strip=depths[-1])
                 lies = now[-1] if self._felt else None
                 self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing, lies)
             conductances = heat.conductances(conducting(pressure))
@@ -275,8 +279,8 @@ class Coupled:
             contact = self._in_step(end, contact, solve)
             state = end.state(self.mu * contact.pressure)
             same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
-            worn_off = [] if passing is None else passing.depths(contact.pressure)
-            lying = [self._debris(contact.pressure, passing)] if passing is not None and self._felt else []
+            worn_off = passing.depths(contact.pressure) if passing.follows else []
+            lying = [self._debris(contact.pressure, passing)] if self._felt else []
             parts = self._parts(contact.pressure, state, conductances, worn_off + lying)
             return unknowns.joined(parts), Solved(contact, state, conductances), same and constant
 
@@ -335,28 +339,28 @@ class Coupled:
         self,
         pressure: NDArray[Any],
         surfaces: NDArray[Any],
-        worn: WornDepths | None,
-        passing: DepthEvolution | None,
+        worn: WornDepths,
+        passing: DepthEvolution,
         debris: NDArray[Any] | None,
     ) -> None:
         """Take the coefficients at these pressures and, where there are any, temperatures, depths and debris."""
         system = self.system
         pressure = np.maximum(pressure, 0.0)  # a combination of some may lie below
-        done, shear = None if passing is None else passing.half_cycles, system.ways.shear(pressure)
+        shear = system.ways.shear(pressure)
         conditions = [
             system.conditions(
                 k,
                 p,
                 (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None,
                 worn,
-                done,
+                passing.half_cycles,
                 shear,
                 None if self._touching is None else self._touching[k],
             )
             for k, p in enumerate(pressure)
         ]
         if debris is not None:
-            lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries and passing is not None
+            lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries
             facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.pairs]
             conditions = [replace(one, debris=own) for one, own in zip(conditions, facing, strict=True)]
         evolution = replace(system.evolution(conditions, worn), near=self.held)
@@ -369,9 +373,9 @@ class Coupled:
             friction = [system.friction.values(state) for state in conditions]
             self.mu = np.array([heating_friction(system, mu, phase) for phase, mu in enumerate(friction)])
 
-    def _remembering(self, evolution: Evolution, passing: DepthEvolution | None) -> Sequence[ContactConditions]:
+    def _remembering(self, evolution: Evolution, passing: DepthEvolution) -> Sequence[ContactConditions]:
         """Return the conditions of the phases with the states of laws at the end of a step."""
-        if passing is None:
+        if not self.system.layers.memory.names:
             return evolution.conditions
         before = self.system.layers.held(passing.before)
         self.held = evolution.implicit(before, passing.cycles)

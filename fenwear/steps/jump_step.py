@@ -236,12 +236,6 @@ class Stepper(JumpLaw[JumpMoment]):
         temperature = before.temperature + cycles * rate.heated
         return JumpMoment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
 
-    def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
-        """Return how depths follow in a stage where coefficients depend on them."""
-        if not self._follows:
-            return None
-        return DepthEvolution(worn, cycles, partial(self._wear, worn, cycles), self._done)
-
     def _wear(self, before: WornDepths, cycles: float, pressure: Array) -> WornDepths:
         return self.wear.begun(before, cycles).worn(pressure)  # as last taken
 
@@ -267,7 +261,7 @@ class Stepper(JumpLaw[JumpMoment]):
             np.inf if self.periodic else cycles - 0.5,
             near,
             lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
-            self._passing(before.worn, cycles),
+            DepthEvolution(before.worn, cycles, partial(self._wear, before.worn, cycles), self._done, self._follows),
         )
         contact, begin = solved.contact, solved.temperature
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin

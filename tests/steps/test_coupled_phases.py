@@ -10,7 +10,7 @@ import pytest
 from fenwear import Tribosystem
 from fenwear.common.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.steps.coupled_phases import Coupled, Solved
+from fenwear.steps.coupled_phases import Coupled, DepthEvolution, Solved
 
 CYCLES, NODE = 20.0, 3
 SETTINGS = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.conductance=perfect")
@@ -28,7 +28,8 @@ def pressed(system: Tribosystem, share: float, start: float) -> tuple[Coupled, A
         return ContactState(pressure, np.zeros(shape), np.zeros((shape[0], 2)), 1)
 
     initial = heat.initial()
-    return coupled, initial, coupled.solve(initial, CYCLES, state(start), lambda *_: state(share))
+    passing = DepthEvolution(system.unworn(), CYCLES, lambda _: system.unworn(), 0.0)
+    return coupled, initial, coupled.solve(initial, CYCLES, state(start), lambda *_: state(share), passing)
 
 
 @pytest.mark.parametrize(("share", "start", "conducts"), [(0.0, 1.0, False), (1e-13, 0.5, False), (1e-3, 0.0, True)])

@@ -257,15 +257,15 @@ class Iterative(Factor):
             ConvergenceError: the iteration does not converge.
         """
         before, after = self._ksp.getOperators()[0].createVecs()
-        found = np.empty_like(right)
+        solutions = np.empty_like(right)
         for column, values in enumerate(right.T):
             before.array[:] = values
             self._ksp.solve(before, after)
             if self._ksp.reason < 0:
                 raise without_factor(self._prefix, f"{self._ksp.its} iterations, reason {self._ksp.reason}")
-            found[:, column] = after.array_r
+            solutions[:, column] = after.array_r
         destroy(before, after)
-        return found
+        return solutions
 
     def free(self) -> None:
         """Free its memory: it solves no more; collective."""
@@ -356,10 +356,10 @@ def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[A
         all_together(factor.comm)
     columns = [right.reshape(len(right), math.prod(right.shape[1:])) for right in rights]
     whole = [factor.gather(one) for factor, one in zip(factors, columns, strict=True)]
-    found = [factor.solve_here(one) for factor, one in zip(factors, whole, strict=True)]
+    solutions = [factor.solve_here(one) for factor, one in zip(factors, whole, strict=True)]
     return [
         factor.scatter(one, right.shape[1]).reshape(given.shape)
-        for factor, one, right, given in zip(factors, found, columns, rights, strict=True)
+        for factor, one, right, given in zip(factors, solutions, columns, rights, strict=True)
     ]
 
 

@@ -221,9 +221,9 @@ class Blocks:
 
     def added(self, diagonal: Array) -> Blocks:
         """Return the blocks with numbers (m, n) added to the diagonal of each phase."""
-        found, every = self.matrices.copy(), np.arange(self.nodes)
-        found[:, every, every] += diagonal
-        return Blocks(found, self.nodes)
+        blocks, every = self.matrices.copy(), np.arange(self.nodes)
+        blocks[:, every, every] += diagonal
+        return Blocks(blocks, self.nodes)
 
     def near(self, wear: Array, touched: Indices) -> Solve:
         """Return what is near the inverse of 1 + (sum of D_k) S^-1 on nodes that touch: S (S + sum of D_k)^-1.

@@ -222,9 +222,9 @@ def _symmetric(response: Array, along: Array) -> Array:
 def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
     """Return the displacement of each body's trace nodes under its loads (N, d), mm, all solved at once; collective."""
     solutions = solve_together([body.factor for body in bodies], [body.load for body in bodies])
-    found = [body.trace.pick(one[:, None])[:, :, 0] for body, one in zip(bodies, solutions, strict=True)]
+    displacement = [body.trace.pick(one[:, None])[:, :, 0] for body, one in zip(bodies, solutions, strict=True)]
     for number, body in enumerate(bodies):
         answer = body.guide_answer
         work = total(body.body.mesh.comm, answer.moved.T @ body.load)
-        found[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
-    return found
+        displacement[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
+    return displacement

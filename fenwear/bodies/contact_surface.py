@@ -383,8 +383,8 @@ def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int
     closures = space.element.basix_element.entity_closure_dofs[fdim]
     cells = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int32)
     numbers = [int(np.flatnonzero(to_facet.links(c) == f)[0]) for c, f in zip(cells, facets, strict=True)]
-    found = [space.dofmap.cell_dofs(c)[sorted(closures[k])] for c, k in zip(cells, numbers, strict=True)]
-    return np.array(found, dtype=np.int32).reshape(-1, len(closures[0])), cells
+    local_blocks = [space.dofmap.cell_dofs(c)[sorted(closures[k])] for c, k in zip(cells, numbers, strict=True)]
+    return np.array(local_blocks, dtype=np.int32).reshape(-1, len(closures[0])), cells
 
 
 def _own_facets(body: BodyMesh) -> NDArray[np.int32]:

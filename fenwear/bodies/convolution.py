@@ -65,30 +65,30 @@ class Convolution:
         flat = forces.reshape(n, b, -1)
         fields, at = np.zeros((flat.shape[2], b, *self.counts)), (EVERY, EVERY, *self.places.T)
         fields[at] = flat.transpose(2, 1, 0)
-        found = convolved([(self._kernel, fields)], len(self.table), self.size)[at].transpose(2, 1, 0)
+        displacements = convolved([(self._kernel, fields)], len(self.table), self.size)[at].transpose(2, 1, 0)
         for weights, response in self.smooth:
             moved = np.tensordot(response, weights.to_points(flat), ((2, 3), (0, 1)))
-            found = found + weights.to_nodes(np.asarray(moved, dtype=np.float64))
-        return np.asarray(found).reshape(n, -1, *rest)
+            displacements = displacements + weights.to_nodes(np.asarray(moved, dtype=np.float64))
+        return np.asarray(displacements).reshape(n, -1, *rest)
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the displacements at some nodes from unit forces at others (rows, a, columns, b)."""
         strides = np.array([*self.table.shape[3:], 1])
         flat = self.places @ strides
         apart = flat[rows][:, None] - flat[columns] + (np.array(self.counts) - 1) @ strides
-        found = self.table.reshape(*self.table.shape[:2], -1)[:, :, apart].transpose(2, 0, 3, 1)
+        displacements = self.table.reshape(*self.table.shape[:2], -1)[:, :, apart].transpose(2, 0, 3, 1)
         for weights, response in self.smooth:
             half = np.tensordot(weights.rows(rows), response, 1)
-            found = found + np.moveaxis(np.tensordot(half, weights.rows(columns), (2, 1)), 3, 2)
-        return np.asarray(found)
+            displacements = displacements + np.moveaxis(np.tensordot(half, weights.rows(columns), (2, 1)), 3, 2)
+        return np.asarray(displacements)
 
     def diagonal(self) -> Array:
         """Return the displacements at each node from unit forces at itself (n, a, b)."""
         middle = self.table.reshape(*self.table.shape[:2], -1)[..., math.prod(self.table.shape[2:]) // 2]
-        found = np.broadcast_to(middle, (len(self.places), *middle.shape))
+        displacements = np.broadcast_to(middle, (len(self.places), *middle.shape))
         for weights, response in self.smooth:
-            found = found + weights.diagonal(response.transpose(0, 2, 1, 3))
-        return np.asarray(found)
+            displacements = displacements + weights.diagonal(response.transpose(0, 2, 1, 3))
+        return np.asarray(displacements)
 
     def times(self, factor: float) -> Convolution:
         """Return the same times a factor."""

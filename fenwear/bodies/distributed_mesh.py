@@ -284,11 +284,11 @@ def _grouped(
             mesh = sound(model_mesh(path.name, gmsh))
         if path.suffix.lower() in CAD:
             wanted = {}  # its parts are named
-    found = grouped(mesh, wanted, scale, dim, by_role, _length)
-    if kind == "axisymmetric" and (inner := float(found.points[:, 0].min())) < -FLAT * float(np.ptp(found.points)):
+    groups = grouped(mesh, wanted, scale, dim, by_role, _length)
+    if kind == "axisymmetric" and (inner := float(groups.points[:, 0].min())) < -FLAT * float(np.ptp(groups.points)):
         message = f"{path.name} reaches to x = {inner:g} mm, but x is the radius of an axisymmetric model: x >= 0"
         raise CaseError(InputError("geometry.file", message))
-    return found, contact_nodes
+    return groups, contact_nodes
 
 
 def _length(text: str) -> float:

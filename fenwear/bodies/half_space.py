@@ -118,18 +118,18 @@ def _influences(
     else:
         own = _in_space_on_grid(shape, spacing, shear, poisson)
     d = len(shape) + 1
-    found = np.zeros((d, d, *(2 * count - 1 for count in shape)))
+    displacements = np.zeros((d, d, *(2 * count - 1 for count in shape)))
     every: list[Any] = [EVERY, EVERY]
-    found[tuple(every + [slice(count - 1, None) for count in shape])] = np.moveaxis(own, (-2, -1), (0, 1))
-    found /= np.prod(spacing)
+    displacements[tuple(every + [slice(count - 1, None) for count in shape])] = np.moveaxis(own, (-2, -1), (0, 1))
+    displacements /= np.prod(spacing)
     for axis, count in enumerate(shape):  # the other way along an axis what that axis has one share in changes its sign
         turned = np.ones(d)
         turned[axis] = -1.0
         behind, ahead = ([*every, *every[: len(shape)]] for _ in range(2))
         behind[2 + axis], ahead[2 + axis] = slice(0, count - 1), slice(2 * count - 2, count - 1, -1)
         sign = np.outer(turned, turned).reshape(d, d, *(1,) * len(shape))
-        found[tuple(behind)] = sign * found[tuple(ahead)]
-    return found
+        displacements[tuple(behind)] = sign * displacements[tuple(ahead)]
+    return displacements
 
 
 def half_space(request: Request) -> HalfSpace:
@@ -254,11 +254,14 @@ def _from_squares(square: Array, sign: Array, shear: float, poisson: float) -> A
     """Return displacements (..., d, d) from these integrals (5, ...), and the signs of the coordinates (..., 2)."""
     xx, yy, xy, fx, fy = square
     xy, fx, fy = xy * sign.prod(axis=-1), fx * sign[..., 0], fy * sign[..., 1]
-    found = np.zeros((*xx.shape, 3, 3))
+    displacements = np.zeros((*xx.shape, 3, 3))
     over_r = xx + yy
-    found[..., 0, 0], found[..., 1, 1] = (1 - poisson) * over_r + poisson * xx, (1 - poisson) * over_r + poisson * yy
-    found[..., 0, 1] = found[..., 1, 0] = poisson * xy
-    found[..., 2, 2] = (1 - poisson) * over_r
+    displacements[..., 0, 0], displacements[..., 1, 1] = (
+        (1 - poisson) * over_r + poisson * xx,
+        (1 - poisson) * over_r + poisson * yy,
+    )
+    displacements[..., 0, 1] = displacements[..., 1, 0] = poisson * xy
+    displacements[..., 2, 2] = (1 - poisson) * over_r
     for k, f in enumerate((fx, fy)):
-        found[..., 2, k], found[..., k, 2] = (0.5 - poisson) * f, -(0.5 - poisson) * f
-    return np.asarray(found / (2 * np.pi * shear))
+        displacements[..., 2, k], displacements[..., k, 2] = (0.5 - poisson) * f, -(0.5 - poisson) * f
+    return np.asarray(displacements / (2 * np.pi * shear))

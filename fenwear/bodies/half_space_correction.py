@@ -90,11 +90,11 @@ class Ground:
         down = into * (x[self.grid.normal] - self.grid.level)
         pushed = [*(force[axis] for axis in self.grid.axes), into * force[self.grid.normal]]
         own = (_in_plane if len(order) == 2 else _in_space)(along, down, pushed, self.poisson, self.depth, by)
-        found: list[Any] = [None] * len(order)
+        displacement: list[Any] = [None] * len(order)
         for axis, value in zip(order, own, strict=True):
-            found[axis] = value / (4 * np.pi * self.shear)
-        found[self.grid.normal] = into * found[self.grid.normal]
-        return found
+            displacement[axis] = value / (4 * np.pi * self.shear)
+        displacement[self.grid.normal] = into * displacement[self.grid.normal]
+        return displacement
 
 
 def _in_plane(along: list[Any], z: Any, force: list[Any], nu: float, depth: float, by: Any) -> list[Any]:

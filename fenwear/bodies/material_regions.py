@@ -45,8 +45,8 @@ def contact_density(shares: Mapping[str, Array], densities: Mapping[str, float |
         shares: Of the regions in the nodes (n,), by their names.
         densities: Of the regions.
     """
-    found = np.zeros(len(next(iter(shares.values()))))
+    density = np.zeros(len(next(iter(shares.values()))))
     for name, share in shares.items():
         rho = densities.get(name)
-        found += np.where(share > 0, share * (np.nan if rho is None else rho), 0.0)
-    return found if bool(np.isfinite(found).all()) else None
+        density += np.where(share > 0, share * (np.nan if rho is None else rho), 0.0)
+    return density if bool(np.isfinite(density).all()) else None

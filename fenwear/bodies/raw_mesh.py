@@ -105,13 +105,13 @@ class GmshView:
 
     def getElements(self, dim: int = -1, tag: int = -1) -> tuple[list[int], list[Any], list[Any]]:  # noqa: N802
         """Return the kinds of the elements of an entity, or of all, with their tags and their nodes."""
-        found: dict[int, tuple[list[Any], list[Any]]] = {}
+        kinds: dict[int, tuple[list[Any], list[Any]]] = {}
         for one, tags in self._tagged(dim, tag):
-            of_kind = found.setdefault(one.kind, ([], []))
+            of_kind = kinds.setdefault(one.kind, ([], []))
             of_kind[0].append(tags)
             of_kind[1].append(one.nodes.ravel() + 1)
-        joined = [(np.concatenate(tags), np.concatenate(nodes)) for tags, nodes in found.values()]
-        return list(found), [of_kind[0] for of_kind in joined], [of_kind[1] for of_kind in joined]
+        joined = [(np.concatenate(tags), np.concatenate(nodes)) for tags, nodes in kinds.values()]
+        return list(kinds), [of_kind[0] for of_kind in joined], [of_kind[1] for of_kind in joined]
 
     def getElementProperties(self, kind: int) -> tuple[str, int, int, int, Array, int]:  # noqa: N802
         """Return of a kind of element what is asked for: its dimension, second, and the number of its nodes, fourth."""

@@ -110,10 +110,10 @@ def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | N
     Bodies whose factors are on different ranks are solved at once.
     """
     answers = [_Answer(one) for one in requests]
-    found = [answer.solve() for answer in answers]
+    response = [answer.solve() for answer in answers]
     for answer in answers:
         answer.factor.free_copies()
-    return [answer.shared(*one) for answer, one in zip(answers, found, strict=True)]
+    return [answer.shared(*one) for answer, one in zip(answers, response, strict=True)]
 
 
 class _Answer:

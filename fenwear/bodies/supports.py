@@ -88,7 +88,7 @@ class Supports:
 
     def _mirrors(self, supports: Sequence[Support]) -> list[tuple[int, float]]:
         """Return the planes that supports hold as those of symmetry; collective."""
-        found, mesh = [], self.body.mesh
+        planes, mesh = [], self.body.mesh
         for support in supports:
             if support.on not in self.body.curves or len(support.fix) != 1 or any(support.by or ()):
                 continue
@@ -98,8 +98,8 @@ class Supports:
             low = mesh.comm.allreduce(float(along.min(initial=np.inf)), MPI.MIN)
             high = mesh.comm.allreduce(float(along.max(initial=-np.inf)), MPI.MAX)
             if high - low < FLAT * self._size():
-                found.append((axis, (low + high) / 2))
-        return found
+                planes.append((axis, (low + high) / 2))
+        return planes
 
     def _described(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key, found = f"{self.body.name}.supports", []

@@ -37,12 +37,12 @@ def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | N
     """
     if wanted.file is not None:
         path = (folder or Path()) / wanted.file
-        found = _interpolated(_measured(path, wanted, key), grid, f"{key}.file")
+        heights = _interpolated(_measured(path, wanted, key), grid, f"{key}.file")
     elif wanted.wavelength is not None:
-        found = _wave(wanted, grid, key)
+        heights = _wave(wanted, grid, key)
     else:
-        found = _self_affine(wanted, grid, key)
-    return wanted.height_factor * found
+        heights = _self_affine(wanted, grid, key)
+    return wanted.height_factor * heights
 
 
 def _wave(wanted: Topography, grid: RegularGrid, key: str) -> Array:

@@ -185,15 +185,15 @@ def renamed(data: Any, change: Callable[[str], str]) -> Any:
         return [renamed(value, change) for value in data]
     if not isinstance(data, Mapping):
         return data
-    found: dict[Any, Any] = {}
+    tables: dict[Any, Any] = {}
     for key, value in data.items():
         if key == "on" and isinstance(value, str):
-            found[key] = change(value)
+            tables[key] = change(value)
         elif key == "regions" and isinstance(value, Mapping):
-            found[key] = {change(name) if isinstance(name, str) else name: one for name, one in value.items()}
+            tables[key] = {change(name) if isinstance(name, str) else name: one for name, one in value.items()}
         else:
-            found[key] = renamed(value, change)
-    return found
+            tables[key] = renamed(value, change)
+    return tables
 
 
 def by_roles(data: Mapping[str, Any], base: Mapping[str, Any] = MappingProxyType({})) -> dict[str, Any]:

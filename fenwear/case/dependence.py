@@ -127,8 +127,8 @@ def _constant(value: float, text: str) -> Function:
 def evaluate(function: Function, state: Now, shape: tuple[int, ...]) -> Array:
     """Return the values (shape) of a parsed expression; NaN and infinities are left to the caller."""
     with np.errstate(all="ignore"):
-        found = np.array(function(state), dtype=float)
-    return found if found.shape == shape else np.broadcast_to(found, shape).copy()
+        values = np.array(function(state), dtype=float)
+    return values if values.shape == shape else np.broadcast_to(values, shape).copy()
 
 
 F = TypeVar("F", bound=Function)
@@ -261,14 +261,14 @@ def _check_state(name: str, state: State, known: Sequence[str]) -> None:
 
 def states_of_law(name: str) -> dict[str, State]:
     """Return the states that a registered law depends on, and those that these depend on; none where there is none."""
-    found: dict[str, State] = {}
+    states: dict[str, State] = {}
     left = list(_LAWS[name].of) if name in _LAWS else []
     while left:
         word = left.pop()
-        if word in _STATES and word not in found:
-            found[word] = _STATES[word]
+        if word in _STATES and word not in states:
+            states[word] = _STATES[word]
             left += _STATES[word].of
-    return {word: found[word] for word in sorted(found)}
+    return {word: states[word] for word in sorted(states)}
 
 
 def variables_of_law(name: str) -> frozenset[str]:
@@ -309,14 +309,16 @@ def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now
         CaseError: it fails, or gives what is no finite number for each node; says so.
     """
     try:
-        found = _called(f"the state {name!r}", function, of, now, shape)
+        values = _called(f"the state {name!r}", function, of, now, shape)
     except ValueError as error:
         raise CaseError(InputError(f"state {name!r}", str(error))) from error
-    if not math.isfinite(float(found @ found)) and not np.isfinite(found).all():  # a square may be beyond all numbers
-        node = int(np.flatnonzero(~np.isfinite(found))[0])
+    if (
+        not math.isfinite(float(values @ values)) and not np.isfinite(values).all()
+    ):  # a square may be beyond all numbers
+        node = int(np.flatnonzero(~np.isfinite(values))[0])
         at = ", ".join(f"{one} = {np.broadcast_to(now[one], shape)[node]:g}" for one in of)
-        raise CaseError(InputError(f"state {name!r}", f"expected finite numbers, got {found[node]:g} at {at}"))
-    return found
+        raise CaseError(InputError(f"state {name!r}", f"expected finite numbers, got {values[node]:g} at {at}"))
+    return values
 
 
 def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:

@@ -68,8 +68,8 @@ class Material(Part):
         Raises:
             CaseError: a property is not finite there, or not positive; `key` is the material's.
         """
-        found = {name: float(self.values(name, np.array([temperature]), key)[0]) for name in self.dependent}
-        return self.model_copy(update=found) if found else self
+        material = {name: float(self.values(name, np.array([temperature]), key)[0]) for name in self.dependent}
+        return self.model_copy(update=material) if material else self
 
     def values(self, name: str, temperature: Array, key: str) -> Array:
         """Return a property at temperatures (n,), 0 where it is not given.

@@ -119,8 +119,8 @@ def _at_files(data: Any, change: Callable[[str, Mapping[str, Any]], Mapping[str,
         return [_at_files(value, change, f"{key}.{number}") for number, value in enumerate(data)]
     if not isinstance(data, Mapping) or key == "geometry":
         return data
-    found = {name: _at_files(value, change, f"{key}.{name}" if key else name) for name, value in data.items()}
-    return change(key, found) if key and "file" in found else found
+    tables = {name: _at_files(value, change, f"{key}.{name}" if key else name) for name, value in data.items()}
+    return change(key, tables) if key and "file" in tables else tables
 
 
 def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:

@@ -85,10 +85,10 @@ def find_template(name: str) -> Template:
         raise CaseError(InputError("new", f"no template {name!r}. There are {', '.join(names)}{hint}"))
     head, _, text = (_folder() / f"{name}.toml").read_text("utf-8").partition(BETWEEN)
     table = tomllib.loads(head)
-    found = {
+    template = {
         key: Dimension(one["value"], one.get("unit", "mm"), one["about"]) for key, one in table["dimensions"].items()
     }
-    return Template(name, table["title"], found, text.lstrip("\n"))
+    return Template(name, table["title"], template, text.lstrip("\n"))
 
 
 def fill_in(template: Template, settings: Sequence[str] = ()) -> str:

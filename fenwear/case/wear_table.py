@@ -228,11 +228,13 @@ class Dependence(_State):
 
     def _of_regions(self, state: Mapping[str, Any], shape: tuple[int, ...], effect: Callable[[Array], Array]) -> Array:
         """Return the coefficient of nodes of one or several regions (shape), see `fenwear.laws.friction`."""
-        found, effects = np.zeros(shape), state["regions"].effects(np.broadcast_to(state["p"], shape), effect)
+        coefficient, effects = np.zeros(shape), state["regions"].effects(np.broadcast_to(state["p"], shape), effect)
         for name, given in (self.regions or {}).items():
             share = state[f"region {name}"] * effects.get(name, 1.0)
-            found += np.where(share > 0, share * (given.at(state, shape) if isinstance(given, OfState) else given), 0.0)
-        return found
+            coefficient += np.where(
+                share > 0, share * (given.at(state, shape) if isinstance(given, OfState) else given), 0.0
+            )
+        return coefficient
 
 
 @lru_cache(maxsize=100)

@@ -319,20 +319,20 @@ def _measures(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> list[Measu
     sizes = {"punch": _size(bodies.punch), "strip": _size(bodies.strip)}
     body = min(sizes, key=lambda name: sizes[name])
     size = sizes[body]
-    found = [Measure(size, 1, 0.3, 5e3, f"the {body} is {size:.3g} mm in all")]
+    estimates = [Measure(size, 1, 0.3, 5e3, f"the {body} is {size:.3g} mm in all")]
     if case.model.kind == "plane":
         thickness = case.model.thickness
-        found.append(Measure(size / thickness, 1, 0.05, 500, f"model.thickness is {thickness:.3g} mm"))
+        estimates.append(Measure(size / thickness, 1, 0.05, 500, f"model.thickness is {thickness:.3g} mm"))
     if isinstance(case.motion, Reciprocating | Tabulated):
         _, distance, half_cycles = cycle_of(case)
         stroke = distance / half_cycles
-        found.append(Measure(size / stroke, 1, 0.05, 1e4, f"the stroke is {stroke:.3g} mm"))
+        estimates.append(Measure(size / stroke, 1, 0.05, 1e4, f"the stroke is {stroke:.3g} mm"))
     if rigid.translations:
         used = case.used_materials
         strain = rigid.mean_pressure / min(case.initial_materials[name].young for name in used)
         text = f"the load presses with {rigid.mean_pressure:,.3g} MPa on the whole surface"
-        found.append(Measure(strain, -1 if case.model.kind == "plane" else -2, 1e-9, 0.05, text))
-    return found
+        estimates.append(Measure(strain, -1 if case.model.kind == "plane" else -2, 1e-9, 0.05, text))
+    return estimates
 
 
 def _size(elastic: ElasticBody) -> float:

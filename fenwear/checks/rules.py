@@ -177,19 +177,19 @@ class Seen:
 
 def _balances(made: Made, block: Block) -> dict[str, Array]:
     """Return the errors of the balances of each half-cycle (k,), relative, by name."""
-    system, found = block.system, {"force and moment": block.equilibrium_error}
+    system, errors = block.system, {"force and moment": block.equilibrium_error}
     if block.heat is not None:
         terms = block.heat.terms[:, : len(TERMS)]
-        found["heat"] = made.error("heat", terms[:, 0] - terms[:, 1:].sum(axis=1), terms)
+        errors["heat"] = made.error("heat", terms[:, 0] - terms[:, 1:].sum(axis=1), terms)
     steps: tuple[Any, ...] = block.steps
     if steps:
         weights = system.law_state.problem.weights
-        found["energy"] = np.array([one.records.balance_error(weights) for one in steps])
+        errors["energy"] = np.array([one.records.balance_error(weights) for one in steps])
     if system.bodies.followed is None:  # else on other meshes
         lost, worn = block.totals.of("volume_punch"), block.wear @ system.pair.weights
-        found["worn volume"] = made.error("worn volume", lost - system.bodies.punch.thickness * worn, lost)
+        errors["worn volume"] = made.error("worn volume", lost - system.bodies.punch.thickness * worn, lost)
     debris = quantities_of(block.system).get("debris_balance_error")
-    return found if debris is None else {**found, "debris": debris.compute(block)}
+    return errors if debris is None else {**errors, "debris": debris.compute(block)}
 
 
 def unbalanced(seen: Seen) -> Fields:
@@ -256,11 +256,17 @@ def hot(seen: Seen) -> Fields:
 def deep_elements(seen: Seen) -> Fields:
     """Return the elements that are too deep for the contact; collective."""
     pressure, net = seen.pressure[0], net_of(seen.system)
-    found = mesh_fineness.deepest(seen.system, net, pressure, _hertzian(seen, pressure))
-    if found is None or found.excess <= 1:
+    elements = mesh_fineness.deepest(seen.system, net, pressure, _hertzian(seen, pressure))
+    if elements is None or elements.excess <= 1:
         return {}
-    where = "at the contact" if found.distance == 0 else f"{found.distance:.2g} mm below the contact"
-    return {"body": found.body, "where": where, "depth": found.depth, "when": seen.when[0], "allowed": found.allowed}
+    where = "at the contact" if elements.distance == 0 else f"{elements.distance:.2g} mm below the contact"
+    return {
+        "body": elements.body,
+        "where": where,
+        "depth": elements.depth,
+        "when": seen.when[0],
+        "allowed": elements.allowed,
+    }
 
 
 def few_nodes(seen: Seen) -> Fields:

@@ -81,30 +81,30 @@ Contribution = dict[Quantity, float]  # to the uncertainty of each number, in it
 
 def values_of(last: Block) -> Values:
     """Return the numbers at the end of a run: largest depths, volumes, largest pressures of a cycle and temperature."""
-    system, found = last.system, Values()
+    system, numbers = last.system, Values()
     depths, surfaces = (last.wear[-1], last.wear_strip[-1]), (system.pair.punch, system.pair.strip)
     for body, law, depth, surface in zip(BODIES, system.sliding.wear, depths, surfaces, strict=True):
         if law.wears:
-            found[Quantity("largest_depth", body)] = _largest(depth, surface)
-            found[Quantity("worn_volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
-    found |= _pressures(system, last)
+            numbers[Quantity("largest_depth", body)] = _largest(depth, surface)
+            numbers[Quantity("worn_volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
+    numbers |= _pressures(system, last)
     if last.heat is not None:
         sides: list[Array] = [last.heat.temperature_punch[-1], last.heat.temperature_strip[-1]]
         warmer = max(sides, key=lambda side: float(side.max()))
-        found[Quantity("largest_temperature")] = _largest(warmer, system.pair.punch)
-    return found
+        numbers[Quantity("largest_temperature")] = _largest(warmer, system.pair.punch)
+    return numbers
 
 
 def values_of_steady(state: SteadyState) -> Values:
     """Return the numbers of a cyclic steady state: the largest pressure of each half-cycle, and the temperature."""
     surface, strokes = state.system.pair.punch, len(state.directions)
-    found = _of_half_cycles(state.system, np.arange(1, strokes + 1), state.pressure)
+    numbers = _of_half_cycles(state.system, np.arange(1, strokes + 1), state.pressure)
     if state.heat is not None:
         sides = [*state.heat.punch, *state.heat.strip]
-        found[Quantity("largest_temperature")] = _largest(
+        numbers[Quantity("largest_temperature")] = _largest(
             np.asarray(max(sides, key=lambda side: float(side.max()))), surface
         )
-    return found
+    return numbers
 
 
 def _pressures(system: ContactSetup, last: Block) -> Values:

@@ -297,18 +297,18 @@ SMALL = GIB  # below which nothing is rejected
 
 def free_memory() -> float:
     """Return the memory that this process may still take, bytes; infinite where the system does not say."""
-    found = [np.inf]
+    memory = [np.inf]
     try:
         lines = Path("/proc/meminfo").read_text("ascii").splitlines()
-        found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
+        memory += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
     except (OSError, ValueError, IndexError):
         pass
     try:  # the limit of a container
         limit, used = (Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii").strip() for name in ("max", "current"))
-        found += [] if limit == "max" else [float(limit) - float(used)]
+        memory += [] if limit == "max" else [float(limit) - float(used)]
     except (OSError, ValueError):
         pass
-    return min(found)
+    return min(memory)
 
 
 def memory_size(memory: float) -> str:

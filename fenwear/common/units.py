@@ -137,9 +137,9 @@ def hardness(value: object) -> float:
 
 def _plain(text: str) -> str:
     """Return a quantity in plain letters: exponents and signs as in case files, the field's short names as pint's."""
-    found = unicodedata.normalize("NFKC", text.translate(_SIGNS)).translate(_SIGNS).replace("**", "^")
-    found = re.sub(r"(?<=[A-Za-zµ°])[-.](?=[A-Za-zµ°])", "*", found)  # N-m, N.m
-    return re.sub(r"(?<![A-Za-zµ°])(?:%|(?:C|mil|U|r|tr)(?![A-Za-zµ°]))", lambda match: _NAMES[match[0]], found)
+    quantity = unicodedata.normalize("NFKC", text.translate(_SIGNS)).translate(_SIGNS).replace("**", "^")
+    quantity = re.sub(r"(?<=[A-Za-zµ°])[-.](?=[A-Za-zµ°])", "*", quantity)  # N-m, N.m
+    return re.sub(r"(?<![A-Za-zµ°])(?:%|(?:C|mil|U|r|tr)(?![A-Za-zµ°]))", lambda match: _NAMES[match[0]], quantity)
 
 
 def _units(given: str) -> Iterator[str]:

@@ -195,12 +195,12 @@ def _on_plane(
     at, axis = length(match["at"]), "xyz".index("x" if match["axis"] == "r" else match["axis"])
     box = np.array(gmsh.model.getBoundingBox(-1, -1))
     near = FLAT * float((box[3:] - box[:3]).max())
-    found = []
+    sides = []
     for dim, tag in gmsh.model.getBoundary(list(regions), combined=False, oriented=False):
         own = np.array(gmsh.model.getBoundingBox(dim, tag))
         if max(abs(own[axis] - at), abs(own[3 + axis] - at)) <= near:
-            found.append((dim, tag))
-    return found
+            sides.append((dim, tag))
+    return sides
 
 
 def _make_groups(gmsh: Any, groups: Mapping[str, list[tuple[int, int]]], dim: int) -> list[InputError]:

@@ -268,7 +268,7 @@ class _Choice:
 
     def regions(self, chosen: Mapping[str, list[MeshSet | str]], dim: int) -> list[Group]:
         """Return the groups that are regions, and complain of those that hold nothing."""
-        found = []
+        groups = []
         for name, sets in chosen.items():
             real = [one for one in sets if isinstance(one, MeshSet)]
             for one in real:
@@ -294,8 +294,8 @@ class _Choice:
                 rest = f" and {len(bad) - SHOWN} more" if len(bad) > SHOWN else ""
                 message = f"degenerate or twisted: {text}{rest}. Check the order of their nodes, or mesh it again."
                 self.wrong(f"{self.mesh.name}: {name}", message)
-            found.append(Group(name, dim, kinds, ", ".join(map(self.where, cells)), elements))
-        return found
+            groups.append(Group(name, dim, kinds, ", ".join(map(self.where, cells)), elements))
+        return groups
 
     def is_region(self, name: str, cells: list[MeshSet], every: list[MeshSet]) -> bool:
         """Return whether of sets of one name, of elements and of others, the elements are meant."""

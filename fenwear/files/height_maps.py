@@ -308,13 +308,13 @@ def raster(axes: Sequence[Array], heights: Array) -> Raw:
     mesh = np.meshgrid(*grid, indexing="ij")
     points = np.column_stack(axes)
     try:
-        found = LinearNDInterpolator(points, heights)(*mesh)
+        scattered_heights = LinearNDInterpolator(points, heights)(*mesh)
     except QhullError:
         raise ValueError("the points lie on a line: expected a raster, or points over an area") from None
-    outside = ~np.isfinite(found)
-    found[outside] = NearestNDInterpolator(points, heights)(*(one[outside] for one in mesh))
+    outside = ~np.isfinite(scattered_heights)
+    scattered_heights[outside] = NearestNDInterpolator(points, heights)(*(one[outside] for one in mesh))
     size = " x ".join(map(str, counts))
-    return grid, found, [f"{count:,} scattered points: interpolated onto a raster of {size}"]
+    return grid, scattered_heights, [f"{count:,} scattered points: interpolated onto a raster of {size}"]
 
 
 def _clusters(values: Array, close: float) -> tuple[Array, NDArray[np.int64]]:

@@ -196,14 +196,14 @@ class MeshFile:
 
     def cells(self, elements: Ints) -> dict[int, Ints]:
         """Return the points of elements (n, k) by their kind."""
-        found: dict[int, Ints] = {}
+        points: dict[int, Ints] = {}
         for block, _, nodes in self.by_block(elements):
-            found[block.kind] = stacked(found.get(block.kind), nodes)
-        return found
+            points[block.kind] = stacked(points.get(block.kind), nodes)
+        return points
 
     def sides(self, members: Ints) -> dict[int, Ints]:
         """Return the points of sides (n, k) by their kind, of elements and numbers of sides (n, 2)."""
-        found: dict[int, Ints] = {}
+        points: dict[int, Ints] = {}
         blocks = self.block_of(members[:, 0])
         for number in np.unique(blocks):
             block = self.blocks[number]
@@ -213,8 +213,8 @@ class MeshFile:
                 columns = kind.side_nodes(side)
                 of = 8 if kind.dim == 2 and len(columns) == 3 else SIDE_KINDS[len(columns)]
                 if len(own):
-                    found[of] = stacked(found.get(of), block.nodes[own][:, columns])
-        return found
+                    points[of] = stacked(points.get(of), block.nodes[own][:, columns])
+        return points
 
     def all_sides(self, elements: Ints) -> Ints:
         """Return every side of elements (n, 2): the element and the number of the side."""

@@ -86,7 +86,7 @@ def _families(group: Mapping[str, Any]) -> dict[str, list[int]]:
     """Return the numbers of the families of each group."""
     import h5py
 
-    found: dict[str, list[int]] = {}
+    numbers: dict[str, list[int]] = {}
     for family in group.values():
         if "GRO" not in family:
             continue
@@ -95,8 +95,8 @@ def _families(group: Mapping[str, Any]) -> dict[str, list[int]]:
         family["GRO"]["NOM"].id.read(h5py.h5s.ALL, h5py.h5s.ALL, rows, mtype=kind)
         for row in rows:
             name = row.tobytes().split(b"\0")[0].decode("utf-8", "replace").strip()
-            found.setdefault(name, []).append(int(family.attrs["NUM"]))
-    return found
+            numbers.setdefault(name, []).append(int(family.attrs["NUM"]))
+    return numbers
 
 
 def read_exodus(path: Path) -> MeshFile:

@@ -351,7 +351,7 @@ def along_contact(history: xarray.Dataset, body: str = "punch") -> tuple[Array, 
 
 def gaps_of(history: xarray.Dataset) -> Array:
     """Return the last place before and the first place after each gap of both surfaces (g, 2), mm."""
-    found: list[Array] = [np.zeros((0, 2))]
+    last_place: list[Array] = [np.zeros((0, 2))]
     for end in ("", "_strip"):
         if f"part{end}" in history and f"x{end}" in history:
             x: Array = history[f"x{end}"].values
@@ -361,8 +361,8 @@ def gaps_of(history: xarray.Dataset) -> Array:
             at = np.flatnonzero(np.diff(x) < -BACK * max(float(np.ptp(x)), 1e-300))
         else:
             continue
-        found.append(np.stack([x[at], x[at + 1]], axis=1))
-    return np.unique(np.concatenate(found), axis=0)
+        last_place.append(np.stack([x[at], x[at + 1]], axis=1))
+    return np.unique(np.concatenate(last_place), axis=0)
 
 
 def sides_of(history: xarray.Dataset) -> tuple[str, str] | None:

@@ -245,13 +245,13 @@ def _draw(
 
 def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
     """Return abscissae, worn depths and unworn heights (mm) of the surfaces that wear, by the body."""
-    found = {}
+    abscissae = {}
     for body, end in BODIES.items():
         if f"wear{end}" in history:
             x = along_contact(history, body)[0]
             height = history[f"height{end}"].values if f"height{end}" in history else np.zeros_like(x)
-            found[body] = (x, history[f"wear{end}"], height)
-    return found
+            abscissae[body] = (x, history[f"wear{end}"], height)
+    return abscissae
 
 
 def that_wear(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:

@@ -192,12 +192,12 @@ def course_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str,
     """Return all figures over the run that a history has data for, by their names."""
     names = [str(name) for name in history.data_vars]
     shown = [name for name, course in COURSES.items() if any(one.startswith(course.of) for one in names)]
-    found = {name: course_figure(history, name, look) for name in shown}
+    figures = {name: course_figure(history, name, look) for name in shown}
     if bores_of(history):
-        found["place"] = place_figure(history, look)
+        figures["place"] = place_figure(history, look)
     if "load_factor" in history:
-        found["program"] = program_figure(history, look)
-    return found
+        figures["program"] = program_figure(history, look)
+    return figures
 
 
 def levels(history: xarray.Dataset) -> dict[str, tuple[float, str]]:

@@ -45,10 +45,10 @@ def stick_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, 
         history: By cycles, as `fenwear.results.stored_history.by_cycles` gives it.
         look: Width and axis.
     """
-    found = {"loops": loops(history, look), "tractions": tractions(history, look)}
+    figures = {"loops": loops(history, look), "tractions": tractions(history, look)}
     if model_of(history) == "solid":
-        return found | {"zones": zone_maps(history, look), "traction_map": traction_maps(history, look)}
-    return found | {"zones": zones(history, look)}
+        return figures | {"zones": zone_maps(history, look), "traction_map": traction_maps(history, look)}
+    return figures | {"zones": zones(history, look)}
 
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:

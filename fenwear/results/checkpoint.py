@@ -157,7 +157,7 @@ def _read(directory: Path, arrays: Arrays, name: str, bodies: Sequence[HeatBody]
     Raises:
         CaseError: they are of other nodes, or no numbers.
     """
-    found: list[Array] = []
+    temperatures: list[Array] = []
     for body in bodies:
         if (table := arrays.get(f"{name}_{body.body.name}")) is None:
             continue
@@ -166,8 +166,8 @@ def _read(directory: Path, arrays: Arrays, name: str, bodies: Sequence[HeatBody]
             values = nodal_values(table, body.space)
         if not body.body.mesh.comm.allreduce(bool(np.isfinite(values).all()), op=MPI.LAND):
             raise damaged(directory)
-        found.append(values)
-    return found
+        temperatures.append(values)
+    return temperatures
 
 
 def last_contact(directory: Path) -> Checkpoint:

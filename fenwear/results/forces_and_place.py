@@ -92,12 +92,12 @@ class Bore(NamedTuple):
 
 def motions(placed: ContactSetup) -> list[str]:
     """Return the names of the free motions of both bodies: moved_z, turned_y_left, moved_x_strip."""
-    found = []
+    names = []
     for k, mode in enumerate(placed.rigid.mode_names):
         kind, part = "_".join(mode.split("_")[:2]), mode.split("_")[2:]
         end = [] if k < placed.rigid.of_punch else ["strip"]
-        found.append("_".join([MOVED[kind], *part, *end]))
-    return found
+        names.append("_".join([MOVED[kind], *part, *end]))
+    return names
 
 
 def quantities(placed: ContactSetup) -> list[Quantity]:
@@ -152,7 +152,7 @@ def bores_of(placed: ContactSetup) -> dict[str, Bore]:
         return {}
     followed = placed.bodies.followed
     depths = (0.0, 0.0) if followed is None else (followed.punch[:, None], followed.strip[:, None])
-    found = {}
+    shaft = {}
     for name in pair.punch.names or ("",):
         nodes, opposite = (
             surface.nodes_of(name) if name in surface.names else np.ones(len(surface.weights), dtype=bool)
@@ -164,8 +164,8 @@ def bores_of(placed: ContactSetup) -> dict[str, Bore]:
             continue
         outwards = np.einsum("ic,ic->i", pair.punch.x[nodes][:, [0, -1]] - punch.middle, outward[:, [0, -1]])
         within = (outwards < 0).all()
-        found[name] = Bore(punch, strip, 1, nodes) if within else Bore(strip, punch, -1, nodes)
-    return found
+        shaft[name] = Bore(punch, strip, 1, nodes) if within else Bore(strip, punch, -1, nodes)
+    return shaft
 
 
 def _circle(surface: ContactSurface, nodes: Mask, followed: Array | float) -> Circle | None:

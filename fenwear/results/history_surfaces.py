@@ -95,8 +95,8 @@ def at_places(surface: ContactSurface, values: Array, places: Array, own: Mask |
         two = np.einsum("fij,kfj->kfi", np.linalg.inv(sides), places[:, None] - corners[:, 0])
         shares = np.concatenate([1 - two.sum(axis=-1, keepdims=True), two], axis=-1)
     inside = (shares > -ON_FACET).all(axis=-1)
-    found = np.where(inside, (shares * values[cells]).sum(axis=-1), -np.inf).max(axis=1, initial=-np.inf)
-    return np.asarray(np.where(np.isfinite(found), found, np.nan))
+    nodal_values = np.where(inside, (shares * values[cells]).sum(axis=-1), -np.inf).max(axis=1, initial=-np.inf)
+    return np.asarray(np.where(np.isfinite(nodal_values), nodal_values, np.nan))
 
 
 def rim(surface: ContactSurface) -> Mask:
@@ -301,9 +301,9 @@ def _neighbours(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     order = np.argsort(one, kind="stable")
     one, other = one[order], other[order]
     place = np.arange(len(one)) - np.searchsorted(one, one)
-    found = np.tile(np.arange(count)[:, None], (1, int(place.max(initial=-1)) + 1))
-    found[one, place] = other
-    return found
+    neighbours = np.tile(np.arange(count)[:, None], (1, int(place.max(initial=-1)) + 1))
+    neighbours[one, place] = other
+    return neighbours
 
 
 def scar_geometry(placed: ContactSetup, surface: ContactSurface) -> ScarGeometry:

@@ -100,16 +100,16 @@ def numbers(records: Any, of: str, known: Iterable[Quantity]) -> dict[str, float
 def computed(records: Any, quantities: Iterable[Quantity]) -> dict[str, Any]:
     """Return the values of quantities by their names; each table is computed once."""
     tables: dict[int, Mapping[str, Any]] = {}
-    found = {}
+    values = {}
     for one in quantities:
         how = one.compute
         if isinstance(how, InTable):
             if id(how.table) not in tables:
                 tables[id(how.table)] = how.table(records)
-            found[one.name] = tables[id(how.table)][how.name]
+            values[one.name] = tables[id(how.table)][how.name]
         else:
-            found[one.name] = how(records)
-    return found
+            values[one.name] = how(records)
+    return values
 
 
 ICE = 273.15  # K, at 0 degrees Celsius

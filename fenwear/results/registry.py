@@ -155,7 +155,7 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
     """Return the quantities of a system by their names."""
     case = system.case
     heat, track = case.heat is not None, case.heat is not None and case.heat.track is not None
-    found = [
+    quantities = [
         *IN_RUN,
         *(() if case.wear.strip is None else OF_STRIP),
         *(one for one in OF_PROGRAM if case.program is not None and (heat or one.name != "ambient")),
@@ -166,10 +166,12 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
         IN_CYCLE,
     ]
     if case.model.kind != "plane":
-        found = on_surfaces(found)
+        quantities = on_surfaces(quantities)
     if case.turns:
-        found = [replace(one, unit="rad s-1", long_name=ANGULAR) if one.name == "speed" else one for one in found]
-    return {one.name: replace(one, long_name=case.names.with_names(one.long_name)) for one in found}
+        quantities = [
+            replace(one, unit="rad s-1", long_name=ANGULAR) if one.name == "speed" else one for one in quantities
+        ]
+    return {one.name: replace(one, long_name=case.names.with_names(one.long_name)) for one in quantities}
 
 
 @cache

@@ -96,10 +96,10 @@ def in_current_names(summary: str) -> Any:
     """
     old = any(re.search(f'"{pattern[1:]}', summary) for pattern, _ in OLD_NAMES)
     changes = _changes(old)
-    found = json.loads(summary, object_pairs_hook=lambda pairs: {changes(key): value for key, value in pairs})
-    if old and "mean_pressure_MPa" in found:  # was the load over the meshed surface; now only of what touches
-        found["pressure_over_surface_MPa"] = found.pop("mean_pressure_MPa")
-    return found
+    tables = json.loads(summary, object_pairs_hook=lambda pairs: {changes(key): value for key, value in pairs})
+    if old and "mean_pressure_MPa" in tables:  # was the load over the meshed surface; now only of what touches
+        tables["pressure_over_surface_MPa"] = tables.pop("mean_pressure_MPa")
+    return tables
 
 
 def _changes(old: bool) -> Callable[[str], str]:

@@ -251,8 +251,8 @@ def _places(system: Tribosystem) -> NDArray[np.float64]:
 
 def _at(system: Tribosystem, values: NDArray[np.float64]) -> list[float | None]:
     """Return nodal values at the three places; None in a gap between parts of the contact."""
-    found = at_places(system.pair.punch, values, _places(system))
-    return [None if np.isnan(one) else float(one) for one in found]
+    nodal_values = at_places(system.pair.punch, values, _places(system))
+    return [None if np.isnan(one) else float(one) for one in nodal_values]
 
 
 def nominal_pressure(placed: ContactSetup, load: float) -> dict[str, float]:

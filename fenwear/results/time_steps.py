@@ -155,8 +155,8 @@ def most(system: Tribosystem) -> int:
 
 def steps_of(block: Block) -> tuple[Steps, ...]:
     """Return the time steps of each half-cycle of a block."""
-    found: tuple[Any, ...] = block.steps
-    return found
+    time_steps: tuple[Any, ...] = block.steps
+    return time_steps
 
 
 def padded(values: Array, size: int, axis: int = 0) -> Array:
@@ -250,20 +250,20 @@ def surface_stress(case: Case, records: TimeStepRecords) -> Array:
 def _of_cycle(last: Block) -> dict[str, float]:
     """Return the numbers of the time steps of the last cycle, by `OF_CYCLE`."""
     system = last.system
-    found = _rows(last)
+    numbers = _rows(last)
     cycle = slice(-system.motion.half_cycles, None)
-    traction = np.abs(found["traction"][cycle])
+    traction = np.abs(numbers["traction"][cycle])
     if system.pair.punch.dim == 3:
-        traction = np.hypot(traction, found["traction_across"][cycle])
-    stuck = traction[found["stick"][cycle] == 1]
-    force = float(np.nanmax(np.abs(found["tangential_force"][cycle])))
+        traction = np.hypot(traction, numbers["traction_across"][cycle])
+    stuck = traction[numbers["stick"][cycle] == 1]
+    force = float(np.nanmax(np.abs(numbers["tangential_force"][cycle])))
     return {
         "largest_force": force,
         "largest_torque": force,
         "largest_traction": float(np.nanmax(traction)),
         "largest_stick_traction": float(stuck.max(initial=0.0)),
-        "largest_surface_stress": float(np.nanmax(found["surface_stress"][cycle])),
-        "friction_work_of_cycle": float(found["friction_work_increment"][cycle].sum()),
+        "largest_surface_stress": float(np.nanmax(numbers["surface_stress"][cycle])),
+        "friction_work_of_cycle": float(numbers["friction_work_increment"][cycle].sum()),
         "steps_per_half_cycle": len(system.law_state.problem.program.steps) / system.motion.half_cycles,
     }
 

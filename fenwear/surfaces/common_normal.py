@@ -60,12 +60,12 @@ def facing_normal(surface: ContactSurface, other: Array) -> Array:
     order = np.lexsort((facing, node))  # of each node the facet that faces most comes last
     most = order[np.append(node[order][1:] != node[order][:-1], True)]
     smooth = np.einsum("ic,ic->i", normal, normal[most][node]) > EDGE
-    found = surface.outward.copy()
+    normals_out = surface.outward.copy()
     edge = np.unique(node[~smooth])
-    kept = np.zeros_like(found)
+    kept = np.zeros_like(normals_out)
     np.add.at(kept, node[smooth], area[smooth])
-    found[edge] = unit(kept[edge])
-    return found
+    normals_out[edge] = unit(kept[edge])
+    return normals_out
 
 
 def facet_normals(surface: ContactSurface) -> Array:

@@ -67,9 +67,9 @@ class GridCompliance:
     def apply(self, x: Array) -> Array:
         """Return the displacements (a n,) of tractions (b n,)."""
         parts = x.reshape(-1, len(self.weights))
-        found = self.of.apply((parts * self.weights).T).T
-        found[0] += self.local * parts[0]
-        return found.ravel()
+        displacements = self.of.apply((parts * self.weights).T).T
+        displacements[0] += self.local * parts[0]
+        return displacements.ravel()
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
         """Return the columns of some nodes (k, nodes), or some rows of them, of the first component."""
@@ -214,13 +214,13 @@ class OnBox:
     def apply(self, x: Array) -> Array:
         """Return the displacements (m, a, ...) of tractions (m, b, ...) of each compliance, in the box."""
         force = x * self._weights
-        found = np.empty((len(x), len(self.of[0].table), *self.box.counts))
+        displacements = np.empty((len(x), len(self.of[0].table), *self.box.counts))
         for own, waves in self._kernels:
-            found[own] = convolved([(waves, force[own])], found.shape[1], self.size)
+            displacements[own] = convolved([(waves, force[own])], displacements.shape[1], self.size)
         for smooth in self._smooth:
-            smooth.add(force, found)
-        found[:, 0] += self.local * x[:, 0]
-        return found
+            smooth.add(force, displacements)
+        displacements[:, 0] += self.local * x[:, 0]
+        return displacements
 
 
 class _Smooth:

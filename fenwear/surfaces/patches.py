@@ -74,14 +74,14 @@ def patches(punch: ContactSurface, strip: ContactSurface, placement: Placement =
 
 def _along_axes(own: Side, other: Side) -> list[Patch]:
     """Return the parts of a contact that look along each axis to each side, as graphs over the plane across it."""
-    found = []
+    parts = []
     for axis, side, part in _sides(own.normal):
         seen = other.normal[:, axis] * side <= -SEEN
         if not seen.any() or (part.all() and (other.normal[:, axis] * side < 0).all()):
             seen[:] = True
         first, second = (np.delete(one.trace, axis, axis=1) for one in (own, other))
-        found.append(Patch.of(own.charted(first, part), other.charted(second, seen)))
-    return found
+        parts.append(Patch.of(own.charted(first, part), other.charted(second, seen)))
+    return parts
 
 
 def folds(surface: ContactSurface) -> bool:
@@ -191,7 +191,7 @@ def _from_middle(own: Side, other: Side) -> list[Patch] | None:
         np.sign(np.einsum("fc,fc->f", way, side.normal @ middle.across.T))
         for way, side in ((ways, own), (opposite, other))
     )
-    found = []
+    parts = []
     for axis, side, part in _sides(ways):
         for out in np.unique(outwards[part]):
             seen = (opposite[:, axis] * side >= AROUND) & (facing == -out)
@@ -202,8 +202,8 @@ def _from_middle(own: Side, other: Side) -> list[Patch] | None:
                 s, used = np.zeros((len(one.trace), one.surface.dim - 1)), np.unique(one.surface.facets[facets])
                 s[used] = middle.chart(one.trace[used], axis)
                 views.append(one.charted(s, facets))
-            found.append(Patch.of(*views))
-    return found
+            parts.append(Patch.of(*views))
+    return parts
 
 
 CHARTS: list[Chart] = [_from_middle, _along_axes]  # asked in turn; the last fits all

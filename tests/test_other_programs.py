@@ -53,7 +53,7 @@ def test_umbridge_client_reads_the_model(model: Forward) -> None:
     process = multiprocessing.get_context("spawn").Process(target=serve, args=(value,), daemon=True)
     process.start()
     try:
-        for _ in range(100):
+        for _ in range(600):
             try:
                 client = umbridge.HTTPModel(f"http://localhost:{PORT}", "forward")
                 break

@@ -125,7 +125,7 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
 
 @pytest.mark.parametrize("ratio", [10.0, 0.1])
 def test_when_a_coating_is_worn_through(ratio: float) -> None:
-    """Stiff bodies on an even layer: after 2.4 half-cycles everywhere, however much faster or slower the base wears in the third."""
+    """Stiff bodies on an even layer: after 2.4 half-cycles everywhere, however fast the base wears in the third."""
     stiff = [f"materials.{name}.young='1e9 MPa'" for name in ("steel", "composite")]
     stiff.append("contact.layer={kind='linear', stiffness='1e3 N/mm^3'}")
     depth = 1e-8 * 1e4 / 600 * 3  # of a half-cycle of 3 mm, mm

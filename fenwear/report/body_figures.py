@@ -316,6 +316,7 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
     heights = [(points(first, body) - centre) @ normal for body in BODIES]
     room = MARGIN * length  # thin bodies do not fill the section
     below, above = min(NEAR[1] * length, room - heights[1].min()), min(NEAR[2] * length, room + heights[0].max())
+    above = max(above, room + ((x - centre) @ normal).max())  # a round contact reaches higher
     middle, level, wide = float(centre @ along), float(centre @ normal), NEAR[0] * length
     box = (middle - wide, middle + wide, level - float(below), level + float(above))
     view = View(centre, along, normal, length, box, 1.0, {})
@@ -375,7 +376,8 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View) -> Figure:
     name, unit, colours = SHOWN[field]
     unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]
-    figure = Figure(figsize=(7.0, 6.6), layout="constrained")
+    wide, high = view.box[1] - view.box[0], view.box[3] - view.box[2]
+    figure = Figure(figsize=(7.0, min(6.3 * high / wide + 1.4, 8.0)), layout="constrained")
     ax: Any = figure.subplots()
     most = low
     for body in BODIES:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fenwear.common.arrays import Array
+from fenwear.common.errors import readable
 from fenwear.report.drawn_surface import along_contact, cut_places, gaps_of, model_of, parted, surface_of
 from fenwear.report.run_figures import cycle_ends, directions_present, levels, temperature_unit
 from fenwear.report.style import (
@@ -286,7 +287,7 @@ def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: St
 def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style) -> Figure:
     """Return round contacts as a tester of roundness sees them: their outlines, depths magnified."""
     worn = [end for end in BODIES.values() if f"wear{end}" in history and f"place{end}" in history]
-    figure, axes = panels(len(worn), 5.0, look=look)
+    figure, axes = panels(len(worn), 5.0, share_x=False, look=look)
     for ax, end in zip(axes, worn, strict=True):
         outline, normal = (
             np.column_stack([history[f"{name}{end}"].values for name in names])
@@ -303,9 +304,9 @@ def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: S
             _trace(ax, worn_away, cuts, color=colour, label=look.name(history, n), gid=str(n))
         ax.plot(*((outline.min(axis=0) + outline.max(axis=0)) / 2), "+", color="0")
         ax.set_aspect("equal")
-        ax.set_ylabel(f"z (mm), depths {magnified:,.3g} times as large")
+        ax.set_xlabel("x (mm)")
+        ax.set_ylabel(f"z (mm), depths {readable(magnified, 3)} times as large")
         legend_beside(ax, look.of_one)
-    axes[-1].set_xlabel("x (mm)")
     return figure
 
 

@@ -122,7 +122,7 @@ AGAINST_STICK = (
     ),
     Check(
         lambda c: c.model.kind == "axisymmetric",
-        "model.kind: rings slide around their axis, and no displacement along r or z gives way to torsion. "
+        "model.kind: rings slide around their axis, and displacements along r and z cannot follow torsion. "
         "Expected a solid, such as fretting-sphere with motion.kind = 'oscillation', or a plane model,",
     ),
     Check(

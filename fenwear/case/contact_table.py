@@ -23,7 +23,7 @@ _ShareOverLambda = Annotated[
     rising("at least two pairs [lambda, share] with rising lambda"),
 ]
 OF = ("T", "p", "v", "x", "y", "z")  # what the share of asperities and the film may depend on
-CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
+CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `system.contact_laws`
 
 
 def _own_or_registered(name: Any, own: Callable[[Any], Any]) -> Any:

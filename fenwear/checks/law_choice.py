@@ -90,7 +90,7 @@ def resolve_law(
         case: The problem.
         log: Told which law is taken of "auto", and why.
         comm: The ranks.
-        heat: Preparation of a system's heat: see `assembly.assemble`.
+        heat: Preparation of a system's heat: see `system.assemble`.
         fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:

@@ -40,13 +40,8 @@ Side = Literal["punch", "strip", "friction"]
 NUDGE = 1e-5  # of a state, for differences
 AGREE, HALVINGS = 1e-6, 10  # change of a state by halving the parts of a phase, over the state; how often they are
 SETTLED, MOST_STEPS = 1e-9, 60  # change that ends Newton's method, over the state; its steps
-STRIDES = (
-    1.0,
-    1e3,
-    1e6,
-    1e9,
-    1e12,
-)  # cycles after which a state at rest is looked for, where it is not in sight at once
+# Cycles after which a state at rest is looked for, where it is not in sight at once.
+STRIDES = (1.0, 1e3, 1e6, 1e9, 1e12)
 
 
 @dataclass(frozen=True)

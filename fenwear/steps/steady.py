@@ -164,7 +164,7 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
 
     With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is. Of a case with a
     program it is the state of what acts at the end of its last step: see `at_step` for another one. Where nodes stick
-    or slip by themselves it is the shape to which partial slip wears, `stick.final.FinalShape`.
+    or slip by themselves it is the shape to which partial slip wears, `steps.stick_final.FinalShape`.
 
     Args:
         system: The assembled problem.

@@ -1,8 +1,8 @@
 """The laws of contact by their names: each sets up bodies, steps over half-cycles and cycles, and finds their end.
 
 A law is registered here by its name in a case, `contact.law`, as the module that has it as `LAW`, or as an object by
-`register_contact_law`; nothing else in this package names one. They share the loop (`cycle.driver`), the state
-(`cycle.state`), blocks, runs and results. Each law answers its differences beyond the steps: the questions are
+`register_contact_law`; nothing else in this package names one. They share the loop (`steps.driver`), the state
+(`steps.run_state`), blocks, runs and results. Each law answers its differences beyond the steps: the questions are
 those of `ContactLaw`.
 """
 
@@ -95,7 +95,7 @@ class ContactLaw(Protocol):
     def half_cycles(
         self, system: Tribosystem, watch: Callable[[], bool], loading: Callable[[float], float], *, implicit: bool
     ) -> Any:
-        """Return the `cycle.driver.Step` that advances by a half-cycle."""
+        """Return the `steps.driver.Step` that advances by a half-cycle."""
 
     def jumps(
         self,
@@ -104,4 +104,4 @@ class ContactLaw(Protocol):
         watch: Callable[[], bool],
         loading: Callable[[float], float],
     ) -> Any:
-        """Return the `cycle.driver.Step` that advances by as many cycles as the tolerance allows."""
+        """Return the `steps.driver.Step` that advances by as many cycles as the tolerance allows."""

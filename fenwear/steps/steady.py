@@ -379,7 +379,8 @@ class _End:
                 f"no cyclic steady state without plastic flow exists: its largest pressure reaches contact.hardness = "
                 f"{hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
             )
-        wear = stepper.wear
+        assert end.rate is not None
+        wear, conductances = stepper.wear, end.rate.conductances
         weights, motion, worn = system.pair.weights, system.motion, wear.opening(contact.pressure)[0]
         if worn.max() <= DIGITS * self._rate:
             raise ConvergenceError(NOTHING_WEARS)
@@ -407,20 +408,20 @@ class _End:
             dict(zip(system.rigid.mode_names, (depths / system.mode_lengths).tolist(), strict=True)),
             contact.iterations,
             0.0,
-            self._heat(end) if stepper.coupled.heat.dim else None,
+            self._heat(end, conductances) if stepper.coupled.heat.dim else None,
             coordinates=system.pair.punch.x,
             system=system,
-            conductances=end.rate.conductances,
+            conductances=conductances,
             debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
             crept=system.creep.depth(end.worn.crept),
             states=system.layers.memory.by_name(system.layers.held(rest)),
         )
 
-    def _heat(self, end: JumpMoment) -> SteadyHeat:
+    def _heat(self, end: JumpMoment, conductances: Array) -> SteadyHeat:
         """Follow the temperatures through one cycle of the steady state."""
         coupled, positions = self.stepper.coupled, self.system.motion.positions
         heated = coupled.mu * end.contact.pressure
-        surfaces, after = end_temperatures(coupled.heat, end.temperature, heated, end.rate.conductances)
+        surfaces, after = end_temperatures(coupled.heat, end.temperature, heated, conductances)
         ends = surfaces[positions - 1 :: positions]  # the last phase of each half-cycle
         return SteadyHeat(ends[:, 0], ends[:, 1], after)
 

@@ -85,8 +85,6 @@ class BodyMesh:
 
     def for_role(self, role: str) -> BodyMesh:
         """Return the mesh for the body of a role, which begins the names of its groups in place of the mesh's own."""
-        if role == self.name:
-            return self
         start = f"{self.name}_"
         by_role = {group: f"{role}_{group.removeprefix(start)}" for group in (*self.regions, *self.curves)}
         regions, curves = (

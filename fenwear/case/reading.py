@@ -228,9 +228,10 @@ def make_case(
     """
     data = by_roles(data)
     names = Names.of(data)
-    on = {names.role_of(name): mesh.for_role(names.role_of(name)) for name, mesh in meshes.items()}
+    roles = {name: names.role_of(name) for name in (*meshes, *stresses)}
+    on = {roles[name]: mesh if roles[name] == name else mesh.for_role(roles[name]) for name, mesh in meshes.items()}
     with names.told_in_errors():
-        return _made(data, folder, Given(on, {names.role_of(name): law for name, law in stresses.items()}))
+        return _made(data, folder, Given(on, {roles[name]: law for name, law in stresses.items()}))
 
 
 def _made(data: Mapping[str, Any], folder: Path | None, given: Given) -> Case:

@@ -144,7 +144,8 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style
     handles = [Line2D([], [], color=colour, linewidth=2.5, label=name) for name, colour in named.items()]
     heights = [min(0.75 * look.width * ax.viewLim.height / ax.viewLim.width, 4.2) for ax in axes]
     figure.set_figheight(sum(heights) + 1.5)
-    axes[0].get_gridspec().set_height_ratios(heights)
+    grid: Any = axes[0].get_gridspec()
+    grid.set_height_ratios(heights)
     figure.legend(handles=handles, loc="outside upper right", frameon=False, ncols=len(named), fontsize="small")
     figure.set_layout_engine("compressed")  # the axes keep their aspect
     return figure

@@ -219,7 +219,7 @@ class Factor:
 
 
 class Iterative(Factor):
-    """What solves for few right-hand sides without a factor: conjugate gradients with PETSc's algebraic multigrid."""
+    """Solver of few right-hand sides without a factor: conjugate gradients with PETSc's algebraic multigrid."""
 
     is_spread, is_moved, has_schur, schur, owner, copies = True, False, False, None, 0, range(1)
 

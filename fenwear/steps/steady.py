@@ -336,10 +336,12 @@ class _End:
         Raises:
             ConvergenceError: a step did not converge, or what it changes is no rigid motion in the end.
         """
+        if self._rate == 0:
+            raise ConvergenceError(NOTHING_WEARS)
         wear = self.system.phases_wear
         if wear.punch.linear and wear.strip.linear:
             with suppress(ConvergenceError):
-                return self._state(self._resting(()))
+                return self._state(self._resting(NEAR[::2] if self.system.motion.steps else ()))
         return self._state(self._resting(NEAR))
 
     def _resting(self, lengths: Sequence[float]) -> JumpMoment:

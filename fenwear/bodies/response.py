@@ -194,7 +194,7 @@ class _Answer:
                 if len(counts):
                     part = np.empty((own.shape[1], some.stop - some.start))
                     sizes: Any = counts * part.shape[1]
-                    sent = (np.ascontiguousarray(warm[some].T), sizes) if self.comm.rank == rank else None
+                    sent = None if warm is None else (np.ascontiguousarray(warm[some].T), sizes)
                     self.comm.Scatterv(sent, part, root=rank)
                     own[some] = part.T
             warm = own if len(counts) else None

@@ -35,7 +35,7 @@ def compiled(form: Any) -> fem.Form:
 
 
 def _options() -> dict[str, Any]:
-    """Return how forms are compiled: with more patience for another process that compiles the same one."""
+    """Return the options to compile forms: with more patience for another process that compiles the same one."""
     options = jit.get_options()
     return {"cache_dir": options["cache_dir"], "timeout": max(PATIENCE, options["timeout"])}
 
@@ -81,7 +81,7 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
 
 
 def assembled_here(form: fem.Form, bcs: Sequence[fem.DirichletBC], present: Mask) -> PETSc.Mat:
-    """Return what this rank's own cells give to a symmetric matrix, on this rank alone; collective.
+    """Return the contribution of this rank's own cells to a symmetric matrix, on this rank alone; collective.
 
     Rows are this rank's own blocks and then its ghosts; only the upper triangle is stored. The sum over the
     ranks is the matrix.

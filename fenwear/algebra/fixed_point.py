@@ -34,7 +34,7 @@ def fixed_point(
     *,
     team: Team = ALONE,
 ) -> T:
-    """Return what belongs to x = g(x); collective where it is found by several ranks.
+    """Return the result of x = g(x); collective where several ranks compute it.
 
     Args:
         advance: From x returns g(x), what belongs to it, and whether it is exact already.

@@ -79,6 +79,6 @@ def _step(
 
 
 def _length(x: Array, dx: Array, w: Array, dw: Array) -> float:
-    """Return how far steps may go until an unknown is zero, at most 1."""
+    """Return the length of a step until an unknown is zero, at most 1."""
     falls = max(float((-dx / x).max()), float((-dw / w).max()))
     return min(1.0, 1 / max(falls, 1e-300))

@@ -226,7 +226,7 @@ class Blocks:
         return Blocks(blocks, self.nodes)
 
     def near(self, wear: Array, touched: Indices) -> Solve:
-        """Return what is near the inverse of 1 + (sum of D_k) S^-1 on nodes that touch: S (S + sum of D_k)^-1.
+        """Return a near inverse of 1 + (sum of D_k) S^-1 on nodes that touch: S (S + sum of D_k)^-1.
 
         That of another step serves whose wear is alike.
 

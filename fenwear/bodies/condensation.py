@@ -52,7 +52,7 @@ class CondensedBody:
     in_memory: ClassVar[bool] = True
 
     def arrays(self) -> dict[str, Array]:
-        """Return what was solved for, by its name."""
+        """Return the solved arrays by their names."""
         found = {"response": self.response, "by_load": self.by_load}
         return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
@@ -200,7 +200,7 @@ def _eliminate(requests: Sequence[Request]) -> None:
 
 
 def _copies(request: Request, ranks: int, bodies: int) -> int:
-    """Return how many ranks solve for the columns of a body, each with a factor of its own; collective.
+    """Return the number of ranks that solve for the columns of a body, each with a factor of its own; collective.
 
     Each has half a second of work, and all copies of all bodies take half of the memory that is free.
     """

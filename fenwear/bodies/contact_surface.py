@@ -191,7 +191,7 @@ class ContactSurface:
         return float(np.ptp(self.trace, axis=0).max())
 
     def spacing(self) -> float:
-        """Return how far contact nodes are apart, mm: the median."""
+        """Return the spacing of contact nodes, mm: the median."""
         if self.dim == 3:
             return float(np.sqrt(np.median(self.weights)))
         return float(np.median(np.diff(self.abscissa)))

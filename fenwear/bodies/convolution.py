@@ -91,7 +91,7 @@ class Convolution:
         return np.asarray(displacements)
 
     def times(self, factor: float) -> Convolution:
-        """Return the same times a factor."""
+        """Return the convolution times a factor."""
         smooth = [(weights, factor * response) for weights, response in self.smooth]
         return replace(self, table=factor * self.table, smooth=smooth)
 

@@ -86,7 +86,7 @@ class Retardation:
         return np.asarray(1 + shares @ self.compliances)
 
     def over(self, durations: Array, courses: Array | None = None) -> RetardedCycle:
-        """Return what a cycle does whose phases last so long (m,), s.
+        """Return the creep over a cycle whose phases have these durations (m,), s.
 
         Args:
             durations: Of the phases.
@@ -194,7 +194,7 @@ class RetardedCycle:
         return np.asarray(np.exp(-since[:, None] / self.of.times) * self.taken / -np.expm1(-self.cycles))
 
     def within(self, cycles: float) -> tuple[Array, Array]:
-        """Return what adds by creep after each phase of the cycle whose middle an implicit step of so many ends in.
+        """Return the additions by creep after each phase of the middle cycle at the end of an implicit step.
 
         The cycle begins by half of its change before.
 
@@ -209,6 +209,6 @@ class RetardedCycle:
         return np.asarray(found @ self.of.compliances), self.of.compliances * begun
 
     def rate(self, cycles: float) -> tuple[Array, Array]:
-        """Return what y changes by in each cycle of such a step: of each v_i (terms, i), and of y itself (terms,)."""
+        """Return the change of y in each cycle of such a step: by each v_i (terms, i), and by y itself (terms,)."""
         share = self.cycles / (1 + cycles * self.cycles)
         return np.asarray((share * self.lasting).T), -share

@@ -307,7 +307,7 @@ def _millimetres(unit: str) -> float:
 
 
 def _any_case(names: Names) -> Callable[[str], str]:
-    """Return what gives a group's name by role, whatever its case and spaces."""
+    """Return the function from a group's name to the name by role, whatever its case and spaces."""
 
     def by_role(group: str) -> str:
         key = normal(group)

@@ -84,7 +84,7 @@ def strain_of(u: Any, kind: Kind) -> Any:
 
 
 def measure(mesh: Mesh, kind: Kind) -> Any:
-    """Return what one unit of the mesh's volume stands for: the circumference 2 pi r, or 1."""
+    """Return the measure of one unit of the mesh's volume: the circumference 2 pi r, or 1."""
     return 2 * ufl.pi * ufl.SpatialCoordinate(mesh)[0] if kind == "axisymmetric" else ufl.as_ufl(1.0)
 
 
@@ -148,7 +148,7 @@ class OwnLaw:
         return self.of_displacement(u)
 
     def thermal_stress(self, theta: Any) -> Any:
-        """Return what holds back the expansion, MPa."""
+        """Return the stress that holds back the expansion, MPa."""
         dim = 2 if self.kind in ("stress", "strain") else 3
         return 0.0 * theta * ufl.Identity(dim) if self.of_temperature is None else self.of_temperature(theta)
 

@@ -135,7 +135,7 @@ class ElasticBody:
         self._factors: list[Factor] = []
 
     def _fixed_by_means(self, loose: Sequence[Loose], loads: Sequence[Load]) -> Guides:
-        """Return what guides hold, and where free motions are measured; collective."""
+        """Return the guides, and the places where free motions are measured; collective."""
         mesh = self.body.mesh
         tags = [self.body.curve(load.on, f"{load.key(self.body.name, k)}.on") for k, load in enumerate(loads)]
         ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
@@ -168,7 +168,7 @@ class ElasticBody:
         return bool(total(self.body.mesh.comm, np.array([np.abs(self.imposed.x.array).max(initial=0.0)]))[0] > 0)
 
     def with_loads(self, loads: Sequence[Load]) -> ElasticBody:
-        """Return the same body under other loads, with the same stiffness and factor; collective."""
+        """Return the body under other loads, with the same stiffness and factor; collective."""
         body = copy.copy(self)
         body._set_loads(loads)
         return body
@@ -199,7 +199,7 @@ class ElasticBody:
         self.reach = None if reach is None else Reach(reach, reading)
 
     def on_grid(self, surface: ContactSurface, reading: csr_array) -> ElasticBody:
-        """Return the same body on another grid, as `lay_grid`, with the same stiffness and factor."""
+        """Return the body on another grid, as `lay_grid`, with the same stiffness and factor."""
         body = copy.copy(self)
         body.__dict__.pop("rigid_motion", None)
         body.surface, body.reading = surface, reading
@@ -250,7 +250,7 @@ class ElasticBody:
         return matrix
 
     def identity(self) -> list[object]:
-        """Return all that this rank's part of K and f follows from: the form, its values, the mesh, the supports."""
+        """Return the data behind this rank's part of K and f: the form, its values, the mesh, the supports."""
         mesh, form = self.body.mesh, self._ufl
         values = [constant.value for constant in form.constants()]
         values += [function.x.array for function in form.coefficients()]

@@ -103,7 +103,7 @@ class FineBody(GridOperator):
 
 
 def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Array:
-    """Return what the loads of a body do to the points of its correction (m, d) by directions (d, a); collective."""
+    """Return the displacements at a correction's points (m, d) by the body's loads, along (d, a); collective."""
     comm = elastic.body.mesh.comm
     own = total(comm, np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64))
     answer, rotations, moved = correction.guided
@@ -115,7 +115,7 @@ def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Arra
 def at_nodes(
     correction: Correction, grid: RegularGrid, places: NDArray[np.int64], x: Array, spacing: Sequence[float]
 ) -> TensorWeights:
-    """Return what takes values at the points of a correction to nodes.
+    """Return the weights from values at the points of a correction to nodes.
 
     Args:
         correction: Between its points.
@@ -173,7 +173,7 @@ def fine(request: Request) -> FineBody:
 
 
 def _guided(request: Request, correction: Correction, weights: TensorWeights) -> tuple[GuideAnswer, Array, Array]:
-    """Return what a body answers to its guides, and rotations and displacements by couples at points; collective.
+    """Return the answer of a body to its guides, and rotations and displacements by couples at points; collective.
 
     The correction is of supports at points, about which couples turn the body far: what turns goes by the moments that
     the correction has, and the rest of what couples move by polynomials through the nodes.
@@ -245,7 +245,7 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
 
 
 def rest_of(correction: Correction, ground: Ground) -> Array:
-    """Return what polynomials of the correction leave out along each axis of the grid (d - 1,).
+    """Return the remainder of the correction's polynomials along each axis of the grid (d - 1,).
 
     Over the mean of the half-space's compliance over the grid. From the last two orders and the two before them, as
     the coefficients of a smooth function fall by the same factor from order to order.

@@ -135,7 +135,7 @@ class RegularGrid:
         return np.stack(corners, axis=-1).reshape(-1, 4)
 
     def sharing(self, other: RegularGrid) -> csr_array:
-        """Return what puts forces at another grid's nodes on those here (n, n_other), their sum and moment kept.
+        """Return the matrix from forces at another grid's nodes to these (n, n_other), with their sum and moment.
 
         Forces beyond this grid move to its rim, without their moment.
         """
@@ -148,7 +148,7 @@ class RegularGrid:
         return csr_array(self._linear(points).T)
 
     def reading(self, to: RegularGrid, shift: Array) -> csr_array | None:
-        """Return what takes values here to the nodes of another grid (n_to, n), linear between nodes.
+        """Return the matrix from values here to the nodes of another grid (n_to, n), linear between nodes.
 
         Args:
             to: Another grid, whose axes are the same.
@@ -167,7 +167,7 @@ class RegularGrid:
         return self._linear(points)
 
     def _linear(self, points: list[Array]) -> csr_array:
-        """Return what reads values at the crossings of points on each axis, in spacings, linear between nodes."""
+        """Return the matrix to the crossings of points on each axis, in spacings, linear between nodes."""
         whole = identity(1, format="csr")
         for at, count in zip(points, self.counts, strict=True):
             near = np.rint(at)

@@ -243,7 +243,7 @@ def _in_space_on_grid(shape: Sequence[int], sides: Sequence[float], shear: float
 
 
 def _at_corners(X: Array, Y: Array) -> Array:
-    """Return what integrals of x²/r³, y²/r³, x y/r³, x/r² and y/r² over a rectangle are differences of (5, ...)."""
+    """Return the antiderivatives of x²/r³, y²/r³, x y/r³, x/r² and y/r² at a rectangle's corners (5, ...)."""
     r = np.hypot(X, Y)
     half = np.log(r)
     parts = (Y * np.log(X + r), X * np.log(Y + r), -r, Y * half + X * np.arctan(Y / X), X * half + Y * np.arctan(X / Y))

@@ -153,13 +153,13 @@ def chebyshev_points(count: int, low: float, high: float) -> Array:
 
 
 def interpolation(count: int, low: float, high: float, x: Array) -> Array:
-    """Return what takes values at Chebyshev's points of an interval to those of their polynomial at x (k, count)."""
+    """Return the matrix from values at Chebyshev's points of an interval to their polynomial at x (k, count)."""
     at = chebyshev.chebvander((2 * x - low - high) / (high - low), count - 1)
     return np.asarray(at @ coefficients(count))
 
 
 def coefficients(count: int) -> Array:
-    """Return what takes values at Chebyshev's points to the coefficients of their polynomial (count, count)."""
+    """Return the matrix from values at Chebyshev's points to the coefficients of their polynomial (count, count)."""
     return np.asarray(np.linalg.inv(chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)))
 
 

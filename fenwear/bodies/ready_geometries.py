@@ -48,7 +48,7 @@ def meshes_folder() -> Path:
 
 
 def ready_geometries() -> dict[str, ReadyGeometry]:
-    """Return all ready geometries by their names."""
+    """Return the ready geometries by their names."""
     return {path.name: _read(path) for path in sorted(meshes_folder().glob("*.geo"))}
 
 

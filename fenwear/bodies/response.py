@@ -69,7 +69,7 @@ class Request:
         return int(self.patterns.shape[1] * self.along.shape[2])
 
     def identity(self) -> list[object]:
-        """Return all that the answer follows from, on this rank."""
+        """Return the data that the answer follows from, on this rank."""
         patterns, coupling = csr_array(self.patterns), self.thermal_coupling
         values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
         setup = self.elastic.setup
@@ -87,7 +87,7 @@ class Request:
         return np.einsum("Nk,kd->Ndk", self.patterns[:, columns // count].toarray(), along)
 
     def seen(self, displacement: Array) -> Array:
-        """Return what the patterns see of displacements of the trace nodes (N, d, k), as (q, d, k)."""
+        """Return the readings by the patterns of displacements of the trace nodes (N, d, k), as (q, d, k)."""
         q, d = self.patterns.shape[1], self.elastic.dim
         product = self.patterns.T.tocsr() @ displacement.reshape(len(displacement), -1)
         return np.asarray(product).reshape(q, d, -1)

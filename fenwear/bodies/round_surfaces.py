@@ -50,7 +50,7 @@ class Round:
 def rounds_of(
     trace: Array, facets: NDArray[np.int64], part: NDArray[np.int64], outward: Array
 ) -> tuple[list[Round], NDArray[np.int64]]:
-    """Return what is round of a surface, and which of it each trace node is on, -1 for none (N,).
+    """Return the round parts of a surface, and the number of the part of each trace node, -1 for none (N,).
 
     Args:
         trace: Coordinates of the nodes (N, d), mm.
@@ -76,7 +76,7 @@ def rounds_of(
 
 
 def _fitted(x: Array, normal: Array) -> Round | None:
-    """Return what all points (n, d) lie on, with normals (n, d) out of the body; None where they are on none."""
+    """Return the round surface through all points (n, d) with normals (n, d) out of the body; None without one."""
     dim, size = x.shape[1], float(np.ptp(x, axis=0).max())
     if len(x) < LEAST[dim]:
         return None

@@ -295,7 +295,7 @@ class Supports:
         return np.unique(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int32)
 
     def _remoteness(self) -> NDArray[np.float64]:
-        """Return how far each owned node is from the contact's middle (owned,); collective.
+        """Return the distance of each owned node from the contact's middle (owned,); collective.
 
         No two are as far, even in a symmetric body: a millionth of it depends on the side.
         """
@@ -306,7 +306,7 @@ class Supports:
         return np.asarray(np.linalg.norm(away, axis=1) * (1 + 1e-6 * away @ (1.0, 0.7, 0.4)))
 
     def _regularise(self) -> list[fem.DirichletBC]:
-        """Return one further support for each rigid mode, at the nodes farthest from the contact; collective.
+        """Return a further support for each rigid mode, at the nodes farthest from the contact; collective.
 
         The displacements under pressure are relative to these nodes: the same on any number of ranks.
         """

@@ -139,7 +139,7 @@ def check_operators(case: Case) -> None:
 
 
 def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: bool = False) -> list[SurfaceOperator]:
-    """Return how bodies answer, each by its own operator; collective.
+    """Return the surface operators of bodies, by their settings; collective.
 
     Args:
         requests: Of the bodies.
@@ -160,7 +160,7 @@ def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: boo
 
 
 def _decided(request: Request) -> SurfaceOperator | None:
-    """Return how a body on a grid answers as the fine one, where it may; else let it be condensed; collective.
+    """Return the fine operator of a body on a grid, or None where the body is to be condensed; collective.
 
     Raises:
         CaseError: it is none, and its grid grows, which no condensed body supports.

@@ -310,7 +310,7 @@ class CondensedContact:
         return f
 
     def _rounding(self) -> float:
-        """Return what a step wears at the mean pressure over the elastic gap: thousands where bodies are stiff."""
+        """Return the wear of a step at the mean pressure over the elastic gap: thousands where bodies are stiff."""
         if self._wearing is None:
             return 1.0
         mean = np.full(self.shape, self._pressure_scale)
@@ -457,7 +457,7 @@ class CondensedContact:
         return int(self._offset.size)
 
     def on_closed_contact(self, use: Callable[[Solve], T], closed: Mask | None = None) -> T:
-        """Return what `use` makes of the solution operator of (p, a) where nodes touch, scaled; collective.
+        """Return the result of `use` for the solution operator of (p, a) where nodes touch, scaled; collective.
 
         Args:
             use: Called with the operator on the unknowns of `closed` and of the rigid motions.

@@ -141,7 +141,7 @@ class EndlessGrid:
         return waves * self.inverse
 
     def between(self, held: Waves, moved: Waves) -> Array:
-        """Return what sums, held in each phase, are of A^-1 of waves in one phase alone (m, m)."""
+        """Return the sums, held in each phase, of A^-1 times waves in a single phase (m, m)."""
         divided = held * self.inverse
         found = np.diag(np.einsum("imj,imj->m", divided, moved).real)
         if self._worn is None:
@@ -155,7 +155,7 @@ class EndlessGrid:
         return found - (rows.reshape(m, -1) @ columns.transpose(0, 1, 3, 2).reshape(-1, m)).real
 
     def measure(self, waves: Waves) -> Waves:
-        """Return what sums over the box of fields times others take their waves by."""
+        """Return the factors of other fields' waves in the sums over the box of their products with these fields."""
         twice = np.full(self.period[-1] // 2 + 1, 2.0)  # waves along the last axis stand for two, but for the ends
         twice[0] = 1.0
         if self.period[-1] % 2 == 0:

@@ -140,7 +140,7 @@ class PhasesBox:
         return csr_array(to), csr_array(back)
 
     def opened(self, by: Opened, p: Array) -> Array:
-        """Return what pressures in the box (m, ...) open besides the bodies, by slopes there."""
+        """Return the openings by pressures in the box (m, ...) besides the bodies, by slopes there."""
         found = by.own * p + (by.common * p).sum(axis=0)
         if np.any(by.strip):
             to, back = self._strip
@@ -230,7 +230,7 @@ class GriddedPhases:
         return found.ravel()
 
     def balanced(self, x: Array, f: Array) -> Array:
-        """Return the same pressures times what varies as the rigid motions do, in balance with the loads.
+        """Return unknowns with pressures scaled to balance the loads, by factors that vary as the rigid motions.
 
         Args:
             x: Unknowns, whose pressures are >= 0.

@@ -305,7 +305,7 @@ class TrackField:
 
 
 def _decaying(rates: Array, capacity: float, flow: float) -> Array:
-    """Return what a kelvin of each mode takes in a cell (m,), mW/(mm K), through which F flows; at rest all decays."""
+    """Return the heat flow into a cell (m,), mW/(mm K), by a kelvin of each mode, where F flows; all decays at rest."""
     if flow == 0:
         return capacity * rates
     return np.asarray(flow * np.exp(np.minimum(rates * capacity / flow, GONE)))

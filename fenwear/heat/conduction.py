@@ -78,7 +78,7 @@ ALONE = Surroundings()
 
 
 def no_heat_sink(name: str, enough: float | None = None) -> InputError:
-    """Return what is wrong where the body of this name has no steady temperature.
+    """Return the error of a body of this name that has no steady temperature.
 
     Args:
         name: Of the body.
@@ -194,7 +194,7 @@ class HeatBody:
         return {"quadrature_degree": 2 * self.space.ufl_element().degree + 1}
 
     def flow(self, sliding: SlidingField) -> _Flow:
-        """Return what depends on how the material moves; made once for each motion; collective."""
+        """Return the terms that depend on the material's motion, which are kept for each motion; collective."""
         if sliding not in self._flows:
             self._flows[sliding] = _Flow(self, sliding)
         return self._flows[sliding]

@@ -71,7 +71,7 @@ class Exchanged:
     debris: float
 
     def row_factors(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Return where nodes conduct, and the factors of q_1 and of theta_1 - theta_2 in their first row."""
+        """Return the mask of conducting nodes, and the factors of q_1 and of theta_1 - theta_2 in their first row."""
         perfect = np.isinf(self.conductance)
         jump = np.where(perfect, 1.0, np.nan_to_num(self.conductance, nan=0.0, posinf=0.0))
         return ~np.isnan(self.conductance), np.where(perfect, 0.0, 1.0), jump
@@ -265,5 +265,5 @@ class FluxUpdate:
 
 
 def _down(ndim: int) -> Callable[[NDArray[Any]], NDArray[Any]]:
-    """Return what makes a vector (n,) a factor of the rows of an array of so many dimensions."""
+    """Return the function that makes a vector (n,) a factor of the rows of an array of so many dimensions."""
     return lambda vector: vector if ndim == 1 else vector[:, None]

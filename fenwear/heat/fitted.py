@@ -96,7 +96,7 @@ def certificate(
 
 
 def pressures(x: Array) -> Array:
-    """Return what the bodies are tried with at contact nodes x (n, d): even, growing along the contact, at random."""
+    """Return trial pressures at contact nodes x (n, d): even, growing along the contact, at random."""
     along = x[:, 0] - x[:, 0].min()
     random = np.random.default_rng(0).random(len(x))
     return np.stack([np.ones(len(x)), along / max(float(along.max()), 1e-300), random], axis=1)

@@ -107,7 +107,7 @@ def shared(
     resistance: Array,
     given: float = 0.5,
 ) -> Array:
-    """Return what of the heat of friction enters the first body (t, m, n), mW/mm².
+    """Return the friction heat that enters the first body (t, m, n), mW/mm².
 
     Args:
         first, second: The bodies.
@@ -220,7 +220,7 @@ def spots_of(x: Array, heat: Array) -> Spots:
 
 
 def bulk_of(body: HeatBody, elastic: ElasticBody, conductivity: float, spots: Spots) -> Bulk | None:
-    """Return what a finite body adds to a half-space at the middle of its heat; None where it has no steady state.
+    """Return the difference of a finite body from a half-space at the middle of its heat; None without steady state.
 
     Collective.
 

@@ -401,7 +401,7 @@ class HeatExchange:
         return np.concatenate(ends), fluxes, bare
 
     def _balances(self, values: Array, *, sources: bool) -> list[Array]:
-        """Return what enters the balance of both bodies."""
+        """Return the terms of both bodies in the balance of heat."""
         return [
             side.balance(part) if sources else side.balance.of_changes(part)
             for side, part in zip(self.sides, self._parts(values), strict=True)
@@ -507,7 +507,7 @@ class HeatExchange:
         return np.where(np.isnan(conductance), 0.0, self.weights)
 
     def step_map(self, kinds: tuple[int, int], conductance: Array) -> StepMap:
-        """Return what a step does to the coordinates; for both on a small basis.
+        """Return the map of the coordinates over a step; for both on a small basis.
 
         Args:
             kinds: Which prepared step each body takes.

@@ -189,7 +189,7 @@ def _before(
     past: Callable[[Array], tuple[Array, Array]],
     fastest: float,
 ) -> Array:
-    """Return what all periods further back add: of each place of the source as if its heat had been even in time."""
+    """Return the temperatures by all earlier periods, for heat at each place of the source that is even in time."""
     count = max(PER_PERIOD, int(np.ceil(2 * fastest * period / width)))
     moved, heat = past(period * (np.arange(count) + 0.5) / count)
     found: Array = np.zeros((len(places[0]), len(places[1])))

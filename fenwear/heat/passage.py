@@ -85,6 +85,6 @@ class Passage:
         return float(apart[:, ~np.eye(facets.shape[1], dtype=bool)].min())
 
     def _moved(self, one: Placement, other: Placement) -> float:
-        """Return how far the strip's nodes are apart at two places, mm."""
+        """Return the largest distance of the strip's nodes between two places, mm."""
         trace = self.middle.strip.trace
         return float(np.linalg.norm(other.points(trace) - one.points(trace), axis=1).max())

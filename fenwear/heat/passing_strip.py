@@ -85,7 +85,7 @@ class ReciprocatingField:
         self.given_back = np.array([convection * (nodes.T @ load.sum(axis=1)) for load in self._loads])
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
-        """Return what a step without flux through the contact, but for what is given back, makes of coordinates."""
+        """Return the coordinates after a step without flux through the contact, but with the heat that comes back."""
         free = self.inner.advance(self._kinds[step], coordinates, sources=sources)
         contact = self.contacts[step]
         above = contact(free) - self._ambient if sources else contact.of_changes(free)
@@ -105,7 +105,7 @@ class ReciprocatingField:
         return self._at_nodes.through(transfer)
 
     def left_out(self, transfer: csr_array, step: int) -> Array | None:
-        """Return what a unit flux of a step adds to such a reading beside the coordinates (n, n); None for nothing."""
+        """Return the reading of a unit flux in a step that the coordinates leave out (n, n); None for nothing."""
         if self.inner.contact_responses is None:
             return None
         load, kind = self._loads[step], self._kinds[step]

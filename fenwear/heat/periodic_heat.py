@@ -82,7 +82,7 @@ class Cycle:
         self._end: JumpEnd | None = None  # the last one
 
     def end(self, cycles: float) -> JumpEnd:
-        """Return what the end of a jump over so many cycles goes by; the last one is kept: jumps try it again."""
+        """Return the matrices of the end of a jump over so many cycles; the last are kept for further attempts."""
         if self._end is None or self._end.cycles != cycles:
             self._end = None  # its memory first
             self._end = JumpEnd(self.propagator, cycles)

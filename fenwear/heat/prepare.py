@@ -204,7 +204,7 @@ def _trial(
     friction: Array,
     plans: Sequence[Sequence[StepPlan]],
 ) -> Trial:
-    """Return what the reduced temperatures of a body whose contact stays in its place are tried with."""
+    """Return the trial heat of a body whose contact stays in its place, for its reduced temperatures."""
     tried, moves = pressures(pair.punch.x), any(plan.speed for row in plans for plan in row)
     entering = [
         tried * friction[phase, :, None] * (plan.speed if moves else 1.0)
@@ -217,7 +217,7 @@ def _trial(
 def opened_gap(
     body: HeatBody, pair: ContactPair, rows: Array, moved: Moved | None, passage: Passage | None = None
 ) -> Opened:
-    """Return what gives the gap (n, k) of changes of a body's temperature (owned, k); collective to call.
+    """Return the function from changes of a body's temperature (owned, k) to the gap (n, k); collective.
 
     Args:
         body: The body.
@@ -367,7 +367,7 @@ def _with_inlets(flux: Array, count: int) -> Array:
 
 
 def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:
-    """Return what a body meets beyond its mesh: the strip new material, and beside the punch the surroundings."""
+    """Return the surroundings of a body beyond its mesh: new material for the strip, ambient air beside the punch."""
     if body.body.name == "punch":
         return Surroundings()
     flow = body.flow(sliding)
@@ -383,7 +383,7 @@ def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, r
 
 
 def contact_rows(body: HeatBody, pair: ContactPair) -> csr_array:
-    """Return what gives the temperature of a body at the interface nodes, (n, owned) of this rank."""
+    """Return the matrix from a body's temperature to the interface nodes, (n, owned) of this rank."""
     onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
     return csr_array(onto_nodes @ body.trace.rows)
 

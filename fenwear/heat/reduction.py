@@ -205,7 +205,7 @@ class _Growing:
             self._append(rest @ (parts / values))
 
     def _felt(self, fields: Array) -> Array:
-        """Return what fields are weighed by."""
+        """Return the fields by which the basis is chosen: one step later where a step is given."""
         return fields if self._later is None else self._later.advance(fields, sources=False)
 
     def _beside(self, fields: Array) -> Array:

@@ -216,7 +216,7 @@ class HeatedCycle:
         return np.asarray(self.reading @ np.divide(state, missing, out=np.zeros_like(state), where=lasts))
 
     def _factor(self, duration: float) -> Array:
-        """Return what a step leaves of each mode (dim,), by the rule of `fenwear.heat.heat_exchange`."""
+        """Return the factor of each mode over a step (dim,), by the rule of `fenwear.heat.heat_exchange`."""
         each = self.rates * duration
         stage = 1 / (1 + STAGE * each)
         return np.asarray(stage * (1 + EARLIER * (stage - 1)))

@@ -148,7 +148,7 @@ class Stage:
     constant: Array
 
     def entering(self, heat: Array, *, sources: bool) -> Array:
-        """Return what enters at the ambient temperature, mW/mm², and what crosses (2 n + 2,) or (2 n + 2, k).
+        """Return the flux at the ambient temperature, mW/mm², and the flux across (2 n + 2,) or (2 n + 2, k).
 
         Args:
             heat: Of friction (n,), or (n, k), mW/mm².

@@ -179,7 +179,7 @@ class HeatState:
         return punch, strip
 
     def on(self, bases: tuple[Basis, ...]) -> HeatState:
-        """Return the same temperatures, or the nearest there are, on other bases; collective, or while one leads."""
+        """Return the temperatures on other bases, or the nearest there are; collective, or while one leads."""
         if all(one is other for one, other in zip(self.bases, bases, strict=True)):
             return self
         own = np.split(self.values, [len(self.bases[0])])
@@ -209,7 +209,7 @@ class Functional:
         return self.of_changes(coordinates) + self.constant
 
     def of_changes(self, changes: Array) -> Array:
-        """Return how the value changes by changes of the coordinates (dim,) or (dim, k)."""
+        """Return the changes of the value by changes of the coordinates (dim,) or (dim, k)."""
         product: Array = self.rows @ changes
         return product if self.comm is None else total(self.comm, product)
 
@@ -218,7 +218,7 @@ class Functional:
         return replace(self, constant=self.constant - value)
 
     def through(self, matrix: csr_array) -> Functional:
-        """Return what a matrix (k, j) makes of its values."""
+        """Return the functional whose values are multiplied by a matrix (k, j)."""
         return replace(self, rows=matrix @ self.rows, constant=matrix @ self.constant)
 
     def times(self, factor: float) -> Functional:
@@ -264,7 +264,7 @@ class Field(Protocol):
         """Contact temperature at these nodes from the same (n, n) where coordinates do not say it all, else None."""
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
-        """Return what a step without flux through the contact makes of coordinates.
+        """Return the coordinates after a step without flux through the contact.
 
         Args:
             step: Its number.
@@ -360,7 +360,7 @@ class ReducedField:
         self._decays = [np.diag(one).copy() for one in self._propagators] if modal else self._propagators
 
     def _projected(self, step: HeatStep, inflow: csc_array) -> tuple[Array, Array, Array]:
-        """Return what a step makes of coordinates, without any, and of unit fluxes; collective."""
+        """Return the maps of a step from coordinates, from sources alone, and from unit fluxes; collective."""
         lift, columns = self.basis.lift, self.basis.columns
         dim, n = len(self.basis), inflow.shape[1]
         a_lift, b_lift = step.apply(lift[:, None])

@@ -40,12 +40,12 @@ class Shares:
         return self.coating * coating + self.base * base
 
     def at(self, interpolation: Array) -> Shares:
-        """Return the same at other nodes, by a matrix that interpolates there."""
+        """Return the shares at other nodes, by a matrix that interpolates there."""
         return Shares(*(interpolation @ one for one in (self.coating, self.base, self.by_coating, self.by_base)))
 
 
 def shares(coating: Array, base: Array, left: Array) -> Shares:
-    """Return what is worn of a coating and the base below it.
+    """Return the shares of the depths that a coating and the base below it lose.
 
     Args:
         coating, base: A and B (n,), mm.
@@ -58,12 +58,12 @@ def shares(coating: Array, base: Array, left: Array) -> Shares:
 
 
 def left_of(thickness: Array, depth: Array) -> Array:
-    """Return what is left of a coating (..., n), mm, of its thickness (n,) where such depths (..., n) are worn off."""
+    """Return the remaining thickness of a coating (..., n), mm, from the initial one (n,) and depths (..., n)."""
     return np.asarray(np.maximum(thickness - depth, 0.0))
 
 
 def covered(thickness: Array, depth: Array) -> Array:
-    """Return how much of its friction a coating still has (n,): 1 until its last tenth, 0 where it is worn through."""
+    """Return the share of a coating's friction that remains (n,): 1 until its last tenth, 0 where it is bare."""
     thick = thickness > 0
     return np.where(thick, np.minimum(left_of(thickness, depth) / np.where(thick, FADES * thickness, 1.0), 1.0), 0.0)
 
@@ -113,7 +113,7 @@ class SoftCoating:
     modulus: float
 
     def left(self, depth: Array) -> Array:
-        """Return what is left of it at a depth (n,), mm."""
+        """Return the remaining thickness at a depth (n,), mm."""
         return left_of(self.thickness, depth)
 
 
@@ -129,7 +129,7 @@ def soft_coatings(pair: ContactPair, laws: tuple[WearLaw, WearLaw]) -> tuple[Sof
 
 
 def covering(coatings: tuple[Array, Array], pair: ContactPair, depths: tuple[Array, Array] | None) -> Covered:
-    """Return how much of the friction of both bodies' coatings is left at the contact's nodes (n,), from 1 to 0.
+    """Return the shares of the friction of both bodies' coatings that remain at the contact's nodes (n,), from 1 to 0.
 
     Args:
         coatings: Thickness at the bodies' own nodes, mm.
@@ -159,5 +159,5 @@ class CoatedBody:
         return np.asarray(measure + (self.ratio - 1) * np.maximum(measure - self.thickness, 0.0))
 
     def at(self, interpolation: Array) -> CoatedBody:
-        """Return the same at other nodes, by a matrix that interpolates there."""
+        """Return the coated body at other nodes, by a matrix that interpolates there."""
         return CoatedBody(interpolation @ self.thickness, interpolation @ self.ratio)

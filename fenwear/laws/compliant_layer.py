@@ -49,7 +49,7 @@ class Law(Closure, Protocol):
     """
 
     def nearness(self, pressure: Array, gap: Array) -> Array:
-        """Return how near surfaces are (n,) that press on each other or are apart by a gap, mm; of no unit."""
+        """Return the nearness of surfaces (n,) that press on each other or are apart by a gap, mm; without a unit."""
 
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""

@@ -55,7 +55,7 @@ class DebrisCycle:
     lost: Array
 
     def change(self, thickness: Array, worn: Array) -> tuple[Array, Array]:
-        """Return what one cycle adds to the thickness and what it ejects (n,) each, mm.
+        """Return the change of the thickness in a cycle, and the ejected debris (n,) each, mm.
 
         Args:
             thickness: At its start (n,), mm.
@@ -71,7 +71,7 @@ class DebrisCycle:
         return added, worn.sum(axis=0) - added
 
     def slope(self, cycles: float | None) -> Array:
-        """Return how much thicker a step ends by what its phases wear in a cycle (m, n); None for one cycle."""
+        """Return the thickness added by a unit of wear in each phase of a cycle (m, n); None for one cycle."""
         return self.share * self.kept if cycles is None else cycles * self.fed / (1 + cycles * self.loss)
 
     def by_loss(self, thickness: Array, worn: Array) -> Array:
@@ -124,7 +124,7 @@ class Debris:
         return isinstance(self.life, Dependence) or self.edge_life < np.inf
 
     def lost(self, conditions: ContactConditions) -> Array:
-        """Return what is lost over the sliding distance, of what is there (n,), 1/mm.
+        """Return the share of the debris that is lost over the sliding distance (n,), 1/mm.
 
         Raises:
             CaseError: a life is not positive.
@@ -140,7 +140,7 @@ class Debris:
     def over(
         self, slid: Array, conditions: Sequence[ContactConditions] = (), onto: Sequence[csr_array] = ()
     ) -> DebrisCycle:
-        """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
+        """Return the debris of a cycle whose phases, one after the other, slide by these distances (m, n), mm.
 
         Args:
             slid: The distances.

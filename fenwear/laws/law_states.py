@@ -212,7 +212,7 @@ class _Slopes:
         return _Slopes(function(self.contact), function(self.strip))
 
     def solve(self, right: Held) -> Held:
-        """Return what the matrices take to the right side."""
+        """Return the solution of the equations with this right side."""
         return Held(_solved(self.contact, right.contact), _solved(self.strip, right.strip))
 
 
@@ -492,7 +492,7 @@ class _Rates:
         return cls(states, given, own_rows, asked, worn)
 
     def known(self, values: Array) -> list[Mapping[str, Array]]:
-        """Return what each rate may depend on, at states (Q, n)."""
+        """Return the variables of each rate at states (Q, n)."""
         worn = {} if self.worn is None else {WEAR: self.worn(values)}
         pairs = zip(self.given, self.rows, strict=True)
         return [{**own, **{name: values[row] for name, row in at.items()}, **worn} for own, at in pairs]
@@ -539,5 +539,5 @@ def _feels(name: str, state: State, other: str) -> bool:
 
 
 def _increment(rate: Array, growth: Array, tau: float) -> Array:
-    """Return what states change by in a time, by their rates (Q, n) and phi of tau J (n, Q, Q)."""
+    """Return the changes of states in a time, by their rates (Q, n) and phi of tau J (n, Q, Q)."""
     return np.asarray(tau * np.einsum("nab,bn->an", growth, rate))

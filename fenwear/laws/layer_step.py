@@ -45,13 +45,13 @@ class LayerEvolution:
         evolution: Evolution | None = None,
         conditions: Sequence[ContactConditions] = (),
     ) -> LayerEvolution:
-        """Return what phases do that slide by these distances (m, n), mm, at conditions that debris may be lost by."""
+        """Return the evolution of phases with these sliding distances (m, n), mm, at conditions for the debris."""
         return cls(layers, wear, layers.debris.over(slid, conditions, layers.places(wear.pairs)), evolution)
 
     def worn(
         self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | float = 0.0
     ) -> WornDepths:
-        """Return what the phases wear, and how the state of what lies between changes.
+        """Return the wear of the phases, with the changes of the layers' states.
 
         Args:
             pressure: (m, n), MPa.
@@ -92,7 +92,7 @@ class LayerEvolution:
         return self.layers.memory.fills @ self._evolved(pressure, before, cycles).contact
 
     def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
-        """Return what is added to the thickness of the debris, and what is ejected, as `worn`.
+        """Return the change of the debris' thickness and the ejected debris, as `worn`.
 
         At the contact's nodes (n,) each, or at those of a strip that carries it (n_strip,).
         """
@@ -120,7 +120,7 @@ class LayerEvolution:
     def step(
         self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
     ) -> LayerStep | None:
-        """Return what the pressures of a step open in it; explicitly the compliance alone, None without one.
+        """Return the opening law of a step by its pressures; explicitly the compliance alone, None without one.
 
         Args:
             before, cycles: As of `worn`.
@@ -223,7 +223,7 @@ class LayerStep:
         return np.concatenate([left, reads], axis=2), np.concatenate([right, -puts], axis=1)
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
-        """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
+        """Return the openings by unit pressures at the punch's nodes, and the strip's wear (m, n), mm/MPa."""
         if not self.implicit:
             return None, None
         felt: Sequence[Array | float] = (1.0, 1.0)
@@ -239,7 +239,7 @@ class LayerStep:
         return -covered if punch is None else punch - covered, strip
 
     def _carried_below(self, pressure: Array, strip: Array | None) -> Array:
-        """Return what unit pressures wear off the strip less what they put on it (m, n), as at the places below them.
+        """Return the strip's wear by unit pressures less the debris that they put on it (m, n), at places below.
 
         A step to the solution, on grids, whose residual has what is put on the strip as it is.
         """
@@ -274,7 +274,7 @@ class LayerStep:
         return self.passing.layers.coatings_closure(self.passing.wear.pairs, *self._depths(pressure))
 
     def _felt(self, pressure: Array) -> tuple[Array, Array]:
-        """Return how much of what punch and strip lose opens the gap of each phase (m, n) each.
+        """Return the shares of the wear of punch and strip that open the gap of each phase (m, n) each.
 
         Where a coating goes that was compressed its compression does, too.
         """

@@ -137,7 +137,7 @@ class Layers:
         return any(coating.modulus < np.inf for coating in self.soft)
 
     def coatings_left(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> tuple[Array, Array]:
-        """Return what is left of the coatings of punch and strip in each phase (m, n), mm.
+        """Return the remaining coatings of punch and strip in each phase (m, n), mm.
 
         Args:
             pairs: The surfaces opposite each other in each phase.
@@ -172,13 +172,13 @@ class Layers:
         return self.with_held(found, self.begun)
 
     def held(self, worn: WornDepths) -> Held:
-        """Return what laws remember at these depths; their state at the start where none is given."""
+        """Return the states of laws at these depths, or at the start where none are given."""
         first = len(self.rows) - len(self.begun.contact)
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)
 
     def places(self, pairs: Sequence[ContactPair]) -> list[csr_array]:
-        """Return what puts depths at the contact's nodes on the strip that carries debris, of each phase; else none."""
+        """Return the matrices from the contact's nodes to a strip that carries debris, of each phase; else none."""
         return [pair.wear_projection for pair in pairs] if self.strip_carries else []
 
     def lies(self, worn: WornDepths) -> Array:
@@ -278,7 +278,7 @@ class Layers:
         return found if capped else found + np.where(pressure > self.hardness, self.softness, 0.0)
 
     def flowed(self, pressure: Array, gap: Array) -> Array:
-        """Return what surfaces have flown (n,), mm, whose pressures were capped at the hardness, from the gap left."""
+        """Return the plastic flow (n,), mm, of surfaces whose pressures were capped at the hardness."""
         return np.where(pressure >= (1 - CAPPED) * self.hardness, np.maximum(-gap, 0.0), 0.0)
 
     def flow(self, pressure: Array) -> Array:
@@ -286,7 +286,7 @@ class Layers:
         return self.softness * np.maximum(pressure - self.hardness, 0.0)
 
     def flowing(self, solve: Callable[[Array], T], pressure_of: Callable[[T], Array]) -> tuple[T, Array]:
-        """Return what solves a contact with no pressure beyond the hardness, and what has flown (n,), mm.
+        """Return the solution of a contact with no pressure above the hardness, and its plastic flow (n,), mm.
 
         Args:
             solve: Contact for a depth (n,), mm, that has flown.
@@ -341,7 +341,7 @@ def layers_of(
     strip_carries: bool = False,
     alike: Mapping[str, Array] | None = None,
 ) -> Layers:
-    """Return what the table of the contact puts between the surfaces of a pair, and what laws remember there.
+    """Return the layers of a pair by the table of the contact, and the states of laws there.
 
     Args:
         contact: The table.
@@ -389,7 +389,7 @@ def layers_of(
 
 
 def memory_of(friction: object, wear: Sequence[WearLaw], temperature: float) -> Memory:
-    """Return what the laws of friction and wear remember, and where.
+    """Return the states of the laws of friction and wear, and the bodies that carry them.
 
     Args:
         friction: The coefficient.
@@ -407,7 +407,7 @@ def memory_of(friction: object, wear: Sequence[WearLaw], temperature: float) -> 
 
 
 def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[str, Array], n: int) -> list[Array]:
-    """Return what of a layer may depend on the place (n,) each, in the order of its keys."""
+    """Return the properties of a layer at the nodes (n,) each, in the order of its keys."""
     return [place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units.items()]
 
 

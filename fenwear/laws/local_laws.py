@@ -38,7 +38,7 @@ class BodyRate:
     wears: bool = True
 
     def slide(self, slid: Array, duration: float | Array) -> Array:
-        """Return how far a node slides in a time, to the power a (n,), mm^a s^(1-a)."""
+        """Return the sliding of nodes in a time, to the power a (n,), mm^a s^(1-a)."""
         a = self.speed_exponent
         return slid if a == 1 else slid**a * duration ** (1 - a)
 
@@ -112,7 +112,7 @@ class LocalLaws:
         touching: Mask | None = None,
         cycle: CycleShear | None = None,
     ) -> ContactConditions:
-        """Return what coefficients depend on.
+        """Return the conditions that coefficients depend on.
 
         Args:
             pair: The surfaces opposite each other.

@@ -40,7 +40,7 @@ HALVINGS = 60  # of an interval that holds a pressure
 
 
 def motion_words(mode: str) -> str:
-    """Return what a body does that moves by a rigid mode of this name."""
+    """Return the motion of a body by a rigid mode of this name, in words."""
     name, kind, part = mode.split("_", maxsplit=1)[0], mode.split("_")[1], mode.split("_")[2:]
     return MOVES[f"{name}_{kind}"] + (f" ({'_'.join(part)})" if part else "")
 

@@ -120,7 +120,7 @@ class SlidingWays:
         return SlidingTensor(values.reshape(-1, 3, 3))
 
     def shear(self, pressure: Array | None) -> CycleShear | None:
-        """Return what coefficients know of a whole cycle; None where none asks for it.
+        """Return the shear of a whole cycle, as coefficients use it; None where no coefficient asks for it.
 
         Where nothing presses in the whole cycle the ways alone count, as where no pressures are known yet; where
         nothing slides the mean pressure is that of the phases.

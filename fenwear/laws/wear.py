@@ -271,7 +271,7 @@ class PhasesWear:
         return np.asarray(sum((body.at(pressure).slope(pressure) for body in self.bodies), np.zeros_like(pressure)))
 
     def worn(self, pressure: Array) -> WornDepths:
-        """Return what all phases wear off both bodies at pressures (m, n)."""
+        """Return the wear of both bodies in all phases at pressures (m, n)."""
         strip: Array = np.zeros(len(self.pairs[0].strip.weights))
         if self.strip.wears:
             strip = sum(self.strip.at(pressure).on_material(pressure), strip)
@@ -301,7 +301,7 @@ class PhasesWear:
         return self._left, right
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
-        """Return what unit pressures wear off punch and strip at pressures (m, n), mm/MPa; None where one does not."""
+        """Return the wear of both bodies by unit pressures at pressures (m, n), mm/MPa; None of one without wear."""
         punch, strip = (body.at(pressure).slope(pressure) if body.wears else None for body in (self.punch, self.strip))
         return punch, strip
 

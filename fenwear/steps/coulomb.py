@@ -201,7 +201,7 @@ class Coulomb:
         return replace(found, system=system)
 
     def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
-        """Return what a run remembers on another contact grid; collective. Jumps continue from a cycle made there."""
+        """Return the memory of a run on another contact grid; collective. Jumps continue from a cycle made there."""
         (nodes, _), stuck = node_maps(before, after), memory.stuck
         problems = before.law_state.problem, after.law_state.problem
         worn = carried(memory.at.worn, before, after)
@@ -296,7 +296,7 @@ class _Run:
         return exchange.own(state.temperature).values
 
     def at(self, state: RunState, load: float) -> PartialSlipState:
-        """Return where the time steps of a state are, with its own depths and temperatures."""
+        """Return the state of the time steps in a run, with the run's depths, temperatures and load."""
         memory: Memory | None = state.memory
         warm = self.temperature(state)
         if memory is None:
@@ -474,7 +474,7 @@ class Jumps(_Run):
         return replace(cycle, end=end, warm=self.temperature(state))
 
     def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: float) -> Totals:
-        """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
+        """Return the additions of a jump: by the trapezoidal rule, but for the wear, which follows from its depths."""
         adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
         found = (adds[0] + adds[1]).times(cycles / 2)
         return self.meter.with_wear(found, then.worn - now.worn)
@@ -521,7 +521,7 @@ class Meter:
         self.thickness = system.bodies.punch.thickness
 
     def __call__(self, records: TimeStepRecords, first: int, worn: WornDepths) -> Totals:
-        """Return what time steps add, the first of them that of this number in the cycle, which wear these depths."""
+        """Return the additions of time steps; the first has this number in the cycle, and all wear these depths."""
         problem, thick = self.problem, self.thickness
         slid, pressure = records.slip_magnitude, records.pressure
         forces = pressure @ problem.weights

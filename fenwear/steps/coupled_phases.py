@@ -231,7 +231,7 @@ class Coupled:
         solve: SolveContact,
         passing: DepthEvolution,
     ) -> Solved:
-        """Return what `solve` does, at edges of the contact that are known."""
+        """Return the result of `solve`; where it does not converge, touching nodes of little pressure conduct, too."""
         try:
             return self._solve(temperature, cycles, start, solve, passing, touching)
         except ConvergenceError:

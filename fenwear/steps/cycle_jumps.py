@@ -74,7 +74,7 @@ def jump_within(
 
 
 def _on_meshes(system: Tribosystem, step: Jumps, state: RunState, until: int) -> tuple[RunState, list[HalfCycle]]:
-    """Return what a jump does; one that wears far more than meshes are to follow ends about where they are to."""
+    """Return the state and the records of a jump, shortened where it wears far more than meshes are to follow."""
     after, recorded = step(state, until)
     before, worn = (system.team.lead(partial(system.wear_on_meshes, one.worn)) for one in (state, after))
     strokes = system.motion.half_cycles

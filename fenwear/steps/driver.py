@@ -83,7 +83,7 @@ class Jumps(Step, Protocol):
         """With its heat on bases as jumps need them."""
 
     def beginning(self) -> RunState:
-        """Return where a run begins."""
+        """Return the state in which a run begins."""
 
 
 @dataclass(frozen=True)

@@ -337,7 +337,7 @@ class GrossSliding:
         return with_what_grows(system, find, lambda found: np.asarray((found.phase_pressure > 0).any(axis=0)))[1]
 
     def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:  # noqa: ARG002
-        """Return what steps remember."""
+        """Return the memory of the steps, which does not depend on the grid."""
         return memory
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:

@@ -277,7 +277,7 @@ def _pressures(system: Tribosystem, depth: Array) -> Array:
 
 
 def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> tuple[float, Array, Array]:
-    """Return how far the wear in all loads together is from a rigid motion, over its largest, by node, and it (n,)."""
+    """Return the share of the wear in all loads that no rigid motion follows, this part (n,), and the wear (n,)."""
     worn = [share * one.phases_wear.opening(p)[0] for one, share, p in zip(systems, shares, pressures, strict=True)]
     total, pressed = np.sum(worn, axis=0), np.any([p.any(axis=0) for p in pressures], axis=0)
     modes, rest = systems[0].rigid.rigid_normal[pressed], np.zeros_like(total)

@@ -96,7 +96,7 @@ class Trend:
         self._contacts = dict(contacts or {})  # by their time, cycles since the begin of the jump
 
     def copy(self) -> Trend:
-        """Return one that goes its own way from here."""
+        """Return a copy that later changes do not affect."""
         return Trend(self._contacts)
 
     def add(self, moment: Moment) -> None:
@@ -176,7 +176,7 @@ class Attempt(Generic[M]):
         return (second - first).times(2 * LAST**2 if self.comes else 0.0)
 
     def finer(self, law: JumpLaw[M], fine: M) -> M:
-        """Return where jumps of next to no length lead, from where they had led before.
+        """Return the end of jumps of vanishing length from the earlier end of such jumps.
 
         From the begin y to y_h in halves and to y_w as a whole y_h is off by a third of y_w - y_h; the earlier error, y
         - f, continues as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
@@ -249,7 +249,7 @@ class Estimate:
         return max(self.depth, self.pressure, self.temperature, self.state)
 
     def longer(self, tolerance: float) -> float:
-        """Return how many times as long a jump of that tolerance is.
+        """Return the factor on the length of the jump at which it has this tolerance.
 
         Depths are measured by what the jump wears, and err with the square of its length; the others with its cube.
         """
@@ -405,7 +405,7 @@ def _relative(
 
 
 def force_difference(pair: ContactPair, first: Array, second: Array) -> float:
-    """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
+    """Return the distance between the forces of two pressures (n,), over the extent of the contact.
 
     The Wasserstein distance of the two distributions, and the difference of their forces. Not a norm of the pressures'
     difference: a node at the edge closes as soon as the shape changes by a node's compliance, and a norm would be

@@ -118,7 +118,7 @@ class Stepper(JumpLaw[JumpMoment]):
         return RunState(half_cycle, moment.worn, contacts, self._temperature(moment.temperature), moment.totals)
 
     def finer(self, made: Attempt[JumpMoment] | None, end: RunState) -> RunState:
-        """Return where jumps of next to no length lead, from where they had led before the last attempt.
+        """Return the end of jumps of vanishing length from the end of such jumps before the last attempt.
 
         Args:
             made: The attempt; None where it was marched, so that there is no estimate of it.
@@ -195,7 +195,7 @@ class Stepper(JumpLaw[JumpMoment]):
         return self._sizes.area(simpson - worn) / max(self._sizes.area(worn), 1e-300)
 
     def _rate(self, state: JumpMoment, half_cycles: float) -> WornDepths:
-        """Return what a cycle wears at the depths, temperatures and pressures of a moment."""
+        """Return the wear of a cycle at the depths, temperatures and pressures of a moment."""
         system, exchange = self.system, self.coupled.heat.exchange
         pressures = state.contact.pressure
         shear = system.ways.shear(pressures)
@@ -306,7 +306,7 @@ class Stepper(JumpLaw[JumpMoment]):
         return found
 
     def _creep(self, worn: WornDepths, cycles: float) -> CreepStage:
-        """Return what creeps in a stage."""
+        """Return the creep of a stage."""
         return self.system.creep.stage(worn.crept, cycles, self.ratios, self._load)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution) -> None:
@@ -320,7 +320,7 @@ class Stepper(JumpLaw[JumpMoment]):
         self.contact.slide(self.ratios)
 
     def _adds(self, pressure: Array) -> list[Totals]:
-        """Return what each phase of a cycle adds at its pressure (m, n)."""
+        """Return the additions of each phase of a cycle at its pressure (m, n)."""
         return [meter(pressure[k, :], self._mu[k], self.wear.some([k])) for k, meter in enumerate(self._meters)]
 
     def ended(self, end: JumpMoment, cycles: float) -> None:

@@ -304,7 +304,7 @@ class PhaseStep:
     def _conditions(
         self, pressure: Array, surfaces: tuple[Array, Array] | None, at: _Begin, touching: Mask | None
     ) -> ContactConditions:
-        """Return what coefficients depend on, as `Tribosystem.conditions`."""
+        """Return the conditions that coefficients depend on, as `Tribosystem.conditions`."""
         system, worn = self.system, at.worn
         if self._staying is None:
             return system.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)

@@ -90,7 +90,7 @@ def follow_program(
 
 
 def _over(span: Span, integrate: IntegrateSpan) -> Integrate:
-    """Return what integrates over a span."""
+    """Return the function that integrates over a span."""
     return lambda system, state, leave: integrate(system, state, leave, span)
 
 
@@ -148,7 +148,7 @@ class Recurring:
         self._made.clear()
 
     def at_stage(self, system: Tribosystem, stage: Stage) -> Tribosystem:
-        """Return what `at_stage` returns; collective."""
+        """Return the bodies of a stage, as the function `at_stage`; collective."""
         key = _changes(stage)
         case, staged = self._made.get(key, (None, None))
         if staged is None or case != stage.case:
@@ -159,7 +159,7 @@ class Recurring:
 
 
 def _changes(stage: Stage) -> str:
-    """Return what differs from stage to stage, in a text."""
+    """Return the settings that differ from stage to stage, as a text."""
     case = stage.case
     return repr((case.motion, case.heat, case.punch.loads, case.strip.loads))
 

@@ -68,7 +68,7 @@ class Totals:
         return Totals(factor * self.sums, factor * self.energy, factor * self.pressure)
 
     def of(self, name: str) -> Array:
-        """Return one of the sums () or (k,), by its name in `SUMS`."""
+        """Return the sum () or (k,) of this name in `SUMS`."""
         found: Array = self.sums[..., SUMS.index(name)]
         return found
 
@@ -115,7 +115,7 @@ class PhaseMeter:
         self._by_friction = np.array([path, areas * dragged, *(areas * along.T)])
 
     def __call__(self, pressure: Array, mu: Array, wear: PhasesWear) -> Totals:
-        """Return what the phase adds.
+        """Return the additions of the phase.
 
         Args:
             pressure: At the nodes (n,), MPa.
@@ -134,7 +134,7 @@ class PhaseMeter:
 
 
 def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Totals:
-    """Return what is added where bodies are coated: their worn volume and mass by the depths themselves.
+    """Return totals to which coated bodies add their worn volume and mass by the depths themselves.
 
     Args:
         system: The bodies.
@@ -179,7 +179,7 @@ def approach(rigid: RigidEquilibrium) -> Array:
 
 
 def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> list[Totals]:
-    """Return what each phase of a cycle adds at pressures (m, n), with coefficients at their conditions.
+    """Return the additions of each phase of a cycle at pressures (m, n), with coefficients at their conditions.
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
@@ -192,7 +192,7 @@ def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[Con
 
 
 def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
-    """Return what a cycle adds, as `phase_totals`."""
+    """Return the additions of a cycle, as `phase_totals`."""
     return sum(phase_totals(system, pressure, conditions), none_yet(system))
 
 

@@ -120,7 +120,7 @@ def _parts(
 def _factors(
     system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool
 ) -> NDArray[np.complex128]:
-    """Return what a cycle multiplies each disturbance of a state by: the eigenvalues of its map."""
+    """Return the factors by which a cycle multiplies the disturbances of a state: the eigenvalues of its map."""
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
@@ -247,7 +247,7 @@ def repeating_temperatures(
 
 
 def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Sequence[HeatState]) -> WornDepths | None:
-    """Return what laws remember, and debris, at rest at pressures and temperatures of the phases; None without.
+    """Return the states of laws and debris at rest at pressures and temperatures of the phases; None without.
 
     Raises:
         ConvergenceError: debris has no thickness at which as much is lost as comes.

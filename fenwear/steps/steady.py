@@ -7,10 +7,10 @@ At the end the wear of a cycle is a rigid motion of the punch, H lambda, and the
 
 with the equilibrium of each phase. Where the motion outruns the wear for ever the surface opens without limit.
 
-It is the root of what cycles do to the state y, up to that motion, and found by the stages of a jump, z = y + N M(z),
-of N cycles each (`jump_step`): implicit Euler's steps with ever the same length, FAR over the rate of running in. What
-is left of the way to the end falls by about that factor in each of them (pseudo-transient continuation, C. T. Kelley,
-D. E. Keyes, SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states come to their ends within such a step.
+The steady state is the root of the change M of the state y in a cycle, up to that motion. Stages of a jump find it,
+z = y + N M(z), of N cycles each (`jump_step`): implicit Euler's steps of one length, FAR over the rate of running in.
+Each divides the distance from the end by about that factor (pseudo-transient continuation, C. T. Kelley, D. E. Keyes,
+SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states reach their ends within such a step.
 
 Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
@@ -429,7 +429,7 @@ class _End:
 
 
 def rigid_of_phases(system: Tribosystem) -> Array:
-    """Return what turns the rigid motions of each phase to those of the middle position (m, modes, modes).
+    """Return the matrices from each phase's rigid motions to those of the middle position (m, modes, modes).
 
     A strip that is free to move and passes as a whole opens in each place the same gaps by other motions, as where it
     tilts about a point that moves with it: H_k = H T_k. So wear that a motion follows in one place one follows in all.
@@ -568,7 +568,7 @@ class _Passed:
         return cls(int(block.half_cycle[-1]) // len(state.directions), distance, block.end)
 
     def meets(self, later: _Passed, goal: float) -> float:
-        """Return where the exponential through here and a later end nearby is the goal; NaN where it does not decay."""
+        """Return the cycles at which an exponential through both ends meets the goal; NaN where it does not decay."""
         if not 0 < later.distance < self.distance:
             return float("nan")
         rate = np.log(self.distance / later.distance) / (later.cycles - self.cycles)
@@ -606,7 +606,7 @@ class _Way:
             yield _Passed.of(block, self.state)
 
     def leads(self, law: Callable[[_Passed, float], float], later: _Passed) -> float:
-        """Return where a law of decay to a later end is the goal: a logarithm may have other bits on other ranks."""
+        """Return the cycles at which a law of decay to a later end meets the goal, as rank 0 computes them."""
         return self.system.team.lead(partial(law, later, self.goal))
 
     def across(self, low: _Passed, high: _Passed, tolerance: float, share: float) -> tuple[float, float]:

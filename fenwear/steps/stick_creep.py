@@ -115,7 +115,7 @@ class StickCreep:
         return np.concatenate([forces.ravel(), np.broadcast_to(by_loads, forces.shape).ravel()])
 
     def displaced(self, state: Array, elastic: Array | None = None, duration: float = 0.0) -> Displaced:
-        """Return what a state, and v at the begin of a step of this duration, move at its end; now without a step."""
+        """Return the displacements of punch, strip and layer at the end of a step, by a state and by v at its begin."""
         found = []
         ends = self.after(state, self.unloaded() if elastic is None else elastic, self.unloaded(), duration)
         for part, (law, y) in enumerate(zip(self.laws, self.parted(ends), strict=True)):
@@ -176,7 +176,7 @@ class StickCreep:
 
 
 def stiff(punch: SurfaceOperator, strip: SurfaceOperator) -> StickCreep:
-    """Return what creeps of bodies and a layer of which none does."""
+    """Return the creep of bodies and a layer of which none creeps."""
     law, moved = Retardation.of(None), (np.zeros_like(punch.by_load), np.zeros_like(strip.by_load))
     n = len(punch.by_load)
     return StickCreep((law, law, law), (moved[0].shape, moved[1].shape, (n,)), moved, np.zeros(n))

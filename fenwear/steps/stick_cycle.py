@@ -85,7 +85,7 @@ class PartialSlipProblem:
         return self.interface.team.lead(function)
 
     def kept_at(self, heat: StickHeat, temperature: Array) -> PartialSlipProblem:
-        """Return the same at a temperature (dim,) that stays as it is."""
+        """Return the problem at a constant temperature (dim,)."""
 
         def expanded(loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
             return heat.expanded(loaded, temperature, offset)
@@ -93,13 +93,13 @@ class PartialSlipProblem:
         return replace(self, heat=None, expanded=expanded, pressed=[])
 
     def elastic(self) -> PartialSlipProblem:
-        """Return the same whose surfaces are as hard as they like."""
+        """Return the problem with surfaces of unlimited hardness."""
         interface = copy(self.interface)
         interface.layers = replace(interface.layers, hardness=np.inf)
         return replace(self, interface=interface, pressed=[])
 
     def driven(self, program: Program) -> PartialSlipProblem:
-        """Return the same in other time steps, without heat."""
+        """Return the problem with other time steps, without heat."""
         same = self.program.same_way(program)
         return replace(self, program=program, heat=None, pressed=self.pressed if same else [])
 
@@ -198,7 +198,7 @@ class PartialSlipProblem:
         return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside, closure)
 
     def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array:
-        """Return what the strip's supports are moved by beside the displacement at the end of a step (n, d), mm.
+        """Return the motion of the strip's supports beside the displacement at the end of a step (n, d), mm.
 
         Near its place every point of the strip keeps the one opposite: it is moved by the screw that leads from there
         to its place, and a cycle brings it back. Going far, others come: it is moved on by what slides past them.
@@ -303,7 +303,7 @@ def on_other_grid(
     nodes: NDArray[np.int64],
     worn: WornDepths,
 ) -> PartialSlipState:
-    """Return where a run is on another grid; for rank 0 that leads.
+    """Return the state of a run on another grid; for rank 0 that leads.
 
     Args:
         at: Where it is, between half-cycles.

@@ -176,7 +176,7 @@ class Step:
         return np.asarray((slip * before.traction).sum(axis=1) <= 0)
 
     def _crept(self, creep: StickCreep) -> tuple[Displaced, Displaced]:
-        """Return what has crept at the end of the step but for what its tractions add, and at its start.
+        """Return the crept displacements at the end of the step without its tractions, and at its start.
 
         Of punch, strip and layer: what was there before, and what the loads add in the step.
         """
@@ -326,7 +326,7 @@ class Step:
         )
 
     def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
-        """Return what tractions (d n,) move, and the surfaces against each other, where it is known: that is left out.
+        """Return the displacements of both surfaces by tractions (d n,); the jump between the surfaces is not used.
 
         Args:
             f: Tractions.

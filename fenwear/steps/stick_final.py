@@ -344,7 +344,7 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
 
 
 def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int) -> float | None:
-    """Return where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
+    """Return the place where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
 
     None, too, where a layer has a closure that is not linear.
 
@@ -440,7 +440,7 @@ def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array]
 
 
 def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
-    """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
+    """Return the punch's part of a depth (n,): both bodies wear by their rates, through their coatings."""
     rates = [float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
     punch, strip = problem.coatings

@@ -64,7 +64,7 @@ class GroupedStep:
         return None if found is None else self.groups.summed(found)
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
-        """Return what unit pressures open at the punch's nodes, and on the strip's (m, n), mm/MPa."""
+        """Return the openings by unit pressures at the punch's nodes, and on the strip's (m, n), mm/MPa."""
         both = self.step.by_body(self.groups.pressure(pressure))
         punch, strip = (None if one is None else self.groups.summed(one) for one in both)
         return punch, strip
@@ -157,7 +157,7 @@ class Frozen:
         return replace(self.worn(contact, worn, 0.0), crept=crept)
 
     def worn(self, contact: ContactState, before: WornDepths, cycles: float) -> WornDepths:
-        """Return what each of so many cycles wears with this contact, from depths on; with 0 cycles the rate there."""
+        """Return the wear of each of so many cycles with this contact, from depths on; with 0 cycles the rate."""
         return self._passing.worn(self.groups.pressure(contact.pressure), before, cycles)
 
 

@@ -98,7 +98,7 @@ class StickHeat:
         self.exchange.check_bounds(self.exchange.at(before), self.exchange.at(after), float(friction - debris))
 
     def expanded(self, loaded: LoadEffect, temperature: Array, offset: float | Placement) -> LoadEffect:
-        """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset, or there."""
+        """Return the effect of the loads and of the expansion at temperatures (dim,), with the strip at an offset."""
         punch, strip = (
             expansion(part)
             for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
@@ -115,7 +115,7 @@ class StickHeat:
         return np.array(self.exchange.contact_temperatures(self.exchange.at(temperature)))
 
     def through(self, heats: Array, conductances: Array) -> CycleMap:
-        """Return what a cycle makes of the temperatures at its start.
+        """Return the map of a cycle from the temperatures at its start to those at its end.
 
         Args:
             heats: Of friction in each of its time steps (k, n), mW/mm².
@@ -201,7 +201,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
 
 
 def read_at(surface: ContactSurface, points: Array) -> csr_array:
-    """Return what takes values at the trace nodes of a surface to points near it (p, N): linear, beside it as its rim.
+    """Return the matrix from a surface's trace nodes to points near it (p, N): linear, constant beyond the rim.
 
     Args:
         surface: Seen along the axis that is nearest to its mean normal.

@@ -76,7 +76,7 @@ class OppositeBodies:
         return self.middle
 
     def loaded(self, fraction: float | None) -> LoadEffect:
-        """Return what the loads do at a fraction of the cycle: always the same."""
+        """Return the effect of the loads at a fraction of the cycle, here a constant."""
         del fraction
         return self._load
 
@@ -143,7 +143,7 @@ class StickInterface(OppositeBodies):
         self._loaded: dict[float | None, LoadEffect] = {}
 
     def _needs(self, nodes: int, on_strip: int) -> Resources:
-        """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
+        """Return the resources for condensed bodies, C of each position and Newton's matrix; collective.
 
         Args:
             nodes: Of the contact.
@@ -155,7 +155,7 @@ class StickInterface(OppositeBodies):
         return setup_resources(both, nodes, asked, positions * d**2 + 2 * d**2 + 1)
 
     def _creep(self) -> StickCreep:
-        """Return what creeps; collective."""
+        """Return the creep of bodies and layer; collective."""
         bodies, operators = (self.bodies.punch, self.bodies.strip), (self.punch, self.strip)
         layer = getattr(self.case.contact.layer, "creep", None)
         punch, strip, between = (Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer))
@@ -206,7 +206,7 @@ class StickInterface(OppositeBodies):
         return offset if isinstance(offset, Placement) else self.field.placement(offset)
 
     def loaded(self, fraction: float | None) -> LoadEffect:
-        """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""
+        """Return the loads' effect at a fraction of the cycle, or its mean; collective, or for rank 0 that leads."""
         loads = [load for body in ("punch", "strip") for load in self.case.loads_of(body)]
         constant = fraction is None or all(load.steady for load in loads)
         key = None if constant or fraction is None else round(fraction, 12)

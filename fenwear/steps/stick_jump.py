@@ -183,7 +183,7 @@ def _recorded(
 
 
 def _through(heat: StickHeat, cycle: FrettingCycle) -> CycleMap:
-    """Return what the heat of a cycle, which begins with the first time step, makes of temperatures."""
+    """Return the map of temperatures by the heat of a cycle that begins with the first time step."""
     records = cycle.records
     return heat.through(records.dissipated / records.duration[:, None], records.conductance)
 

@@ -48,7 +48,7 @@ class StepLosses:
         return laws is not None and (laws.asks("cs") or laws.asks("pm"))
 
     def at_start(self, at: PartialSlipState) -> dict[str, Any]:
-        """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
+        """Return the conditions of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
         warm, heat = None, self.problem.heat
         if heat is not None and len(at.temperature):
             punch, strip = heat.surfaces(at.temperature)
@@ -62,7 +62,7 @@ class StepLosses:
         }
 
     def _shear(self, at: PartialSlipState) -> CycleShear | None:
-        """Return what laws know of the last cycle before a state; None where none asks.
+        """Return the shear of the last cycle before a state, as laws use it; None where no law asks.
 
         A time step that has not been computed slips nothing at the mean pressure.
         """
@@ -111,7 +111,7 @@ class StepLosses:
         return [self.problem.interface.position(place).pair for place in places]
 
     def worn(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> WornDepths:
-        """Return what time steps wear, and how the state of what lies between changes; arguments as of `over`."""
+        """Return the depths after time steps, with the changes of the layers' states; arguments as of `over`."""
         passing, flowed = self.over(records, begin, which), records.flowed[which].sum(axis=0)
         return passing.worn(records.pressure[which], begin.worn, flowed=flowed)
 
@@ -146,7 +146,7 @@ class StepLosses:
         return phases_wear(wears, (punch, strip), pairs, coatings)
 
     def evolution(self, records: TimeStepRecords, begin: PartialSlipState) -> Evolution | None:
-        """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""
+        """Return the evolution of laws' states in the steps of a record that begin at a state; None without any."""
         memory, laws = self.layers.memory, self.problem.laws
         if not memory.names or laws is None:
             return None

@@ -51,13 +51,13 @@ class LoadEffect:
     forced_strip: Array
 
     def times(self, factor: float) -> LoadEffect:
-        """Return the same of loads times a factor."""
+        """Return the effect of the loads times a factor."""
         if factor == 1:
             return self
         return LoadEffect(*(factor * part for part in self._parts))
 
     def plus(self, other: LoadEffect) -> LoadEffect:
-        """Return what both loads do."""
+        """Return the sum of the effects of both loads."""
         return LoadEffect(*(one + more for one, more in zip(self._parts, other._parts, strict=True)))
 
     @property
@@ -100,7 +100,7 @@ class Position:
         return self.pair.transfer if self.interface.strip_moves else identity(len(self.pair.weights))
 
     def reaction(self, force: Array) -> Array:
-        """Return what acts against the strip at the nodes of its operator (q, d) by forces on the punch (n, d)."""
+        """Return the reaction on the strip at the nodes of its operator (q, d) to forces on the punch (n, d)."""
         return np.asarray(self.reading.T @ self.pair.placement.back(force))
 
     def forces(self, f: Array) -> tuple[Array, Array]:
@@ -150,7 +150,7 @@ class Position:
         return in_space(np.einsum("nac,na->nc", self.frame[:, 1:], slip))
 
     def beside(self, moved: Array) -> Array:
-        """Return what the strip is moved by beside its motion (n, d), of all nodes or alike, in the frame (d n,)."""
+        """Return the strip's displacement beside its motion (n, d), of all nodes or alike, in the frame (d n,)."""
         found = self.in_frame(moved)
         if self.far:
             found[: len(self.pair.weights)] = 0.0
@@ -185,14 +185,14 @@ def position_of(
 
 
 def along_tangents(position: Position) -> Position:
-    """Return the same for a strip that goes far: what it is moved by along e_n its place has in the gap."""
+    """Return the position for a strip that goes far: its place has the motion along e_n, the drive none."""
     drive = position.drive.copy()
     drive[: len(position.pair.weights)] = 0.0
     return replace(position, drive=drive, far=True)
 
 
 def along_sliding(position: Position) -> Array:
-    """Return what turns tangential components at each node to those along and across the sliding (n, m, m).
+    """Return the rotations of tangential components at each node to those along and across the sliding (n, m, m).
 
     In the plane along x; where a turning strip does not move, on its axis, along the first tangent.
     """

@@ -137,7 +137,7 @@ class GridStep(Step):
         return np.asarray(np.concatenate([gap[None], slip.T]) / self.length)
 
     def _missing(self, found: StatusSolution) -> Array:
-        """Return what the balances miss (r,), in means over the area."""
+        """Return the residuals of the balances (r,), as means over the area."""
         forces = self.position.balance @ found.f + self.imposed.loaded.resultant
         forces = forces * (self.units / (self.length * self.area))
         if self.imposed.force is None:
@@ -145,7 +145,7 @@ class GridStep(Step):
         return np.append(forces, (self.position.pull @ found.f - self.imposed.force) / self.area)
 
     def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
-        """Return what tractions (d n,) move at once: of the strip what the punch's displacement and the jump leave."""
+        """Return the immediate displacements by tractions (d n,); the strip's follow from the punch's and the jump."""
         if jump is None or self.interface.moves:
             return super()._moved(f, jump)
         position, bodies = self.position, jump.copy()
@@ -180,7 +180,7 @@ class _Piece:
 
     @classmethod
     def of(cls, step: GridStep, status: ContactStatus) -> _Piece:
-        """Return those of a status."""
+        """Return the linear pieces of a status."""
         closed, slips = status.closed, status.closed & status.slipping
         flows = closed & status.flowing
         size = np.maximum(np.linalg.norm(status.trial, axis=1), 1e-300)
@@ -291,13 +291,13 @@ class _Solver:
         self.shrunk = np.sqrt((1 + known) / np.maximum(1 + over, 1 + known))
 
     def _weighed(self, force: Array) -> Array:
-        """Return what forces of tractions (d, size) take of the unknowns: N^T."""
+        """Return the products N^T of forces by tractions (d, size), as unknowns."""
         own = self.piece.unknown(force)
         own[0] += (self.piece.slides * force[1:]).sum(axis=0) * self.piece.pressed
         return own
 
     def _inverse(self, fields: Array) -> Array:
-        """Return what the endless grid makes of residuals (d size,): unknowns."""
+        """Return the unknowns that solve the equations of the endless grid for residuals (d size,)."""
         shrunk, counts = fields.reshape(self.fields) * self.shrunk, (self.fields[0], *self.on.counts)
         stiff = shrunk * self.shares[:, None]
         stiff[:, 0] = 0.0

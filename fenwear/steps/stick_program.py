@@ -71,7 +71,7 @@ class Program:
         return self._way == other._way
 
     def with_force(self, factor: float) -> Program:
-        """Return the same with imposed tangential forces times a factor."""
+        """Return the program with imposed tangential forces times a factor."""
         way, steps = (
             tuple(step if step.force is None else replace(step, force=factor * step.force) for step in part)
             for part in (self.lead_in, self.steps)
@@ -130,7 +130,7 @@ def make_program(case: Case, steps: int | None = None) -> Program:
 
 
 def steps_of(case: Case) -> int:
-    """Return how many time steps a half-cycle is to have: of a table those between its rows."""
+    """Return the number of time steps in a half-cycle: of a table the steps between its rows."""
     return len(case.motion.rows) - 1 if isinstance(case.motion, Cycle) else case.stick.steps
 
 
@@ -163,12 +163,12 @@ def _table(case: Case, motion: Motion) -> Program:
 
 
 def _along(field: SlidingField, place: Placement) -> float:
-    """Return how far a place is along a motion, mm or rad."""
+    """Return the position of a place along a motion, mm or rad."""
     return float(np.dot(field.turn, place.turn) if any(field.turn) else np.dot(field.shift, place.shift))
 
 
 def _part(way: Screw, ways: list[Screw]) -> float:
-    """Return how long a way is against all of these, by what it turns or shifts, whichever is more."""
+    """Return the share of a way in the length of all ways, by turns or by shifts, whichever is larger."""
     parts = []
     for which in ("turn", "shift"):
         ends = [(getattr(one.first, which), getattr(one.last, which)) for one in (way, *ways)]
@@ -178,7 +178,7 @@ def _part(way: Screw, ways: list[Screw]) -> float:
 
 
 def _bulk_share(settings: Stick, share: float, fraction: float | None) -> float:
-    """Return what part of the bulk stress acts: that of the displacement, or by its own course."""
+    """Return the share of the bulk stress that acts: the share of the displacement, or by a course of its own."""
     table = settings.bulk_over_cycle
     return share if table is None else float(np.interp(fraction or 0.0, *np.array(table).T))
 

@@ -90,19 +90,19 @@ class TimeStepRecords:
         return np.asarray((self.pressure > 0).any(axis=0))
 
     def slip_amplitude(self, weights: Array, half_cycles: int) -> float:
-        """Return how far the surfaces slip to each side in steps of so many half-cycles, mm.
+        """Return the mean slip of the surfaces to each side in steps of so many half-cycles, mm.
 
-        Its mean over the pressure: where nodes stick, the strip's surface moves with the punch's.
+        The pressure weights the mean: where nodes stick, the strip's surface moves with the punch's.
         """
         carried = np.maximum(self.pressure @ weights, 1e-300)
         return float(((self.pressure * self.slip_magnitude) @ weights / carried).sum()) / (2 * half_cycles)
 
     def energy(self, weights: Array) -> float:
-        """Return what friction has dissipated, N in the plane and N mm in a solid."""
+        """Return the energy that friction has dissipated, N in the plane and N mm in a solid."""
         return float(self.dissipated.sum(axis=0) @ weights)
 
     def balance_error(self, weights: Array) -> float:
-        """Return what is missing in the balance of energy of all steps together, over its largest term."""
+        """Return the error in the energy balance of all steps together, over its largest term."""
         terms = np.array([self.work.sum(), self.stored.sum(), self.energy(weights), self.closing.sum()])
         largest = max(np.abs(self.work).sum(), np.abs(terms).max(), 1e-300)
         return float(abs(terms[0] - terms[1] - terms[2] + terms[3]) / largest)
@@ -198,7 +198,7 @@ def record(
 def _work(
     interface: OppositeBodies, position: Position, at: PartialSlipState, after: PartialSlipState
 ) -> tuple[float, float]:
-    """Return what rig and loads do in a time step at a place of the strip, and what both bodies take up."""
+    """Return the work of rig and loads in a time step at a place of the strip, and the energy stored in both bodies."""
     before, state = at.contact, after.contact
     f = np.concatenate([state.pressure, state.traction.T.ravel()])
     force, back = position.forces(f)

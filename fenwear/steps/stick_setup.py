@@ -72,7 +72,7 @@ def placed_by_slip(
     fresh: bool = False,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
 ) -> PartialSlipProblem:
-    """Return the same without heat, its strip passing if it slips as far; collective.
+    """Return the problem without heat, in which the strip passes if it slips as far; collective.
 
     Arguments as of `partial_slip_problem`, bodies being built.
     """
@@ -91,7 +91,7 @@ def unheated_problem(
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
     moves: bool | None = None,
 ) -> PartialSlipProblem:
-    """Return the same without heat; collective. Arguments as of `partial_slip_problem`.
+    """Return the problem without heat; collective. Arguments as of `partial_slip_problem`.
 
     Args:
         moves: Whether the strip's surface passes under the punch; None as the motion says.
@@ -123,12 +123,12 @@ def unheated_problem(
 
 
 def with_steps(problem: PartialSlipProblem, case: Case, steps: int) -> PartialSlipProblem:
-    """Return the same with other time steps."""
+    """Return the problem with another number of time steps."""
     return heated(problem.driven(make_program(case, steps)), case)
 
 
 def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
-    """Return the same with the heat of the case for its time steps; collective."""
+    """Return the problem with the heat of the case for its time steps; collective."""
     if case.heat is None:
         return problem
     steps = len(problem.program.steps) // problem.program.half_cycles
@@ -215,7 +215,7 @@ class Fineness:
     ends: Ends
 
     def text(self) -> str:
-        """Return what is to be said of steps that are too coarse; "" of others."""
+        """Return the message about time steps that are too coarse; "" where they are fine enough."""
         if self.enough:
             return ""
         return (
@@ -267,7 +267,7 @@ def _finest(case: Case) -> Program:
 def _judged(
     problem: PartialSlipProblem, fine: PartialSlipProblem, of: Ends, splits: NDArray[np.bool_], tolerance: float
 ) -> tuple[float, NDArray[np.bool_] | None]:
-    """Return what halving all steps changes, and which are to be halved; None where that is to end."""
+    """Return the change by halving all steps, and the steps to halve; None where the halving is to end."""
     after, coarse = problem.cycle(problem.beginning())
     known = np.where(_last(of)[:, None], after.pressures[of], np.nan)  # second halves end where their steps do
     begin = replace(fine.beginning(), pressures=known, trials=after.trials[of])
@@ -316,7 +316,7 @@ def _last(of: Ends) -> NDArray[np.bool_]:
 
 
 def _compare(coarse: TimeStepRecords, fine: TimeStepRecords, of: Ends, weights: Array) -> tuple[Array, float]:
-    """Return what the halves change in each step, and what they change in the cycle, as shares."""
+    """Return the changes by halved steps in each step, and their change of the cycle, as shares."""
     force = max(float(np.abs(fine.force).max()), 1e-300)
     full_stick = 1e-6 * force * float(np.ptp(fine.displacement))  # no work but rounding
     work = max(fine.energy(weights), full_stick, 1e-300)

@@ -44,7 +44,7 @@ class Imposed:
     closure: Closure | None = None
 
     def towards(self, other: Imposed, share: float) -> Imposed:
-        """Return what is imposed a share of the way to the other."""
+        """Return the imposed motions and loads a share of the way to the others."""
 
         def between(a: float | None, b: float | None) -> float | None:
             return b if a is None or b is None else a + share * (b - a)
@@ -174,7 +174,7 @@ class PartialSlipState:
         return self.pressures[self.next_step], self.trials[self.next_step]
 
     def then(self, state: StickState, imposed: Imposed, worn: WornDepths, duration: float) -> PartialSlipState:
-        """Return where a run is after its next time step, but for its heat."""
+        """Return the state of a run after its next time step, without the heat of the step."""
         k, slipped = self.next_step, np.linalg.norm(state.slip, axis=1)
         pressures, trials, slips = self.pressures.copy(), self.trials.copy(), self.slips.copy()
         pressures[k], trials[k], slips[k] = state.pressure, state.trial, state.slip

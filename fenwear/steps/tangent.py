@@ -32,7 +32,7 @@ def phase_tangent(
     implicit: bool = True,
     worn: WornDepths | None = None,
 ) -> Array:
-    """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
+    """Return the response of a phase to small changes of temperature and worn depth (dim + n, dim + n); collective.
 
     With changes ds, dw at its start and dp of its pressure, d(mu p) = (mu + p mu_p) dp + p mu_s ds,
 
@@ -119,7 +119,7 @@ def lies_after(
     state: HeatState | None,
     worn: WornDepths | None,
 ) -> WornDepths | None:
-    """Return what lies between after a phase, of what does at its start."""
+    """Return the depths with the debris at the end of a phase, from those at its start."""
     if worn is None or not system.layers.debris.present:
         return worn
     conditions = _conditions(system, phase, pressure, heat, state, worn)
@@ -138,11 +138,11 @@ def _goes_on(
     *,
     implicit: bool,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return what the state of heat and debris does in a phase.
+    """Return the derivatives of the state of heat and debris in a phase.
 
     Returns:
-        The gap by it at the end and at the start of the phase (n, dim), and itself at the end by what it was at the
-        start (dim, dim) and by the pressure (dim, n).
+        The gap's by the state at the end and at the start of the phase (n, dim), and the end state's by the state at
+        the start (dim, dim) and by the pressure (dim, n).
     """
     n, dim = laws.mu_s.shape
     of_heat = heat.dim
@@ -247,7 +247,7 @@ def _lying(
     taken: Array,
     worn: WornDepths,
 ) -> tuple[Array, list[Array], Array]:
-    """Return what becomes of debris in a phase.
+    """Return the derivatives of debris in a phase.
 
     Args:
         system: The assembled problem.
@@ -295,7 +295,7 @@ class _Creeping(NamedTuple):
 
 
 def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p: Array, traction_s: Array) -> _Creeping:
-    """Return what creeps in a phase.
+    """Return the derivatives of creep in a phase.
 
     Args:
         creep: All that does.

@@ -59,7 +59,7 @@ class Interface:
     layer: Array | float = 0.0
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
-        """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
+        """Return the interface under other loads, or where others of the strip's material face the punch."""
         return Interface(rigid, punch, strip, self.strip_moves, self.frame, like=self._made, layer=self.layer)
 
     @property
@@ -101,7 +101,7 @@ class Interface:
         return np.asarray((self.layer / self.pair.weights)[:, None] * self.axes[:, 0])
 
     def displaced(self, forces: Array) -> tuple[Array, Array]:
-        """Return what forces on the punch (n, d, ...) and their reactions do to each body at its operator's patterns.
+        """Return the displacements of both bodies at their operators' patterns by forces on the punch (n, d, ...).
 
         Displacements of punch and strip (q, a, ...), mm, along the directions of their operators.
         """
@@ -183,7 +183,7 @@ class Interface:
         return found
 
     def _on_strip(self, own: NDArray[np.int64], rows: Nodes, columns: Nodes) -> Array:
-        """Return what forces in the strip's own frame do to it, as contact nodes see it."""
+        """Return the strip's displacements at the contact nodes by forces in its own frame."""
         axes, strip = self._axes_on_strip[own], self.strip
         if not self.strip_moves:
             return _along(axes, strip.entries(rows, columns))
@@ -294,7 +294,7 @@ class Compliance:
         return on_one_grid(bodies, axes, self._traction, own.pair.weights, self._local, self._known)
 
     def _block(self, rows: Nodes, nodes: Nodes) -> Array:
-        """Return what components of some nodes do to those of others (components, nodes, components, rows)."""
+        """Return the block of compliances between components of nodes (components, nodes, components, rows)."""
         return np.einsum("iajc,jcb->bjai", self.interface.asked(rows, nodes), self._force[nodes], optimize=True)
 
     @cached_property

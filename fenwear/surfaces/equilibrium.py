@@ -101,7 +101,7 @@ class RigidEquilibrium:
 
 
 def _seen(patterns: csr_array, motion: Array) -> Array:
-    """Return what patterns (n, N) see of motions (N, d, modes), as (n, d, modes)."""
+    """Return the readings of motions (N, d, modes) by patterns (n, N), as (n, d, modes)."""
     seen = patterns @ motion.reshape(len(motion), -1)
     return np.asarray(seen).reshape(patterns.shape[0], *motion.shape[1:])
 

@@ -139,7 +139,7 @@ class Box:
         return bool(((places >= self.low) & (places < np.array(self.low) + self.counts)).all())
 
     def where(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return where places (k, axes) stand in it, its last axis the fastest (k,)."""
+        """Return the numbers of places (k, axes) in the box, its last axis the fastest (k,)."""
         return np.asarray(np.ravel_multi_index(tuple((places - np.array(self.low)).T), self.counts))
 
     def spread(self, values: Array) -> Array:
@@ -152,13 +152,13 @@ class Box:
         return found.reshape(-1, *self.counts)
 
     def values(self, boxed: Array) -> Array:
-        """Return what a box (m, ...) has at its nodes (m, k)."""
+        """Return the values of a box (m, ...) at its nodes (m, k)."""
         flat = boxed.reshape(len(boxed), -1)
         return np.asarray(flat if self.within else flat[:, self.at])
 
 
 def _padded(count: int) -> int:
-    """Return how many places along an axis cost no more than so many: transforms are of twice as many."""
+    """Return the most places along an axis at the cost of this number: transforms take twice as many."""
     return (int(scipy.fft.next_fast_len(2 * count - 1, real=True)) + 1) // 2
 
 

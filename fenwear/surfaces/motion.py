@@ -234,7 +234,7 @@ class Motion:
         return bool(self._ends)
 
     def measured(self, amounts: Sequence[float]) -> Motion:
-        """Return the same motion, a table, with the distances of its phases times these amounts (phases,).
+        """Return the motion as a table, with the distances of its phases times these amounts (phases,).
 
         Their fields are divided by them: what slides stays as it is.
         """
@@ -288,7 +288,7 @@ class Motion:
         return np.concatenate(rows)
 
     def offsets(self, steps: int) -> Array:
-        """Return where the strip is at the ends of equal steps of each phase (phases, steps + 1), mm or rad."""
+        """Return the strip's positions at the ends of equal steps of each phase (phases, steps + 1), mm or rad."""
         rows = []
         directions = self.stroke_directions
         for stroke, start, direction in zip(self._strokes, self._starts, directions, strict=True):
@@ -299,7 +299,7 @@ class Motion:
         return np.array(rows)
 
     def ways(self, field: SlidingField, steps: int) -> list[list[Way]]:
-        """Return where the strip goes in equal steps of each phase.
+        """Return the strip's ways in equal steps of each phase.
 
         Args:
             field: Of the motion, where its phases have none of their own.
@@ -313,7 +313,7 @@ class Motion:
         ]
 
     def ends(self, field: SlidingField) -> list[Placement]:
-        """Return where the strip is at the end of each phase."""
+        """Return the strip's place at the end of each phase."""
         if self.steps:
             return [phase.way.last if phase.way else HERE for phase in self.phases]
         return [field.placement(float(end)) for end in self.offsets(1)[:, -1]]

@@ -238,7 +238,7 @@ def shared_areas(first: ChartedSurface, second: ChartedSurface) -> csr_array:
 
 
 def reading_at(surface: ChartedSurface, points: Array) -> csr_array | None:
-    """Return what takes values at the trace nodes to points of the chart (p, N); None where one is off the surface."""
+    """Return the matrix from trace nodes to points of the chart (p, N); None with a point off the surface."""
     ring, grain = surface.corners[:, RING[surface.cell]], SLACK * surface.extent
     around = points[:, None] + grain * np.array([-1.0, 1.0])[:, None]
     point, facet = _boxes_that_meet(around, ring)

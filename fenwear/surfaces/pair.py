@@ -185,7 +185,7 @@ def _profiles(punch: ContactSurface, strip: ContactSurface, material: csr_array)
 
 
 def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:
-    """Return what takes values at the strip's trace nodes to the punch's nodes with the strip at another place (n, N).
+    """Return the matrix from the strip's trace nodes to the punch's nodes (n, N), at another place of the strip.
 
     Raises:
         CaseError: the strip's contact surface does not reach below the whole punch there.
@@ -200,7 +200,7 @@ def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:
 
 
 def _material(parts: Sequence[Patch], transfer: csr_array) -> csr_array:
-    """Return what takes values at the strip's pressure nodes to the punch's (n, n_strip)."""
+    """Return the matrix from the strip's pressure nodes to the punch's (n, n_strip)."""
     strip = parts[0].second
     if len(strip.nodes) == len(strip.s):
         return transfer
@@ -218,7 +218,7 @@ def _material(parts: Sequence[Patch], transfer: csr_array) -> csr_array:
 
 
 def _wear_projection(parts: Sequence[Patch], weights: Array, strip_weights: Array) -> csr_array:
-    """Return what puts depths of the punch's nodes on the strip's by the areas that their own areas share."""
+    """Return the matrix from depths of the punch's nodes to the strip's, by the areas that nodes of both share."""
     return csr_array(wear_transfer(parts).multiply(weights[:, None]).T / strip_weights[:, None])
 
 
@@ -286,7 +286,7 @@ def _check_covered(parts: Sequence[Patch], placement: Placement) -> None:
 
 
 def _missing(first: Array, second: Array) -> float:
-    """Return how far points reach beyond the box around others, mm."""
+    """Return the largest distance of points beyond the box around others, mm."""
     low, high = second.min(axis=0) - first.min(axis=0), first.max(axis=0) - second.max(axis=0)
     return float(max(low.max(), high.max(), 0.0))
 

@@ -149,7 +149,7 @@ class _Middle:
         return unit((x - self.point) @ self.across.T)
 
     def chart(self, x: Array, axis: int) -> Array:
-        """Return where points (n, d) are seen from the middle in the plane at the radius across one direction, mm."""
+        """Return the points (n, d) projected from the middle to the plane at the radius across one direction, mm."""
         seen = (x - self.point) @ self.across.T
         flat = np.delete(seen, axis, axis=1) / seen[:, axis, None] * self.radius
         return np.column_stack([flat, (x - self.point) @ self.along.T])

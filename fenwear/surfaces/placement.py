@@ -48,14 +48,14 @@ class Placement:
         return f"turned by {turn:g} rad" if turn else f"moved by {shift:g} mm"
 
     def points(self, x: Array) -> Array:
-        """Return where points (n, d) of the body are, mm."""
+        """Return the points (n, d) of the body at its place, mm."""
         if self.turn == ZERO:
             return x + in_model(np.array([self.shift]), x.shape[1])
         moved = self._rotation.apply(in_space(x) - self.centre) + self.centre + self.shift
         return in_model(moved, x.shape[1])
 
     def points_back(self, x: Array) -> Array:
-        """Return what points (n, d) in space are in the body's own frame, mm."""
+        """Return the points (n, d) of space in the body's own frame, mm."""
         if self.turn == ZERO:
             return x - in_model(np.array([self.shift]), x.shape[1])
         moved = self._rotation.inv().apply(in_space(x) - self.centre - self.shift) + self.centre

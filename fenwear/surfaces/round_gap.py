@@ -48,7 +48,7 @@ def round_shape(
     transfer: csr_array,
     material: csr_array,
 ) -> RoundShape:
-    """Return what round surfaces are besides their facets.
+    """Return the differences of round surfaces from their facets.
 
     Args:
         parts: The patches of the contact.
@@ -97,7 +97,7 @@ def _placed(one: Round, placement: Placement) -> Round:
 
 
 def _opposite(parts: Sequence[Patch], count: int, strip: ContactSurface) -> Array:
-    """Return what of the strip is opposite each of the punch's nodes (n,), -1 where that is not round."""
+    """Return the number of the strip's round surface opposite each of the punch's nodes (n,), -1 for none."""
     most = len(strip.rounds[0])
     found = np.full(count, most)
     for part in parts:

@@ -79,7 +79,7 @@ class SlidingField:
         return SlidingField(shift, turn, self.centre)
 
     def rate(self, x: Array, normal: Array) -> Array:
-        """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad; e_n (n, d) its normal."""
+        """Return the sliding of points with normals e_n (n, d) for a unit of the stroke's law (n,): 1, or mm/rad."""
         return np.linalg.norm(self._tangential(x, normal), axis=1)
 
     def _tangential(self, x: Array, normal: Array) -> Array:
@@ -103,7 +103,7 @@ class SlidingField:
         return {1: "rightward", -1: "leftward"} if dim == 2 else {1: "forward", -1: "backward"}
 
     def placement(self, amount: float) -> Placement:
-        """Return where the counter-body is after this amount of the motion, mm or rad."""
+        """Return the place of the counter-body after this amount of the motion, mm or rad."""
         if amount == 0.0:
             return Placement()
         (x, y, z), (a, b, c) = self.shift, self.turn
@@ -142,7 +142,7 @@ POINTS, SHARES = np.polynomial.legendre.leggauss(16)
 
 
 def node_rates(field: SlidingField, pair: ContactPair, power: float = 1.0) -> Array:
-    """Return what each node slides for a unit of the stroke's law (n,): 1, or mm/rad.
+    """Return the sliding of each node for a unit of the stroke's law (n,): 1, or mm/rad.
 
     Args:
         field: Of the sliding.

@@ -282,7 +282,7 @@ class _Crossing:
         return np.asarray(self.s[:, 2])
 
     def reach(self) -> Array:
-        """Return where the areas begin and end (2 k,), ascending, mm: k stretches that do not meet."""
+        """Return the begin and the end of each stretch of the areas (2 k,), ascending, mm; stretches do not meet."""
         order = np.argsort(self.low)
         low, high = self.low[order], np.maximum.accumulate(self.high[order])
         apart = np.flatnonzero(low[1:] > high[:-1])

@@ -52,7 +52,7 @@ def check_coatings(case: Case, punch: ElasticBody, strip: ElasticBody) -> None:
 
 
 def _height(elastic: ElasticBody) -> float:
-    """Return how far a body reaches along the mean normal of its contact surface, mm; collective."""
+    """Return the height of a body along the mean normal of its contact surface, mm; collective."""
     surface, mesh = elastic.surface, elastic.body.mesh
     x = mesh.geometry.x[:, : mesh.geometry.dim]
     normal = surface.weights @ surface.outward / surface.weights.sum()

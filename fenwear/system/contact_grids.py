@@ -194,7 +194,7 @@ def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> Reg
 
 
 def _reached(case: Case, grid: RegularGrid, sliding: Sliding) -> RegularGrid:
-    """Return the same grid, as much longer as the punch reaches on the strip during the motion, or a whole program."""
+    """Return the grid, longer by the punch's reach on the strip during the motion, or during a whole program."""
     along, corners = grid.axes, grid.points[:: max(len(grid.points) - 1, 1)]
     steps = np.array(grid.spacing)
     before = after = np.zeros(len(steps))
@@ -235,7 +235,7 @@ def _charted(surface: ContactSurface, grid: RegularGrid) -> ChartedSurface:
 
 
 def _reading(body: ElasticBody, surface: ContactSurface, grid: RegularGrid) -> csr_array:
-    """Return what takes values at the trace nodes of a surface of a body's mesh to its grid (n, N).
+    """Return the matrix from the trace nodes of a surface of a body's mesh to its grid (n, N).
 
     Raises:
         CaseError: the grid reaches beyond the surface.

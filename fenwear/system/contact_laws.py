@@ -90,7 +90,7 @@ class ContactLaw(Protocol):
         """Return the state to which wear leads in the end; collective."""
 
     def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:
-        """Return what steps remember, on another contact grid of the same bodies; collective."""
+        """Return the memory of the steps on another contact grid of the same bodies; collective."""
 
     def half_cycles(
         self, system: Tribosystem, watch: Callable[[], bool], loading: Callable[[float], float], *, implicit: bool

@@ -186,7 +186,7 @@ class ContactSetup:
         return self._rates(1.0)
 
     def _rates(self, power: float) -> Array:
-        """Return what each node slides in each phase for a unit of the stroke's law (phases, n), see `node_rates`."""
+        """Return the sliding of nodes in each phase for a unit of the stroke's law (phases, n), see `node_rates`."""
         return np.array([node_rates(self.field_of(phase), pair, power) for phase, pair in enumerate(self.pairs)])
 
     def field_of(self, phase: int) -> SlidingField:
@@ -306,7 +306,7 @@ class ContactSetup:
         evolution: Evolution | None = None,
         conditions: Sequence[ContactConditions] = (),
     ) -> LayerEvolution:
-        """Return what phases of the motion, by default all, wear and do to what lies between.
+        """Return the evolution of wear and layers over phases of the motion, by default all.
 
         Args:
             wear: Of these phases.
@@ -325,7 +325,7 @@ class ContactSetup:
         worn: WornDepths | None = None,
         phases: Sequence[int] | None = None,
     ) -> Evolution:
-        """Return what phases of the motion, by default all, do to the states that laws remember.
+        """Return the evolution of laws' states over phases of the motion, by default all.
 
         Args:
             conditions: Of these phases.
@@ -450,7 +450,7 @@ class ContactSetup:
         return np.full(len(self.pair.weights), self.initial_temperature)
 
     def slid_after(self, half_cycles: float) -> float:
-        """Return how far the motion has gone after half-cycles from the start of the run, mm or rad; or cycles."""
+        """Return the sliding distance after half-cycles of the run, mm or rad; of tables the number of cycles."""
         strokes, each = self.motion.half_cycles, sum(phase.distance for phase in self.motion.phases)
         if self.motion.steps:
             each = 1.0
@@ -466,7 +466,7 @@ class ContactSetup:
         cycle: CycleShear | None = None,
         touching: Mask | None = None,
     ) -> ContactConditions:
-        """Return what coefficients depend on in a phase.
+        """Return the conditions that coefficients depend on in a phase.
 
         Args:
             phase: Its number; MIDDLE for the mean speed of the motion in the middle position.

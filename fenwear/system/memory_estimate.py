@@ -60,7 +60,7 @@ class Resources:
 
 
 def setup_resources(bodies: Bodies, nodes: int, asked: tuple[Asked, Asked], matrices: int) -> Resources:
-    """Return what condensing both bodies and joining them asks for; collective.
+    """Return the resources to condense and join both bodies; collective.
 
     Args:
         bodies: Both.
@@ -80,7 +80,7 @@ Asked = tuple[int, int]
 
 
 def _numbers(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> float:
-    """Return how many numbers a condensed body, its stiffness and its factor are; collective."""
+    """Return the count of numbers in a condensed body, its stiffness and its factor; collective."""
     if elastic.operator != CONDENSED:
         return 0.0
     found = float(patterns) * (elastic.dim * columns + (elastic.size / elastic.dim if heat else 0.0))

@@ -134,7 +134,7 @@ def place_at_rest(
 
 
 def _passage(middle: ContactPair, sliding: Sliding, *, rings: bool) -> Passage | None:
-    """Return where the punch is on a strip that passes under it to and fro or through a cycle.
+    """Return the place of the punch on a strip that passes under it to and fro or through a cycle.
 
     None where it hardly moves, or is of rings, whose temperatures are the same all around.
 
@@ -177,7 +177,7 @@ def place_case_bodies(case: Case, bodies: Bodies, sliding: Sliding | None = None
 
 
 def _wanted(case: Case, placed: ContactSetup) -> int:
-    """Return how many positions bring them as near to each other as contact nodes; 0 where that is not open.
+    """Return the number of positions that are as close as contact nodes; 0 where the case does not leave it open.
 
     Of a program the longest stroke counts. None are added on contact grids, which cover what positions need, nor with
     heat, whose response is another in each.

@@ -50,7 +50,7 @@ class Sliding:
         )
 
     def placement(self, phase: Phase) -> Placement:
-        """Return where the strip is in a phase."""
+        """Return the place of the strip in a phase."""
         return phase.place if self.motion.steps else self.field.placement(phase.offset)
 
 

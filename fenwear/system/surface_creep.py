@@ -109,7 +109,7 @@ class Creep:
         return sum(self.depths(crept).values(), np.zeros(self._nodes))
 
     def depths(self, crept: Array) -> dict[str, Array]:
-        """Return how far punch, strip and layer have crept (n,), or of states (size, k) each, (n, k), mm, by name."""
+        """Return the creep of punch, strip and layer (n,), or of states (size, k) each, (n, k), mm, by name."""
         found = {}
         for member, y in self._each(crept):
             found[member.name] = member.opened(
@@ -147,7 +147,7 @@ class Creep:
         return tuple(found)
 
     def factors(self, phase: int) -> tuple[float, ...]:
-        """Return how many times as soft as at once punch, strip and layer are over a phase of a march."""
+        """Return the compliances of punch, strip and layer over a phase of a march, over their immediate ones."""
         factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
         return tuple(float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER))
 
@@ -167,7 +167,7 @@ class Creep:
         )
 
     def change(self, phase: int, crept: Array, pressure: Array, ratio: Array, load: float) -> Array:
-        """Return what a phase adds to the state.
+        """Return the change of the state in a phase.
 
         Args:
             phase: Its number.
@@ -184,7 +184,7 @@ class Creep:
         return _joined([one.ravel() for one in found])
 
     def tangent(self, phase: int, ratio: Array) -> CreepTangent:
-        """Return what changes of state and pressure do in a phase."""
+        """Return the derivatives of a phase by changes of state and pressure."""
         n = self._nodes
         gaps: list[Array] = [np.zeros((n, 0))]
         by_pressure: tuple[list[Array], list[Array]] = [np.zeros((0, n))], [np.zeros((0, n))]
@@ -208,7 +208,7 @@ class Creep:
     # ------------------------------------------------------------------ whole cycles
 
     def stage(self, crept: Array, cycles: float, ratios: Sequence[Array], load: float) -> CreepStage:
-        """Return what an implicit step of so many cycles from a state does to the contact of all phases.
+        """Return the creep of all phases in an implicit step of so many cycles from a state.
 
         Args:
             crept: State at its start.
@@ -324,7 +324,7 @@ class CreepStage:
         return gap + self.gap, own if coupling is None else own + coupling
 
     def rate(self, pressure: Array) -> Array:
-        """Return what each cycle of the step adds to the state, at pressures (m, n)."""
+        """Return the change of the state in each cycle of the step, at pressures (m, n)."""
         creep, found = self.creep, []
         displaced = creep.lasting(pressure, self.ratios, self.load)
         for cycle, y, v in zip(creep.cycles, creep.parted(self.crept), displaced, strict=True):
@@ -339,7 +339,7 @@ def creep_of(
     interfaces: tuple[Interface, ...],
     on_material: Callable[[int], Interface],
 ) -> Creep:
-    """Return what creeps; collective.
+    """Return the creep of both bodies and the layer; collective.
 
     Args:
         placed: The bodies.

@@ -66,7 +66,7 @@ class Condensed:
         return Interface(rigid, self.punch, strip, moves, layer=layer)
 
     def facing(self, rigid: RigidEquilibrium) -> tuple[SurfaceOperator, bool]:
-        """Return how the strip answers at the place of a pair, and whether it moves as a whole: not on a grid."""
+        """Return the strip's operator at the place of a pair, and whether it moves as a whole: not on a grid."""
         pair, strip = rigid.pair, self.strip
         if self.strip_moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
             return strip.at(pair.placement.points_back(pair.punch.x)), False
@@ -195,7 +195,7 @@ class Tribosystem(ContactSetup):
 
 
 def resources_of(placed: ContactSetup) -> Resources:
-    """Return what condensing the bodies and joining them will ask for; collective."""
+    """Return the resources to condense and join the bodies; collective."""
     moves, fixed, flat = _frame(placed)
     nodes, dim = len(placed.pair.weights), placed.pair.punch.dim
     on_strip = len(placed.pair.strip.trace) if moves else nodes
@@ -423,7 +423,7 @@ def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = 
 
 
 def preparation(system: Tribosystem) -> Preparation:
-    """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
+    """Return the preparation of the heat of a system: "reduced" where its settings do not say so themselves."""
     if system.heat is None:
         return "as set"
     if not system.exchange.conducts:
@@ -453,7 +453,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
 
 
 def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:
-    """Return what each kelvin of this rank's nodes moves each surface along the normal, mm/K.
+    """Return the motion of each surface along the normal by each kelvin of this rank's nodes, mm/K.
 
     Args:
         system: With condensed bodies.

@@ -151,7 +151,7 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
 
 
 def set_up_by(case: Case) -> tuple[object, ...]:
-    """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
+    """Return the settings behind meshes, stiffnesses and thermal expansion of a case: equal variants share them."""
     bodies = (
         (
             *(body.regions, body.supports, body.no_turning_about, body.pivot, body.profile, body.topography),

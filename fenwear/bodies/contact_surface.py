@@ -247,7 +247,7 @@ def profile_at(body: str, points: Array, x: Array) -> Array:
     if (x.min(axis=0) < low - slack).any() or (x.max(axis=0) > high + slack).any():
         spans = [f"{a:g} to {b:g} mm" for a, b in ((low[0], high[0]), (x[:, 0].min(), x[:, 0].max()))]
         raise CaseError(
-            InputError(key, f"spans x = {spans[0]}, but the contact surface {spans[1]}: expected all of it")
+            InputError(key, f"spans x = {spans[0]}, but the contact surface {spans[1]}. Give values on all of it")
         )
     if x.shape[1] == 1:
         order = places[:, 0].argsort()

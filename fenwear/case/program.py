@@ -171,7 +171,7 @@ def held_at(case: Case, step: int | None = None) -> Held | None:
     program = case.program
     if program is None:
         if step is not None:
-            raise CaseError(InputError("program", "missing: there are no steps to choose from"))
+            raise CaseError(InputError("program", "missing, so that there is no step to hold. Leave out --step"))
         return None
     count = len(program.steps)
     number = count - 1 if step is None else step

@@ -346,7 +346,8 @@ def optimum_command(
         system = place_case(held_case)
     if not system.rigid.mode_names:
         reason = (
-            "they hold the punch along the contact's normal: no rigid motion follows the wear, and no pressure stays"
+            "they hold the punch along the contact's normal, so that no rigid motion follows the wear. Free this "
+            "motion and give a load, or use `run`"
         )
         raise CaseError(InputError("punch.supports", reason))
     optima = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
@@ -406,7 +407,12 @@ def shape_command(
     wanted = [_load_of(text) for text in loads] or [(1.0, 1.0)]
     if pressure:
         if loads:
-            raise CaseError(InputError("--pressure", "is that of the case's loads: leave out --load"))
+            raise CaseError(
+                InputError(
+                    "--pressure",
+                    "given together with --load. Leave out --load: the pressure balances the loads of the case",
+                )
+            )
         shape = shape_for_pressure(system, pressure_at(system.pair.punch, pressure))
     else:
         shape = initial_shape(system if system.sticks else with_reduced_heat(system, keep=True), wanted)

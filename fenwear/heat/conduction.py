@@ -84,9 +84,9 @@ def no_heat_sink(name: str, enough: float | None = None) -> InputError:
         name: Of the body.
         enough: Convection that would do, see `HeatBody.enough_convection`; None where it is not known.
     """
-    message = f"the {name} loses heat nowhere: expected convection or a held temperature"
+    message = f"the {name} loses no heat, so that no temperature is steady. Set convection, or hold a temperature"
     if enough is not None:
-        message += f"; with {enough:.3g} N/(mm*s*K) it would be about {WARMER:g} K warmer than the surroundings"
+        message += f". With {enough:.3g} N/(mm*s*K) it would be about {WARMER:g} K warmer than the surroundings"
     return InputError("heat.convection", message)
 
 

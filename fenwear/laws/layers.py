@@ -306,8 +306,7 @@ class Layers:
         beyond = float(pressure_of(found).max()) / self.hardness - 1
         raise ConvergenceError(
             f"Plastic flow did not converge: after {MOST_FLOWS} iterations the largest pressure exceeds "
-            f"contact.hardness by {100 * beyond:.2g} %. Little else carries the load where the hardness is near "
-            "the mean pressure"
+            f"contact.hardness by {100 * beyond:.2g} %. Increase contact.hardness"
         )
 
     def bounded(self, worn: WornDepths) -> WornDepths:

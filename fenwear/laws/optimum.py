@@ -212,10 +212,12 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
     if law.threshold > 0 and _balanced_below(rows, resultant, law.threshold):
         raise ConvergenceError(
             f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, "
-            "and nothing wears"
+            "and nothing wears. Reduce it, or increase the loads"
         )
     if not np.isfinite(rate / even).all():
-        raise ConvergenceError("no optimum: the wear rates of the mean pressure are too large or too small to compute")
+        raise ConvergenceError(
+            "no optimum: wear rates of the mean pressure are too large or small to compute. Check the wear law"
+        )
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
     y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
     if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
@@ -229,7 +231,7 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
     if pressure.max(initial=0.0) > wear.cap:
         raise ConvergenceError(
             f"no optimum: it would need {pressure.max():.4g} MPa, above the pressure_cap of {wear.cap:.4g} MPa, where "
-            "wear does not grow with pressure"
+            "wear does not grow with pressure. Raise the cap"
         )
     velocity = rate * y / lengths
     tilt = np.arctan2(_tangential(rigid, velocity), rigid.rigid_normal @ velocity)

@@ -140,7 +140,12 @@ def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
     """
     if system.sticks or system.case.heat is not None:
         what = "contact.law" if system.sticks else "heat"
-        raise CaseError(InputError(what, "a shape for a pressure is of gross sliding without heat"))
+        raise CaseError(
+            InputError(
+                what,
+                "--pressure works in gross sliding without heat alone. Leave out --pressure, or change this setting",
+            )
+        )
     if not (np.isfinite(pressure).all() and pressure.min() >= 0 and pressure.any()):
         raise CaseError(InputError("--pressure", "expected numbers of zero or more, and some above zero"))
     interface, ratio, unworn = system.interfaces[0], system.friction_ratios()[0], system.unworn()
@@ -169,7 +174,7 @@ def _balanced(system: Tribosystem, pressure: Array, ratio: Array) -> Array:
         InputError(
             "--pressure",
             f"the pressure carries {thickness * has:.6g} {unit} along {name}; loads and friction need "
-            f"{thickness * must:.6g} {unit}",
+            f"{thickness * must:.6g} {unit}. Scale or shift the pressure",
         )
         for name, has, must, most in zip(rigid.mode_names, carried, needed, allowed, strict=True)
         if abs(has - must) > most and (unit := "N" if is_translation(name) else "N mm")
@@ -198,7 +203,9 @@ def pressure_at(surface: ContactSurface, text: str) -> Array:
         return np.asarray(parse_expression(text)(place) + np.zeros(len(surface.weights)))
     except (ValueError, KeyError) as error:
         raise CaseError(
-            InputError("--pressure", f"expected a CSV file or an expression of the place: {error}")
+            InputError(
+                "--pressure", f"expected a CSV file or an expression in {', '.join(place)}, got {text!r}: {error}"
+            )
         ) from None
 
 

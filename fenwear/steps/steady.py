@@ -67,7 +67,7 @@ BESIDE = 0.05  # of the cycles: how far the last two ends are apart between whic
 REFINED, SETTLED = 3, 0.02  # times that the jump across it is made again; change of the cycles that ends it
 NOTHING_WEARS = (
     "no unique cyclic steady state exists: pressures below the pressure_threshold balance the loads, and nothing "
-    "wears. Follow the wear by `run`"
+    "wears. Reduce pressure_threshold, and set a wear coefficient above zero"
 )
 NO_ONE_MOTION = (
     "no cyclic steady state exists: no single rigid motion follows the wear of all nodes under pressure. This happens "

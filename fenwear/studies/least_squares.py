@@ -158,17 +158,26 @@ class LeastSquares:
         if not unknowns:
             raise CaseError(InputError("--unknown", "expected at least one key"))
         keys = [unknown.key for unknown in unknowns]
-        problems = [InputError(f"--unknown {key}", "given twice") for key in dict.fromkeys(keys) if keys.count(key) > 1]
+        problems = [
+            InputError(f"--unknown {key}", "given twice. Give each key once")
+            for key in dict.fromkeys(keys)
+            if keys.count(key) > 1
+        ]
         for name in self.baseline:
             if name not in BASELINES:
                 problems.append(InputError("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
         if self.baseline and not any(series.is_profile for series in self.series):
-            problems.append(InputError("--baseline", "expected with profiles only: the data hold none"))
+            problems.append(InputError("--baseline", "works with profiles only, and the data hold none. Leave it out"))
         for one in self.data:
             for setting in one.settings:
                 key = setting.partition("=")[0]
                 if key in keys:
-                    problems.append(InputError(f"{one.name}: # set {key}", "is an unknown of the calibration too"))
+                    problems.append(
+                        InputError(
+                            f"{one.name}: # set {key}",
+                            "is an unknown of the calibration, too. Remove this line or --unknown",
+                        )
+                    )
         kinds = {series.quantity for series in self.series}
         given = {series.has_sigma for series in self.series}
         if len(given) > 1 or (len(kinds) > 1 and given == {False}):

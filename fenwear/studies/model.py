@@ -129,8 +129,8 @@ class Model:
         """
         for key in self.case.passing_laws:
             message = (
-                "depends on the worn depth or the distance slid: it changes throughout a run, so that no "
-                "steady state exists"
+                "depends on the worn depth or the distance slid. It changes throughout a run, so that no steady state "
+                "exists. Ask for a quantity of a run, such as 'wear after 100 cycles'"
             )
             raise CaseError(InputError(key, message))
 
@@ -308,7 +308,9 @@ class Model:
         """
         system = self.system(values, settings)
         if system.sticks:
-            message = "a quantity of gross sliding: in partial slip wear continues until slipping nodes carry nothing"
+            message = (
+                "has no value in partial slip: wear continues until slipping nodes carry nothing. Use gross sliding"
+            )
             raise CaseError(InputError(quantity, message))
         return system
 

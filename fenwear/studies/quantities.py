@@ -265,7 +265,9 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
         raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
     body, at = _place(name, match, words, option, names)
     if is_steady and (match["after"] or not registered(name, body).steady):
-        raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
+        raise CaseError(
+            InputError(option, f"{words!r}: a steady state lasts for ever. Leave out 'steady' for {name} in a run")
+        )
     after = parse_amount(match["after"], option) if match["after"] else None
     kind: Kind = "steady" if is_steady else "snapshot"
     return Quantity(words, name, kind, unit_of(name), body, at, after, contact=match["contact"] or "")
@@ -382,7 +384,7 @@ def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
     lacking = [body for body in ("punch", "strip") if getattr(case.wear, body) is None]
     if worn and (quantity.body in lacking or (quantity.body == BOTH and lacking)):
         other = next(body for body in ("strip", "punch") if body not in lacking)
-        message = f"{quantity.text!r}: the case has no wear.{lacking[0]}; expected it 'of {other}'"
+        message = f"{quantity.text!r}: the case has no wear.{lacking[0]}; write 'of {other}'"
         raise CaseError(InputError(option, message))
     return replace(quantity, unit="rad/s") if quantity.name == "critical_speed" and case.turns else quantity
 

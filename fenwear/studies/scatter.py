@@ -86,7 +86,9 @@ class Scatter:
         """
         twice = [key for key in self.keys if key in other.keys]
         if twice:
-            raise CaseError([InputError(f"--scatter {key}", "has a distribution already") for key in twice])
+            raise CaseError(
+                [InputError(f"--scatter {key}", "has a distribution already. Give one for each key") for key in twice]
+            )
         return Scatter(
             (*self.keys, *other.keys),
             (*self.marginals, *other.marginals),

@@ -238,7 +238,7 @@ def _bases(model: Model, wanted: Sequence[Quantity]) -> list[tuple[float, Path]]
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):
             raise CaseError(
-                InputError("--of", f"{quantity.text!r} is never reached in this case: it has no derivative")
+                InputError("--of", f"{quantity.text!r} is never reached, so it has no derivative. Reduce the level")
             )
     return bases
 

@@ -249,7 +249,9 @@ def run_life(
     if not scatter.keys:
         options = {"--resume": study.resume, "--collect": study.collect, "--wanted": wanted}
         for option in (option for option, given in options.items() if given):
-            message = f"expected {option} with --scatter KEY=KIND(A, B), or --from a calibration, only"
+            message = (
+                f"applies to a distribution of lives. Add --scatter KEY=KIND(A, B) or --from DIR, or leave out {option}"
+            )
             raise CaseError(InputError(option, message))
         return _one_life(case, quantities, folder, log, study.comm), folder
     scatter.check(case)

@@ -88,7 +88,7 @@ def test_the_convection_that_is_proposed_does(assembled: Callable[..., Tribosyst
     case = (*COARSE, "strip.temperatures=[]", "heat.conductance=0", "heat.partition=1", "heat.debris=0")
     with pytest.raises(CaseError, match=r"100 K warmer than the surroundings") as refused:
         steady(assembled("example1-heat", *case, "heat.convection=0"))
-    found = re.search(r"with (\S+) N", str(refused.value))
+    found = re.search(r"(\S+) N/\(mm", str(refused.value))
     assert found is not None
     system = assembled("example1-heat", *case, f"heat.convection={found[1]}")
     state = steady(system)

@@ -93,7 +93,7 @@ class Factor:
             matrix: Square; for "cholesky" symmetric and positive definite.
             prefix: Of PETSc's options.
             kind: Of the factor.
-            comm: Its ranks: PETSc frees its own communicator with the last of its objects.
+            comm: Ranks of the matrix: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
             owner: The rank that has it, unless it is spread; a rank that has the whole matrix is the owner.
             copies: Number of ranks from the owner on that make one, where it is not spread.
@@ -229,7 +229,7 @@ class Iterative(Factor):
         Args:
             matrix: Symmetric and positive definite, in blocks of the nodes' components.
             prefix: Of PETSc's options.
-            comm: Its ranks.
+            comm: Ranks of the matrix.
             x: This rank's nodes (n, d), for the rigid motions.
         """
         self.comm, self._prefix, self.is_made = comm, prefix, False

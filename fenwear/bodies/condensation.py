@@ -103,7 +103,7 @@ def condense(
     Args:
         elastic: The body.
         patterns: Share of each trace node in a unit force (N, q).
-        directions: One unit vector for each pattern (q, d); by default all axes.
+        directions: Unit vector for each pattern (q, d); by default all axes.
         thermal_coupling: G; needs one direction for each pattern.
 
     Raises:

@@ -100,7 +100,7 @@ class ContactSurface:
 
     @cached_property
     def rounds(self) -> tuple[list[Round], NDArray[np.int64]]:
-        """Its round parts as meshed, and the part that each trace node is on, -1 for none (N,)."""
+        """Round parts of the surface as meshed, and the part of each trace node, -1 for none (N,)."""
         if self.made is not None:
             return self.made.rounds
         number = np.full(len(self.trace), -1)
@@ -111,12 +111,12 @@ class ContactSurface:
 
     @cached_property
     def abscissa(self) -> Array:
-        """Where the pressure nodes are along a curve (n,), ascending, mm: x, or the arc length; in a solid x."""
+        """Places of the pressure nodes along a curve (n,), ascending, mm: x, or the arc length; in a solid x."""
         return self.x[:, 0] if self.arc is None else self.arc[self.nodes]
 
     @cached_property
     def places(self) -> Array:
-        """Where profiles have the pressure nodes, mm: in the plane x or the arc length (n, 1).
+        """Places of the pressure nodes in profiles, mm: in the plane x or the arc length (n, 1).
 
         In a solid the coordinates across its mean normal (n, 2); all of them (n, 3) where it is no graph over these.
         """
@@ -148,7 +148,7 @@ class ContactSurface:
 
     @property
     def unworn(self) -> Array:
-        """Where the unworn surface is at the pressure nodes (n, d), mm: that of the mesh, and its profile."""
+        """Places of the unworn surface at the pressure nodes (n, d), mm: that of the mesh, and its profile."""
         return np.asarray(self.x - self.profile[:, None] * self.outward)
 
     @property
@@ -361,7 +361,7 @@ def trace_of(surface: Trace, vector: fem.FunctionSpace, space: fem.FunctionSpace
 
     Args:
         surface: The trace of `vector`.
-        vector: Its space.
+        vector: Function space of `surface`.
         space: The other space, which may number its nodes in another way.
     """
     index_map = vector.dofmap.index_map

@@ -99,7 +99,7 @@ class Convolution:
         """Return the convolution on the nodes of a box of the grid.
 
         Args:
-            low: Its least place along each axis.
+            low: Least place of the box along each axis.
             counts: Places along each axis.
             nodes: Numbers of the nodes in it (k,).
         """

@@ -99,7 +99,7 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
 
     Args:
         name: "punch" or "strip", or the name that the case gives the body.
-        mesh: Its mesh, mm.
+        mesh: Mesh of the body, mm.
         groups: For each group whether points x (3, q) belong to it, such as NAME_contact for the contact.
 
     Raises:

@@ -91,9 +91,9 @@ class ElasticBody:
         """Assemble the stiffness of `body`; collective.
 
         Args:
-            body: Its mesh.
-            description: Its supports, loads and pivot.
-            law: Its material.
+            body: Mesh and groups of the body.
+            description: Supports, loads and pivot of the body.
+            law: Law of the material.
             degree: Of the displacement.
             thickness: Of a plane model, mm; 1 for whole rings and solids.
             setup: Way of its condensation; by default as its size says.
@@ -394,7 +394,7 @@ class ElasticBody:
         The force acts through a point p: J w = M + (p - c) x F, J the facets' second moments of area about c.
 
         Args:
-            load: Its resultant, the point and the moment.
+            load: Resultant of the load, the point and the moment.
             ds: The facets' measure.
             area: Theirs, mm².
         """

@@ -44,12 +44,12 @@ class RegularGrid:
 
     @property
     def sides(self) -> Array:
-        """Its extents (d - 1,), mm."""
+        """Extents of the grid (d - 1,), mm."""
         return np.array(self.spacing) * (np.array(self.counts) - 1)
 
     @property
     def middle(self) -> Array:
-        """Its middle (d - 1,), mm."""
+        """Middle of the grid (d - 1,), mm."""
         return np.array(self.corner) + self.sides / 2
 
     @property

@@ -82,7 +82,7 @@ class Ground:
         Args:
             x: Coordinates, one for each of the model's axes.
             source: Where the force acts, along the grid.
-            force: Its components along the model's axes, N, in the plane N/mm.
+            force: Components of the force along the model's axes, N, in the plane N/mm.
             by: numpy, or what has `sqrt`, `log` and `arctan2` of UFL.
         """
         order, into = self._order, -self.outward

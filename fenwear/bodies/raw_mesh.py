@@ -20,7 +20,7 @@ class Elements:
 
     Attributes:
         dim: Of the group.
-        group: Its tag.
+        group: Tag of the group.
         kind: gmsh's number of the kind of element.
         nodes: Of each element in gmsh's order, counted from 0 (elements, nodes).
     """

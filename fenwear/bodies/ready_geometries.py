@@ -19,7 +19,7 @@ class ReadyGeometry:
 
     Attributes:
         name: Of its file.
-        about: Its description.
+        about: Description of the geometry.
         parameters: Name, default (lengths in mm, angles in degrees) and meaning of each.
         groups: Names of its regions and surfaces, for any parameters: some of these may leave some of them out.
     """

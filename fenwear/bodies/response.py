@@ -35,7 +35,7 @@ class Request:
     Attributes:
         elastic: The body.
         patterns: Share of each trace node in a unit force (N, q).
-        directions: One unit vector for each pattern (q, d); None for all axes.
+        directions: Unit vector for each pattern (q, d); None for all axes.
         thermal_coupling: G; needs one direction for each pattern.
     """
 
@@ -52,7 +52,7 @@ class Request:
 
     @property
     def places(self) -> Array:
-        """Where the patterns are (q, d), mm."""
+        """Places of the patterns (q, d), mm."""
         shares = np.asarray(self.patterns.sum(axis=0)).reshape(-1, 1)
         return np.asarray((self.patterns.T @ self.elastic.surface.trace) / shares)
 

@@ -85,7 +85,7 @@ class Substructures(Factor):
 
         Args:
             form: Of K, symmetric and positive definite with its supports.
-            bcs: Its supports.
+            bcs: Supports of the body.
             boundary: Of this rank's cells.
             surface: Global numbers of the contact surface's degrees of freedom (m,).
             prefix: Of PETSc's options.

@@ -28,7 +28,7 @@ def heights_on(grid: RegularGrid, wanted: Topography, key: str, folder: Path | N
 
     Args:
         grid: The contact.
-        wanted: Its description.
+        wanted: Description of the heights.
         key: Of the case, for messages.
         folder: Where its file lies.
 

@@ -121,7 +121,7 @@ class _Face:
     """An end of the mesh with a form on it, gathered on every rank; collective.
 
     Attributes:
-        dofs: Its degrees of freedom, by their global numbers (k,).
+        dofs: Degrees of freedom of the face, by their global numbers (k,).
         places: Where they are in the section (k, 2), mm.
         matrix: Of the form (k, k).
     """

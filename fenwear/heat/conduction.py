@@ -104,9 +104,9 @@ class HeatBody:
         """Prepare the forms on the mesh of an elastic body; collective.
 
         Args:
-            elastic: It gives the mesh, the model, the nodes and the contact surface.
-            description: Its held temperatures.
-            law: Its material.
+            elastic: Elastic body with the mesh, the model, the nodes and the contact surface.
+            description: Description of the body with its held temperatures.
+            law: Law of the material.
             heat: Convection, and the temperatures of the surroundings and of the start.
 
         Raises:

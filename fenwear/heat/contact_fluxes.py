@@ -139,7 +139,7 @@ class Fluxes(Protocol):
 
 
 class FluxFactor:
-    """They by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 follows from q_1.
+    """The fluxes by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 follows from q_1.
 
     Attributes:
         step: Their equations.
@@ -217,7 +217,7 @@ class FluxFactor:
 
 
 class FluxUpdate:
-    """They by the factor of a step of which a few nodes conduct otherwise.
+    """The fluxes by the factor of a step in which a few nodes conduct otherwise.
 
     Attributes:
         base: That factor.

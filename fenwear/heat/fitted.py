@@ -71,7 +71,7 @@ def certificate(
         step: A stage of the whole body, which it advances by.
         velocity: Of its material in it, mm/s or rad/s.
         surroundings: Boundary beyond the mesh.
-        small: Its reduced temperature with this stage.
+        small: Reduced temperature of the body with this stage.
         trial: Fluxes, and what is compared.
     """
     body, last = step.body, trial.entering[-STEPS:]

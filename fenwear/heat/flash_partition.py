@@ -59,7 +59,7 @@ class Bulk:
     """The addition of a finite body at the contact to the half-space.
 
     Attributes:
-        base: Its temperature there without friction, over the surroundings, K.
+        base: Temperature of the body there without friction, over the surroundings, K.
         per_power: Rise for a unit of mean power into it, K/mW.
     """
 
@@ -72,7 +72,7 @@ NO_BULK = Bulk()
 
 @dataclass(frozen=True)
 class HeatedSide:
-    """One of the bodies.
+    """Either of the bodies.
 
     Attributes:
         response: The half-space.

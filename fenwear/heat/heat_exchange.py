@@ -158,7 +158,7 @@ class HeatExchange:
 
         Args:
             state: The temperatures.
-            phase: Its number: it says where the contact is; -1 for the last one, with which the first one begins.
+            phase: Number of the phase, for the place of the contact; -1 for the last phase, before the first.
         """
         punch, strip = self._parts(self.own(state).values)
         return self.sides[0].readings[phase].gap(punch) + self.sides[1].readings[phase].gap(strip)

@@ -34,7 +34,7 @@ class PhaseMap:
     """One phase: s' = propagator s + source + response p.
 
     Args:
-        steps: Its steps in their order, with the friction heat of unit pressures in each (n,).
+        steps: Steps of the phase in their order, with the friction heat of unit pressures in each (n,).
     """
 
     def __init__(self, steps: Sequence[tuple[StepMap, Array]]) -> None:
@@ -156,7 +156,7 @@ class JumpEnd:
 
 
 class CycleJump:
-    """Where a jump ends, as a function of the pressures of its phases.
+    """End of a jump as a function of the pressures of its phases.
 
     Args:
         start: The state at its begin (dim,).

@@ -56,7 +56,7 @@ class Side:
     Attributes:
         field: The coordinates and their steps.
         contacts: Temperature at the interface nodes over the places of every prepared step (n,), K.
-        readings: Its values at the contact at the end of each phase.
+        readings: Values of the field at the contact at the end of each phase.
         balance: Heat stored, heat convected per second, and for every prepared step what enters per
             second at held temperatures by the end and by the start state, and what the moving
             material carries out; then for every prepared step what is given back; per thickness.

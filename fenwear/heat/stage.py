@@ -135,7 +135,7 @@ class Stage:
     """A stage at given conductances.
 
     Attributes:
-        prepared: Its parts that do not depend on the conducting nodes.
+        prepared: Parts of the stage that do not depend on the conducting nodes.
         by_contact: The flux that enters, q + h_b (theta_c - theta_a), and the part of q that crosses the contact into
             each body, from theta_c - theta_a (2 n + 2, 2 n).
         by_heat: From the friction heat (2 n + 2, n).

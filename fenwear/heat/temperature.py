@@ -196,7 +196,7 @@ class Functional:
 
     Attributes:
         rows: Of the coordinates on this rank (j, dim).
-        constant: Its value where they are zero (j,).
+        constant: Value at coordinates of zero (j,).
         comm: The ranks that the coordinates are spread over; None where each has all of them.
     """
 
@@ -267,7 +267,7 @@ class Field(Protocol):
         """Return the coordinates after a step without flux through the contact.
 
         Args:
-            step: Its number.
+            step: Number of the step.
             coordinates: (dim,), or without sources (dim,) or (dim, k).
             sources: False for what it makes of changes.
         """
@@ -293,7 +293,7 @@ class FullField:
 
         Args:
             body: The body.
-            steps: Its factored steps.
+            steps: Factored steps of the body.
             inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
         """
         self.steps, self.basis = list(steps), Basis(body)
@@ -414,7 +414,7 @@ def modal_basis(basis: ReducedBasis, step: HeatStep, duration: float) -> tuple[R
     Args:
         basis: Orthonormal in the heat capacity.
         step: A step of the body, not moving.
-        duration: Its duration, s.
+        duration: Duration of the step, s.
     """
     projected = total(basis.body.body.mesh.comm, basis.columns.T @ step.apply(basis.columns)[0])
     values, vectors = np.linalg.eigh((projected + projected.T) / 2)

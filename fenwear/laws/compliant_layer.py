@@ -42,7 +42,7 @@ class Closure(Protocol):
 
 
 class Law(Closure, Protocol):
-    """One that can be turned round.
+    """Closure whose pressure follows from the nearness.
 
     Surfaces are near each other by what is closed, or less than not at all by what is open, in a measure in which they
     come nearer evenly, whether they touch or not.

@@ -137,7 +137,7 @@ def asperity_share(
     """Return X at nodes (n,).
 
     Args:
-        lubrication: Its table.
+        lubrication: Table of the lubrication.
         state: Variables of laws at the nodes, by name.
         shape: Of nodal values.
         checked: Whether values of a law are: not on the way to a solution.
@@ -393,7 +393,7 @@ class FollowingFriction:
     """mu by the pressure, where all else is as in some conditions: on the way to a solution its values are not checked.
 
     Args:
-        friction: Its law.
+        friction: Law of friction.
         conditions: Of all else.
     """
 

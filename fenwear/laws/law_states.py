@@ -321,7 +321,7 @@ class Evolution:
 
         Args:
             before: States at the start of a step; they may be out of bounds.
-            cycles: Its length.
+            cycles: Length of the step.
 
         Raises:
             ConvergenceError: it does not converge; a shorter step may.

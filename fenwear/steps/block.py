@@ -85,7 +85,7 @@ class Block:
     Attributes:
         system: Their system.
         half_cycle: Number of each half-cycle (k,), from 1.
-        direction: Its sliding direction d (k,).
+        direction: Sliding direction d (k,).
         pressure: p in its middle position (k, n), MPa.
         gap: Gap there (k, n), mm.
         wear: Worn depth of the punch at its end (k, n), mm.
@@ -95,7 +95,7 @@ class Block:
         carried: States of the strip's material that laws remember (k, rows, n_strip).
         rigid: Amplitudes of the rigid modes there (k, modes).
         totals: Totals of all half-cycles up to its end, k of them.
-        adds: Its own additions, k of them.
+        adds: Additions of the block, k of them.
         optimum_distance: Share of the load that is carried elsewhere than in the optimum: half the integral of the
             difference to the optimal pressure of the present contact zone, over the pressure's (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
@@ -205,10 +205,10 @@ class PhaseRecord:
     """Result of one phase of a half-cycle.
 
     Attributes:
-        phase: Its number in the cycle.
-        contact: Its contact.
+        phase: Number of the phase in the cycle.
+        contact: Contact of the phase.
         before: Pressure of the same phase one cycle ago (n,), MPa; NaN in the first cycle.
-        adds: Its additions to the totals.
+        adds: Additions of the phase to the totals.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
         equilibrium: Its half-cycle; by default that of the phase.
     """

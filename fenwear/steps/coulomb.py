@@ -322,10 +322,10 @@ class _Run:
         """Return the record of a half-cycle.
 
         Args:
-            number: Its own.
-            steps: Its time steps.
+            number: Number of the half-cycle.
+            steps: Time steps of the half-cycle.
             states: Depths and totals at its end.
-            adds: Its additions to the totals.
+            adds: Additions of the half-cycle to the totals.
             load: Factor of all loads.
         """
         records, stroke = steps.records, (number - 1) % self.strokes

@@ -76,7 +76,7 @@ class DepthEvolution:
 
     Attributes:
         before: Depths that it begins with.
-        cycles: Its length.
+        cycles: Length of the step.
         wear: Wear of a cycle at pressures (m, n), at the last coefficients.
         half_cycles: Done since the start of the run, at its end.
         follows: Whether coefficients depend on depths, states or distance.

@@ -48,7 +48,7 @@ class ThermalContact:
     Args:
         system: The assembled problem, with heat.
         phase: Which phase.
-        contact: Its contact.
+        contact: Contact of the phase.
     """
 
     def __init__(self, system: Tribosystem, phase: int, contact: ContactSolver) -> None:
@@ -72,7 +72,7 @@ class ThermalContact:
         Args:
             temperature: At the start.
             gap: Of the unloaded bodies at the initial temperature, worn depth included (n,), mm.
-            start: The same phase one cycle ago.
+            start: State of this phase one cycle ago.
             wearing: Wear of this half-cycle where its step is implicit.
 
         Raises:

@@ -1,4 +1,4 @@
-"""One cycle jump: its two stages, its error, and how long the next one is; laws of contact give the stages.
+"""One cycle jump: its two stages, its error, and the length of the next; laws of contact give the stages.
 
 The state y(n) after n cycles, the worn depths and layers, follows dy/dn = M(y) + R(n): M is the wear of
 a contact inequality, R what cycles do beside it, linear in n and zero in gross sliding. One step of N cycles has the
@@ -134,7 +134,7 @@ def two_stages(law: JumpLaw[M], before: M, cycles: float, since: float, near: Tr
     Args:
         law: Gives the stages.
         before: Where it begins.
-        cycles: Its length.
+        cycles: Length of the jump.
         since: Cycles from the begin of the jump to that of the step.
         near: Change of contacts, which takes those of the step, too.
         digits: Share of the tolerance that its last contact is solved to; of a first stage its wear is all that stays.
@@ -156,7 +156,7 @@ class Attempt(Generic[M]):
     Attributes:
         begin, half, end: Of the halves.
         whole: The end of the whole step.
-        cycles: Its length.
+        cycles: Length of the jump.
         comes: Whether nodes come into contact, so that it ends by a last step.
         near: Change of contacts in it.
     """

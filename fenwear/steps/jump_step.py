@@ -122,7 +122,7 @@ class Stepper(JumpLaw[JumpMoment]):
 
         Args:
             made: The attempt; None where it was marched, so that there is no estimate of it.
-            end: Its end.
+            end: End of the attempt.
         """
         fine = self._begin.finer
         assert fine is not None

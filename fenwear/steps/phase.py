@@ -108,7 +108,7 @@ class _Begin:
     Attributes:
         temperature: Of both bodies.
         worn: Depths.
-        before: The same phase one cycle ago.
+        before: Contact of this phase one cycle ago.
         start: Where its contact is looked for; None from nothing.
         near: Pressures there (n,), MPa: even ones where none are known. By edges of the contact those nodes touch that
             carry one, as in a cycle ago: they do not go to and fro.
@@ -140,7 +140,7 @@ class PhaseStep:
 
     Args:
         system: The assembled problem.
-        phase: Its number in the cycle.
+        phase: Number of the phase in the cycle.
         implicit: Whether the pressure is that on the shape at the end of the phase.
     """
 
@@ -193,7 +193,7 @@ class PhaseStep:
         Args:
             temperature: At its start; None for the initial one.
             worn: Depths at its start.
-            before: The same phase one cycle ago.
+            before: Contact of this phase one cycle ago.
             load: Factor of all loads.
             half_cycles: Done since the start of the run, in its middle.
             near: Where to start from in the first cycle, such as the phase before.

@@ -24,7 +24,7 @@ MOST_RECURRING = 16  # systems of stages that are held at once, each with its st
 
 @dataclass(frozen=True)
 class Span:
-    """Where an integration ends at the latest, the factor of all loads on the way, and whether it is the last one.
+    """Latest end of an integration, the factor of all loads on the way, and whether it is the last one.
 
     The last one may end before, where its cycles repeat.
     """
@@ -202,7 +202,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
 
     Args:
         placed: The bodies of the case.
-        step: Its number from 0; by default the last.
+        step: Number of the step, from 0; by default the last.
 
     Returns:
         Without a program the case itself and "".

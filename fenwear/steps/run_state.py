@@ -21,7 +21,7 @@ class RunState:
     """The state at the end of a half-cycle.
 
     Attributes:
-        half_cycle: Its number; 0 before the first.
+        half_cycle: Number of the half-cycle; 0 before the first.
         worn: Worn depths of both bodies.
         contacts: The last contact of each phase; unsolved where there was none yet.
         temperature: Of both bodies; None without heat.

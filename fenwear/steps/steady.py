@@ -116,7 +116,7 @@ class SteadyState:
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
-        system: Its system: with the properties of its own temperatures, where they depend on them.
+        system: System of the state: with the properties at its temperatures, where they depend on them.
         passes: Number of updates of the properties; 0 where they are constants.
         conductances: By which its temperatures have come about (phases, n), N/(mm s K), NaN where none conducts; None
             without heat.

@@ -23,7 +23,7 @@ class SteadyCycle:
     """The k half-cycles of a steady state, of n contact nodes.
 
     Attributes:
-        system: Its system.
+        system: System of the state.
         pressure: In the middle position of each half-cycle (k, n), MPa.
         phase_pressure: In every phase (m, n), MPa.
         adds: Additions of each half-cycle to the totals, k of them.

@@ -1,4 +1,4 @@
-"""Where a stick zone ends, within its element: in the plane, where the zone is one or more lengths along x.
+"""Ends of a stick zone within their elements: in the plane, where the zone is one or more lengths along x.
 
 From the edge c of a stick zone the slip of a cycle grows as (x - c)^(3/2), as that of half-planes does (Cattaneo).
 A line through s^(2/3) at the second and third node that slip is zero there; the first one carries what the discrete

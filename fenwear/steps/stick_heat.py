@@ -288,7 +288,7 @@ def coupled_step(
         solved: Returns the contact under loads, from the pressure and the trial of one that is near.
         loaded: The loads without expansion.
         at: Where the run is at the start.
-        step: Its loads and motions.
+        step: Loads and motions of the step.
         flux: Largest friction heat, about, mW/mm².
 
     Raises:

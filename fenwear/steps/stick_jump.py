@@ -142,7 +142,7 @@ def _cycle_after(
         before: The last whole cycle.
         at: Where the time steps are, so many cycles earlier.
         worn: Depths.
-        number: Its own.
+        number: Number of the cycle.
         cycles: Run there, of which it is the last.
 
     Raises:

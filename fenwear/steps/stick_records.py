@@ -168,7 +168,7 @@ def record(
         interface: The bodies.
         heat: Of friction; None without.
         at, after: The states at its start and end.
-        step: Its loads and motions.
+        step: Loads and motions of the step.
     """
     state, position = after.contact, interface.position(step.offset)
     weights, (work, stored) = position.pair.weights, _work(interface, position, at, after)

@@ -129,13 +129,13 @@ class StickState:
 
 @dataclass(frozen=True)
 class PartialSlipState:
-    """Where a run is.
+    """State of a run between two time steps.
 
     Attributes:
         contact: With what it remembers.
         imposed: On it, expansion by heat among it.
         worn: Depths.
-        next_step: Its number in the cycle.
+        next_step: Number of the next time step in the cycle.
         temperature: Of both bodies, on the bases of the rig's heat (dim,); empty without heat, as the next two.
         heating: Heat of friction of the nodes in the last step (n,), mW/mm².
         conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts.

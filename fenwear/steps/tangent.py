@@ -48,7 +48,7 @@ def phase_tangent(
 
     Args:
         system: The assembled problem.
-        phase: Its number in the cycle.
+        phase: Number of the phase in the cycle.
         pressure: During it (n,), MPa.
         heat: Of cycles, at the friction there.
         state: Temperatures at its start; None where nothing depends on them.
@@ -251,7 +251,7 @@ def _lying(
 
     Args:
         system: The assembled problem.
-        phase: Its number.
+        phase: Number of the phase.
         conditions: In it.
         by_depths, by_lost: Derivatives of what both bodies lose and of what is lost over a unit of sliding, to the
             pressure, the temperatures and the thickness of debris at the nodes of the contact.
@@ -282,7 +282,7 @@ class _Creeping(NamedTuple):
         gap_by_heat: By the state of the heat (n, dim).
         gap_by_pressure: By the pressures (n, n).
         stays: Remaining share of its state (k,).
-        by_state: Its state at the end by that of the heat (k, dim).
+        by_state: State at the end by the state of the heat (k, dim).
         by_pressure: By the pressures (k, n).
     """
 
@@ -299,7 +299,7 @@ def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p:
 
     Args:
         creep: All that does.
-        phase: Its number.
+        phase: Number of the phase.
         ratios: tau (n, d), and that of a friction that is larger by 1.
         traction_p, traction_s: Change of mu by pressure and by the state of the heat, times the pressure.
     """

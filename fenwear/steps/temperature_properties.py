@@ -33,7 +33,7 @@ def with_own_properties(
 
     Args:
         system: The assembled problem.
-        found: Its state, with the properties as they are; collective.
+        found: Function that returns the state with the properties as they are; collective.
         temperatures: Of a state.
         within: Relative change of the properties that is left; by default a tenth of heat.property_tolerance.
 

@@ -42,7 +42,7 @@ class Interface:
 
     Attributes:
         rigid: H, F, the nodes and the transfer.
-        punch: Its response at its pressure nodes.
+        punch: Response of the punch at its pressure nodes.
         strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.

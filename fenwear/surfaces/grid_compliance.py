@@ -99,7 +99,7 @@ class Box:
     """A box of places of a grid.
 
     Attributes:
-        low: Its least place along each axis.
+        low: Least place of the box along each axis.
         counts: Places along each axis.
         nodes: Numbers of the nodes in it (k,).
         at: Where they stand in it, its last axis the fastest (k,).

@@ -63,7 +63,7 @@ class ContactPair:
 
     @cached_property
     def places(self) -> tuple[Array, Array]:
-        """Where the contact nodes are on the punch and on the strip's material (n, 3) each, mm."""
+        """Places of the contact nodes on the punch and on the strip's material (n, 3) each, mm."""
         return in_space(self.punch.x), in_space(self.material_place.points_back(self.punch.x))
 
     @property
@@ -73,7 +73,7 @@ class ContactPair:
 
     @cached_property
     def opposite(self) -> Array:
-        """Where the strip's surface is opposite each node, before any deformation and wear (n, d), mm.
+        """Place of the strip's surface opposite each node, before any deformation and wear (n, d), mm.
 
         Sliding of the strip's material there: a flat block's ends are farther from a ring's axis
         than the ring is.

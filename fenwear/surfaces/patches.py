@@ -40,7 +40,7 @@ class Side:
 
     Attributes:
         surface: As it was meshed.
-        trace: Its trace nodes (N, d), mm.
+        trace: Trace nodes of the side (N, d), mm.
         normal: Of its facets (f, d).
     """
 

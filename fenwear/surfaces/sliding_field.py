@@ -199,7 +199,7 @@ SMALL = 1e-4  # rad: a turn whose series ends after three terms
 
 
 class Way(Protocol):
-    """Where a body goes in a time step; equal ways there and back are one."""
+    """Way of a body in a time step; equal ways there and back are one."""
 
     def at(self, share: float) -> Placement:
         """Return the place at a share of it, from 0 at its lower end to 1."""
@@ -228,7 +228,7 @@ class Screw:
     """The shortest screw between two places, which turn about the same centre where both are turned.
 
     Attributes:
-        first, last: Its ends.
+        first, last: Ends of the screw.
     """
 
     first: Placement

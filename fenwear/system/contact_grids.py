@@ -158,7 +158,7 @@ def surface_on(name: str, grid: RegularGrid, outward: float, depth: Array) -> Co
 
     Args:
         name: Of the body.
-        grid: Its nodes.
+        grid: Nodes of the grid.
         outward: 1.0 where the normal out of the body points along its axis, else -1.0.
         depth: Depth of the body's surface below the grid (n,), mm.
     """

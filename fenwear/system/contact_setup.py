@@ -469,7 +469,7 @@ class ContactSetup:
         """Return the conditions that coefficients depend on in a phase.
 
         Args:
-            phase: Its number; MIDDLE for the mean speed of the motion in the middle position.
+            phase: Number of the phase; MIDDLE for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths, and states that laws remember; by default those at the start.

@@ -24,13 +24,13 @@ class Member(Protocol):
     Attributes:
         name: "punch", "strip" or "layer".
         key: Of its creep in a case.
-        retardation: Its law.
+        retardation: Creep law of the member.
         size: Of its displacement.
     """
 
     @property
     def retardation(self) -> Retardation:
-        """Its law."""
+        """The creep law of the member."""
 
     @property
     def name(self) -> str:
@@ -54,11 +54,11 @@ class Member(Protocol):
         """Return the gap (n, ...) that displacements (size, ...) open in a phase."""
 
     def from_other(self, other: Member, states: Array, nodes: NDArray[np.int64]) -> Array:
-        """Return states (terms, size) here of those of the same on another contact grid.
+        """Return states (terms, size) from states of the member on another contact grid.
 
         Args:
-            other: The same there.
-            states: Its own (terms, size of other).
+            other: The member on the other grid.
+            states: States on the other grid (terms, size of other).
             nodes: The contact node there of each one here (n,), -1 for none.
         """
 
@@ -69,7 +69,7 @@ class CreepingBody:
 
     Attributes:
         which: 0 the punch, 1 the strip.
-        retardation: Its law.
+        retardation: Creep law of the body.
         faces: The surfaces in each phase, with what the strip's material answers.
         moved: Displacement by moved supports alone (q, d), mm.
     """
@@ -212,7 +212,7 @@ class CreepingLayer:
     """A linear layer that creeps.
 
     Attributes:
-        retardation: Its law.
+        retardation: Creep law of the layer.
         closure: By unit pressures at once (n,), mm/MPa.
     """
 

@@ -75,7 +75,7 @@ class Creep:
 
     @cached_property
     def _ends(self) -> list[int]:
-        """Where the states of the members end."""
+        """Ends of the members' states."""
         return [int(end) for end in np.cumsum([len(one.retardation.times) * one.size for one in self.members])]
 
     @property
@@ -170,7 +170,7 @@ class Creep:
         """Return the change of the state in a phase.
 
         Args:
-            phase: Its number.
+            phase: Number of the phase.
             crept: State at its start.
             pressure: (n,), MPa.
             ratio: tau (n, d).
@@ -212,7 +212,7 @@ class Creep:
 
         Args:
             crept: State at its start.
-            cycles: Its length.
+            cycles: Length of the step.
             ratios: tau of each phase, (n, d) each.
             load: Factor of all loads.
         """

@@ -147,7 +147,7 @@ class Tribosystem(ContactSetup):
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm.
 
         Args:
-            phase: Its number.
+            phase: Number of the phase.
             worn: Depths at its start, what lies between and what has crept.
             passing: Whether creep continues over the phase, in a march; else it is left out.
         """
@@ -488,7 +488,7 @@ def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Ar
     Args:
         system: The placed bodies.
         mu: (n,).
-        phase: Its number; MIDDLE for the field of the whole motion.
+        phase: Number of the phase; MIDDLE for the field of the whole motion.
     """
     return mu * (system.sliding_ratio[phase] if phase >= 0 else node_rates(system.sliding.field, system.pair))
 

@@ -345,7 +345,7 @@ class Bordered(Phases):
         gaps += self.left @ np.einsum("kqn,kn->q", self.right, pressure)
 
     def _solution(self, cut: _Cut) -> Solve:
-        """Return the solution operator, with what lies between the phases eliminated.
+        """Return the solution operator, with the unknowns between the phases eliminated.
 
         With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
         (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
@@ -420,7 +420,7 @@ class Worn(Phases):
 
 
 def _as_border(local: Array) -> tuple[Array, Array]:
-    """Return L and R of what unit pressures wear at their own nodes (m, n)."""
+    """Return L and R of the wear by unit pressures at their own nodes (m, n)."""
     m, n = local.shape
     unit = np.eye(n)
     return np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]

@@ -144,7 +144,7 @@ def by_components(waves: Waves) -> Kernel:
 
 
 def convolved(parts: Sequence[tuple[Kernel, Array]], count: int, size: Sequence[int]) -> Array:
-    """Return the sum of what kernels make of fields (k, b, ...), `count` components of each (k, count, ...).
+    """Return the sum of kernels times fields (k, b, ...), `count` components of each (k, count, ...).
 
     As many fields at a time as stay in the cache. Components without forces are not transformed.
 

@@ -263,7 +263,7 @@ class ElasticBody:
         return solve_together([self.factor], [right])[0]
 
     def couple_of(self, forces: Array) -> Array:
-        """Return the moments about what guides hold (g, k) of forces (owned, k), those on supports too; collective."""
+        """Return the guides' moments (g, k) of forces (owned, k), of forces on supports, too; collective."""
         return total(self.body.mesh.comm, self.guides.rotations.T @ forces)
 
     @property
@@ -292,7 +292,7 @@ class ElasticBody:
 
     @property
     def is_factored(self) -> bool:
-        """Whether what solves for its columns is made."""
+        """Whether the solver of its columns is made."""
         return any(factor.is_made for factor in self._factors)
 
     @cached_property

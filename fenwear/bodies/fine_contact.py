@@ -199,7 +199,7 @@ def _guided(request: Request, correction: Correction, weights: TensorWeights) ->
 
 
 def _held(correction: Correction, along: Array) -> Correction:
-    """Return a correction with what guides hold, for displacements asked along directions (d, a)."""
+    """Return a correction with the guides, for displacements along directions (d, a)."""
     answer, rotations, moved = correction.guided
     couple, work = (fields.reshape(len(fields) * fields.shape[1], -1).T for fields in (rotations, moved))
     change = answer.change(rotations, moved, couple, work).reshape(*rotations.shape[:2], *rotations.shape[:2])

@@ -114,7 +114,7 @@ class GmshView:
         return list(kinds), [of_kind[0] for of_kind in joined], [of_kind[1] for of_kind in joined]
 
     def getElementProperties(self, kind: int) -> tuple[str, int, int, int, Array, int]:  # noqa: N802
-        """Return of a kind of element what is asked for: its dimension, second, and the number of its nodes, fourth."""
+        """Return the properties of a kind of element: second its dimension, fourth the number of its nodes."""
         one = next(one for one in self.raw.elements if one.kind == kind)
         return "", one.dim, 0, one.nodes.shape[1], np.empty(0), 0
 

@@ -93,7 +93,7 @@ class WearCompliance(Protocol):
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
-        """Return its derivative but for `layer`: what unit pressures open at the punch's nodes, and on the strip's.
+        """Return the openings by unit pressures at the punch's nodes, and on the strip's, without `layer`.
 
         (m, n) each, mm/MPa; None for nothing.
         """
@@ -418,7 +418,7 @@ class CondensedContact:
         )
 
     def _opened_beside(self, pressure: Array) -> Array:
-        """Return the gaps (m, n) that pressures (m, n) open by what friction differs from that of the products."""
+        """Return the gaps (m, n) by pressures (m, n) and the difference of friction from that of the products."""
         forces = self._beside * pressure[:, :, None]
         return np.array([phase.interface.apply(forces[k])[:, 0] for k, phase in enumerate(self.phases)])
 

@@ -110,7 +110,7 @@ class Exchanged:
         return right
 
     def sources(self, rows: Array) -> Sources:
-        """Return rows (r, 2 n) of the right-hand side as rows of what it follows from."""
+        """Return rows (r, 2 n) of the right-hand side as rows of its sources."""
         conducts, own, jump = self.row_factors()
         first, second = np.hsplit(rows, 2)
         loss, kept = self.loss, conducts * (1 - self.debris)

@@ -92,7 +92,7 @@ class HeatedSide:
 
 
 def mean_power(heat: Array, cell: float) -> float:
-    """Return the mean over instants of what enters, mW."""
+    """Return the mean heat flow over all instants, mW."""
     return cell * float(heat.sum()) / len(heat)
 
 
@@ -247,7 +247,7 @@ def bulk_of(body: HeatBody, elastic: ElasticBody, conductivity: float, spots: Sp
 
 
 def _half_space(body: HeatBody, conductivity: float, grid: RegularGrid, spots: Spots) -> tuple[Array, Array]:
-    """Return U at the own nodes (owned,), and what it leaves on the body as loads (owned,); collective."""
+    """Return U at the owned nodes (owned,), and its residual on the body as loads (owned,); collective."""
     mesh, dim = body.body.mesh, body.body.mesh.geometry.dim
     x, v, normal = ufl.SpatialCoordinate(mesh), ufl.TestFunction(body.space), ufl.FacetNormal(mesh)
     source = fem.Constant(mesh, np.zeros(dim, dtype=PETSc.ScalarType))

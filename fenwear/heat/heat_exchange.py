@@ -120,7 +120,7 @@ class HeatExchange:
         return all(isinstance(basis, ReducedBasis) for basis in self.bases)
 
     def with_friction(self, friction: Array) -> HeatExchange:
-        """Return the exchange at another mu (phases, n) with all else the same."""
+        """Return the exchange at another mu (phases, n)."""
         other = copy.copy(self)
         other.friction = friction
         return other
@@ -452,7 +452,7 @@ class HeatExchange:
         return changes
 
     def _kept(self, plan: StepPlan, starts: Array, reached: Array, *, sources: bool) -> Array:
-        """Return the terms of what bodies have kept or lost in a step, per thickness; of a steady state a second.
+        """Return the terms of heat stored and lost in a step, per thickness; of a steady state in a second.
 
         Args:
             plan: The step.

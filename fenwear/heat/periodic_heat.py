@@ -23,7 +23,7 @@ KEPT, MEMORY = 8, 10**9  # cycles of different conducting nodes that are kept, a
 
 
 def cycle_memory(exchange: HeatExchange) -> float:
-    """Return the bytes that the maps of a cycle's steps take, and what they are made of, for one set of nodes."""
+    """Return the bytes of the maps of a cycle's steps and of their parts, for one set of nodes."""
     dim, (phases, n) = sum(len(basis) for basis in exchange.bases), exchange.friction.shape
     kinds = [{(plan.punch, plan.strip) for plan in plans} for plans in exchange.plans]
     maps, prepared = sum(map(len, kinds)), len(set[tuple[int, int]]().union(*kinds))

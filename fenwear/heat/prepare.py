@@ -431,7 +431,7 @@ def _on_balance(
     *,
     cooled: bool,
 ) -> Side:
-    """Return a side with what enters the balance of its heat; collective."""
+    """Return a side with the terms of its heat balance; collective."""
     body = field.basis.body
     convected = body.convected
     if surroundings.exposed is not None:

@@ -209,7 +209,7 @@ class _Growing:
         return fields if self._later is None else self._later.advance(fields, sources=False)
 
     def _beside(self, fields: Array) -> Array:
-        """Return fields without what the basis has of them; first without the uniform one, which may be far larger."""
+        """Return fields without their parts in the basis; first without the uniform one, which may be far larger."""
         comm = self.body.body.mesh.comm
         fields = np.asfortranarray(fields)  # one layout, whoever has made them: the same bits on any number of ranks
         for some in (slice(self._first), slice(None)):

@@ -53,7 +53,7 @@ class Basis:
         return temperature
 
     def translated(self, other: Basis, coordinates: Array) -> Array:
-        """Return the coordinates of what has these on another basis; collective, or for rank 0 that leads."""
+        """Return the coordinates here from coordinates on another basis; collective, or for rank 0 that leads."""
         return Team.of(self.body.body.mesh.comm).each(self, "from_other", other, coordinates)  # type: ignore[no-any-return]
 
     def from_other(self, other: Basis, coordinates: Array) -> Array:
@@ -122,7 +122,7 @@ class TrackBasis(ReducedBasis):
         return track
 
     def on_track(self, coordinates: Array, track: Array) -> Array:
-        """Return coordinates with what is on its way back: of a track with other modes its temperatures alone."""
+        """Return coordinates with the heat on its way back: of a track with other modes its temperatures alone."""
         found: Array = np.zeros((self.cells, self.modes + 1))
         if track.shape == found.shape:
             found[:] = track

@@ -120,7 +120,7 @@ class Debris:
 
     @property
     def varies(self) -> bool:
-        """Whether what is lost changes with more than the place."""
+        """Whether the loss changes with more than the place."""
         return isinstance(self.life, Dependence) or self.edge_life < np.inf
 
     def lost(self, conditions: ContactConditions) -> Array:

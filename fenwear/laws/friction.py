@@ -344,7 +344,7 @@ class Friction:
         return np.asarray(lubrication.fluid_friction + share * (found - lubrication.fluid_friction))
 
     def values(self, conditions: ContactConditions) -> Array:
-        """Return mu at the nodes (n,): of asperities and fluid by what they carry.
+        """Return mu at the nodes (n,): of asperities and fluid by their shares of the load.
 
         Raises:
             CaseError: it is negative or not finite.

@@ -115,7 +115,7 @@ class Memory:
 
     @cached_property
     def of_wear(self) -> bool:
-        """Whether a rate asks for what is worn."""
+        """Whether a rate depends on the wear."""
         return any(WEAR in state.of for state in self.states)
 
     @cached_property

@@ -192,7 +192,7 @@ class LayerStep:
         return self._length * found - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
-        """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
+        """Return L (m, n, q) and R (m, q, n) of the openings L_k R_j by pressures in all phases."""
         left, right = self._worn.border(pressure)
         right = self._length * right
         if self.passing.layers.softens:
@@ -206,7 +206,7 @@ class LayerStep:
         return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
 
     def _felt_by_border(self, left: Array, pressure: Array) -> Array:
-        """Return L of `border` with what coatings that are compressed leave of it."""
+        """Return L of `border`, reduced by the compression of coatings."""
         (punch, strip), n = self._felt(pressure), pressure.shape[1]
         first = n if self._worn.punch.wears else 0
         found = left.copy()
@@ -215,7 +215,7 @@ class LayerStep:
         return found
 
     def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
-        """Return both with what the strip carries between, as its wear."""
+        """Return both with the debris that the strip carries, as its wear."""
         passing, pairs = self.passing, self.passing.wear.pairs
         slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
         reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])

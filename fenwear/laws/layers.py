@@ -249,7 +249,7 @@ class Layers:
         return self.flown(worn, other.between[row] - worn.between[row])
 
     def opening(self, pair: ContactPair, worn: WornDepths) -> Array | float:
-        """Return the gap that what lies between opens at one place (n,), mm."""
+        """Return the gap that the layers open at one place (n,), mm."""
         found = self.opened(worn.between)
         if self.strip_carries and len(worn.carried):
             found = found - pair.wear_interpolation @ worn.carried[0]

@@ -297,7 +297,7 @@ def optimum_on_track(
     recession: Callable[[Array], Array],
     zone: Mask | None = None,
 ) -> Optimum:
-    """Return the optimum of a punch on a strip that recedes by what is spread along its closed track.
+    """Return the optimum of a punch on a strip whose wear spreads along its closed track.
 
     With r(p) the recession, W(p) + r(p) = w_n: the same as K_eff q^b = w_n with K_eff = (W(p) + r(p)) / q^b, which is
     taken again until the pressure repeats; q^b is the law of the body that begins to wear at the lower pressure.

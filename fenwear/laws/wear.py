@@ -73,7 +73,7 @@ class WornDepths:
 
 
 def _added(one: Array, other: Array) -> Array:
-    """Return the sum of states of what lies between or creeps; where one has none it adds nothing."""
+    """Return the sum of states of layers or creep; an empty state adds nothing."""
     if not len(other):
         return one
     return one + other if len(one) else other
@@ -114,7 +114,7 @@ class BodyWear:
         return self
 
     def at(self, pressure: Array) -> BodyWear:  # noqa: ARG002
-        """Return the wear at pressures (m, n), which say what of it is of the coating and of the base."""
+        """Return the wear at pressures (m, n), which determine the shares of the coating and the base."""
         return self
 
     def depth(self, pressure: Array) -> Array:

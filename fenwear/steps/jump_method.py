@@ -79,7 +79,7 @@ class JumpLaw(Protocol[M]):
         return replace(base, worn=base.worn + (one.worn - other.worn).times(share))
 
     def halfway(self, half: M, cycles: float) -> M:  # noqa: ARG002
-        """Return the state halfway through so many cycles with what R is found to be there; by default none."""
+        """Return the state halfway through so many cycles, with R there; by default none."""
         return half
 
     def ended(self, end: M, cycles: float) -> None:
@@ -351,7 +351,7 @@ class Sizes:
         return float(weights @ np.abs(worn.punch) + on_strip @ np.abs(worn.strip)) + between + self._carried(worn)
 
     def of_depth(self, wrong: WornDepths, begin: WornDepths, end: WornDepths) -> float:
-        """Return the largest relative error of depths, of what creeps, and of debris that the strip carries.
+        """Return the largest relative error of depths, of creep, and of debris that the strip carries.
 
         Along a track debris is thin, and nothing beside what is worn: it is measured by itself, as creep is.
         """
@@ -399,7 +399,7 @@ class Sizes:
 def _relative(
     size: Callable[[WornDepths], T], share: float, wrong: WornDepths, begin: WornDepths, end: WornDepths
 ) -> Array:
-    """Return the size of an error over that of what a jump adds, or over a share of all that there is at its end."""
+    """Return the size of an error over the size of a jump's additions, or over a share of the size at its end."""
     step, reached = np.asarray(size(end - begin)), np.asarray(size(end))
     return np.asarray(size(wrong) / np.maximum(np.maximum(step, share * reached), 1e-300))
 

@@ -198,7 +198,7 @@ def _nominal(placed: ContactSetup, key: str) -> float:
 
 
 def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
-    """Return the case of what acts at the end of a step of a program, held for ever, and the step in words.
+    """Return the case with the conditions at the end of a program's step, held for ever, and the step in words.
 
     Args:
         placed: The bodies of the case.
@@ -224,7 +224,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
 
 
 def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
-    """Return the system of what acts at the end of a step of its program, held for ever; collective.
+    """Return the system under the conditions at the end of a program's step, held for ever; collective.
 
     A system of a case without a program is returned as it is. Operators that the step leaves are shared.
 

@@ -202,7 +202,7 @@ def stacked(totals: Sequence[Totals]) -> Totals:
 
 
 def opposite_densities(system: ContactSetup, phase: int) -> tuple[Array | None, Array | None]:
-    """Return the densities of what is worn at the contact nodes in a phase, of punch and strip, N s²/mm⁴."""
+    """Return the densities of punch and strip at the contact nodes in a phase, N s²/mm⁴."""
     pair, (punch, strip) = system.pairs[phase], system.bodies.densities
     if strip is None:
         return punch, None

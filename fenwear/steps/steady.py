@@ -366,7 +366,7 @@ class _End:
         return replace(self.system.unworn().times(0.0), punch=punch, strip=strip)
 
     def _shape(self, worn: WornDepths) -> Array:
-        """Return the gap that depths open, and what lies between and stays where it lies (n,), mm."""
+        """Return the gap that depths and layers at rest open (n,), mm."""
         system = self.system
         if system.track_changes:
             worn = replace(worn, carried=0 * worn.carried)

@@ -161,7 +161,7 @@ class StickCreep:
         return np.concatenate(found)
 
     def rate(self, begin: Array, end: Array, period: float) -> Array:
-        """Return the rate by which the state changes with the cycles, from what one cycle did to it."""
+        """Return the rate by which the state changes with the cycles, from its change in one cycle."""
         paces = [np.repeat(period / law.times, count) for law, count in zip(self.laws, self._numbers, strict=True)]
         return np.concatenate(paces) * (self.lasting(begin, end, period) - begin)
 

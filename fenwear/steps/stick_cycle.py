@@ -110,7 +110,7 @@ class PartialSlipProblem:
         return max(ways, default=0.0) or 1e-3 * self.interface.middle.pair.punch.extent()
 
     def unworn(self) -> WornDepths:
-        """Return the worn depths at the start, none, and what lies between then."""
+        """Return the worn depths at the start, none, and the initial layers."""
         found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
         return replace(found, crept=self.interface.creep.beginning())
 
@@ -187,7 +187,7 @@ class PartialSlipProblem:
         return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
     def imposed(self, step: TimeStep, at: PartialSlipState) -> tuple[Position, Imposed]:
-        """Return the place of the strip in the time step after a state, and what is imposed at its end; collective."""
+        """Return the place of the strip in the time step after a state, and loads and motion at its end; collective."""
         interface, worn, load = self.interface, at.worn, at.load
         position = interface.position(step.offset)
         given = interface.loaded(step.fraction if step.fraction is not None else 0.0).times(load)

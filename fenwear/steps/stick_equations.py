@@ -287,7 +287,7 @@ class Step:
         return status, float(wrong / max(pressure.max(), 1e-300))
 
     def state(self, found: StatusSolution, iterations: int, *, unique: bool) -> StickState:
-        """Return the state at the end of the step, free of what rounding leaves in the laws."""
+        """Return the state at the end of the step, without rounding errors in the laws."""
         n, position = self.n, self.position
         status, _ = self.status_of(found)
         gap, slip = self.jumps(found)

@@ -253,7 +253,7 @@ def _of_nodes(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
 
 
 def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
-    """Return the shape with a zone of whole nodes, and what it is with those beside its edge and without its own."""
+    """Return the shape with a zone of whole nodes, and the shapes with one node more and less at each edge."""
     found, surface = _of_nodes(problem, zone), problem.interface.middle.pair.punch
     wider, rim = beside(surface, zone), beside(surface, ~zone)
     inner = zone & ~rim
@@ -325,7 +325,7 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
         ends.append((here, there))
 
     def blended(shift: float) -> tuple[Array, Array]:
-        """Return pressures and gaps with both ends moved out by a share of what is left of their intervals."""
+        """Return pressures and gaps with both ends moved out by a share of the remaining intervals."""
         shares = [
             (edge.x + edge.side * shift * edge.within - here) / (there - here)
             for edge, (here, there) in zip(edges, ends, strict=True)
@@ -420,7 +420,7 @@ def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
 
 
 def _with_debris_left(problem: PartialSlipProblem, zone: Mask) -> WornDepths:
-    """Return the unworn bodies with what is left in the end of the debris there was: all where nothing slips."""
+    """Return the unworn bodies with the debris that remains in the end: all of it where nothing slips."""
     unworn, layers, pair = problem.unworn(), problem.interface.layers, problem.interface.middle.pair
     if not layers.debris.present:
         return unworn

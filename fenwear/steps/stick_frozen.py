@@ -141,7 +141,7 @@ class Frozen:
         return replace(before + worn.times(cycles), crept=crept), contact
 
     def _opened(self, crept: Array) -> Array:
-        """Return the gap (m, n) that a state of what creeps opens beside that of the cycle, mm."""
+        """Return the gap (m, n) that a state of creep opens beside that of the cycle, mm."""
         creep, away = self.problem.interface.creep, crept - self._crept
         return np.array([opened_by_creep(position, creep, away) for position in self.positions])
 

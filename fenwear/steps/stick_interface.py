@@ -231,7 +231,7 @@ class StickInterface(OppositeBodies):
 
 
 def meshed(bodies: OppositeBodies) -> StickInterface:
-    """Return bodies that were made from meshes, as what follows needs them.
+    """Return the bodies, which must have been made from meshes.
 
     Raises:
         ValueError: they were not.

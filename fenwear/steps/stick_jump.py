@@ -250,7 +250,7 @@ class _Jump(JumpLaw[_Moment]):
         self.then = self._cycle(end, cycles)
 
     def estimate(self, made: Attempt[_Moment]) -> tuple[Estimate, WornDepths]:
-        """Return the error of a jump, and what R leaves of it, by Simpson's rule."""
+        """Return the error of a jump, and its remainder with R, by Simpson's rule."""
         end, interface = made.end, self.problem.interface
         curved = self._beside(self.then, end) - self._at(made.cycles)
         start = replace(end, worn=end.begin - self._at(end.time).times(end.length) + curved.times(made.cycles / 6))

@@ -43,7 +43,7 @@ class StepLosses:
 
     @property
     def asks_cycle(self) -> bool:
-        """Whether a law depends on what a whole cycle does: its cross-shear, its mean pressure."""
+        """Whether a law depends on the cross-shear or the mean pressure of a whole cycle."""
         laws = self.problem.laws
         return laws is not None and (laws.asks("cs") or laws.asks("pm"))
 
@@ -116,7 +116,7 @@ class StepLosses:
         return passing.worn(records.pressure[which], begin.worn, flowed=flowed)
 
     def over(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> LayerEvolution:
-        """Return the wear of time steps by their pressures, and what they do besides.
+        """Return the wear of time steps by their pressures, with the changes of layers and laws.
 
         Args:
             records: Of time steps one after the other.

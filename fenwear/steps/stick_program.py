@@ -67,7 +67,7 @@ class Program:
     period: float
 
     def same_way(self, other: Program) -> bool:
-        """Return whether another cycle begins in the same place, with the same way to it."""
+        """Return whether another cycle has the start and the lead-in of this one."""
         return self._way == other._way
 
     def with_force(self, factor: float) -> Program:

@@ -43,7 +43,7 @@ def partial_slip_problem(
     bodies: Bodies | None = None,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
 ) -> PartialSlipProblem:
-    """Return the bodies of a case with what is done to them; collective.
+    """Return the bodies of a case with their loads and motions; collective.
 
     The condensed bodies and the bases of their temperatures are kept on disk for the next time.
 

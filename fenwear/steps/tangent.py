@@ -189,7 +189,7 @@ def _conditions(
     state: HeatState | None,
     worn: WornDepths | None,
 ) -> ContactConditions:
-    """Return the conditions of a phase, at temperatures and with what lies between at its start."""
+    """Return the conditions of a phase, at the temperatures and with the layers of its start."""
     surfaces = None if state is None else heat.exchange.contact_temperatures(state, phase - 1)
     return system.conditions(phase, pressure, surfaces, worn)
 

@@ -105,7 +105,7 @@ class Border:
         return {place: self.on(pair, strip) for place, pair in pairs.items()}
 
     def on_strip(self, strip: ContactSurface) -> ContactSurface:
-        """Return the strip's surface whose nodes stand for what of their areas is swept."""
+        """Return the strip's surface whose nodes stand for the swept parts of their areas."""
         if self.none:
             return strip
         return replace(strip, weights=self.share * strip.weights)
@@ -125,7 +125,7 @@ class Border:
 
 
 def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> ContactPair:
-    """Return the pair whose wear_projection spreads what is worn off the strip along a closed track.
+    """Return the pair whose wear_projection spreads the strip's wear along a closed track.
 
     Args:
         pair: The surfaces opposite each other.

@@ -223,7 +223,7 @@ def build_bodies(
 
 
 def with_surfaces(case: Case, bodies: Bodies) -> Bodies:
-    """Return the bodies with what their contact nodes are made of; collective."""
+    """Return the bodies with the materials of their contact nodes; collective."""
     regions = contact_regions(bodies.punch), contact_regions(bodies.strip)
     of_punch, of_strip = (
         contact_density(shares, {region: case.materials[name].density for region, name in description.regions.items()})

@@ -26,7 +26,7 @@ LAWS: dict[str, Any] = {GROSS: "fenwear.steps.gross_sliding", "coulomb": "fenwea
 
 
 def law_named(name: str) -> Any:
-    """Return a law of contact, a `ContactLaw`, by its name in cases; what a case leaves open slides as a whole."""
+    """Return a law of contact, a `ContactLaw`, by its name in cases; `auto` gives gross sliding."""
     found = LAWS[GROSS if name == AUTO else name]
     return _own(found) if isinstance(found, str) else found
 
@@ -74,7 +74,7 @@ class ContactLaw(Protocol):
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
-        """Return the system of another case of the same set-up and law, sharing what the change leaves; collective."""
+        """Return the system of another case of the same set-up and law, sharing all unchanged parts; collective."""
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa: the scale of gaps."""

@@ -296,7 +296,7 @@ class ContactSetup:
         return {**found, "v": speeds[0] if same else speeds}
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
-        """Return h_c by the pressures (n,), where what lies between gives it (`fenwear.laws.contact_conductance`)."""
+        """Return h_c by the pressures (n,), where the layer gives it (`fenwear.laws.contact_conductance`)."""
         return conductance_of(self.layers, self.case, self.bodies.regions, self.pair)
 
     def passing(
@@ -409,7 +409,7 @@ class ContactSetup:
         return pair.initial_gap + pair.opening(worn.punch, worn.strip) + between
 
     def unworn(self) -> WornDepths:
-        """Return the worn depths at the start, none, and what lies between then."""
+        """Return the worn depths at the start, none, and the initial layers."""
         return self.layers.unworn(len(self.pair.strip.weights))
 
     def mesh_update_due(self, worn: WornDepths) -> bool:

@@ -197,7 +197,7 @@ class CreepingForces(CreepingBody):
         return grid
 
     def from_other(self, other: Member, states: Array, _nodes: NDArray[np.int64]) -> Array:
-        """Return states (terms, size) of those on another grid; what loads displaced, as the loads of phases do."""
+        """Return states (terms, size) from states on another grid; the parts of loads follow the loads here."""
         assert isinstance(other, CreepingForces)
         forces, by_loads = np.split(states, [-len(other._loaded[0])], axis=1)
         shares, (q, d) = self._grid.sharing(other._grid), other._forces

@@ -178,7 +178,7 @@ def at_rim(system: ContactSetup, touched: Mask) -> bool:
 
 
 def carried(worn: WornDepths, before: Tribosystem, after: Tribosystem) -> WornDepths:
-    """Return depths and states on another grid: where it has the same nodes theirs, elsewhere those of the start."""
+    """Return depths and states on another grid: old values at common nodes, initial values elsewhere."""
     (on_punch, on_strip), start = node_maps(before, after), after.unworn()
     return replace(
         start,

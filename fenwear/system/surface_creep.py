@@ -317,7 +317,7 @@ class CreepStage:
     load: float
 
     def opening(self, gap: Array, coupling: Array | None) -> tuple[Array, Array | None]:
-        """Return gaps (m, n), mm, and a coupling (m, n, m, n), mm/MPa, with what creeps; None for no coupling."""
+        """Return gaps (m, n), mm, and a coupling (m, n, m, n), mm/MPa, with creep; None for no coupling."""
         if not self.creep.creeps:
             return gap, coupling
         own = self.creep.coupling(self.shares, self.ratios)

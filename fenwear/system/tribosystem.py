@@ -137,7 +137,7 @@ class Tribosystem(ContactSetup):
         return self._contact(sliding)
 
     def passed_contact(self, phase: int, *, capped: bool = True) -> ContactSolver:
-        """Return the contact of a phase that passes in a march, with what creeps, and what flows where it can."""
+        """Return the contact of a phase in a march, with creep and, where possible, plastic flow."""
         return self._contact(
             [SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])],
             self.layers.hardness if capped else np.inf,
@@ -155,7 +155,7 @@ class Tribosystem(ContactSetup):
         return found + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else found
 
     def unworn(self) -> WornDepths:
-        """Return the worn depths at the start, none, what lies between then, and that nothing has crept."""
+        """Return the worn depths at the start, none, with the initial layers and without creep."""
         return replace(super().unworn(), crept=self.creep.beginning())
 
     def _contact(
@@ -483,7 +483,7 @@ def mean_friction(system: ContactSetup) -> Array:
 
 
 def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Array:
-    """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
+    """Return mu times the sliding for a unit of the stroke's law (n,): friction heat is this times p v.
 
     Args:
         system: The placed bodies.

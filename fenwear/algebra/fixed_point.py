@@ -1,4 +1,4 @@
-"""Fixed points: pressures and what they themselves decide, such as coefficients or which nodes conduct.
+"""Fixed points: pressures and quantities that follow from them, such as coefficients or conducting nodes.
 
 x = g(x) is solved by Anderson's acceleration: the next x is the combination of the last ones whose
 residuals g(x) - x cancel best, which for a linear g is GMRES (Walker and Ni, SIAM J. Numer. Anal. 49,

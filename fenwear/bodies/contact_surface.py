@@ -1,7 +1,7 @@
 """The contact surface of a body: its trace as a small mesh, the same on every rank.
 
 Displacements and temperatures live on the trace nodes, pressures and heat fluxes on the pressure
-nodes. They are the same nodes where the shape functions of the trace have positive integrals at
+nodes. Both are the same nodes where the shape functions of the trace have positive integrals at
 Gauss-Lobatto nodes: on lines and quadrilaterals of any degree. Quadratic triangles have integrals of
 zero at their vertices; there the pressure lives on the vertices alone, in the dual piecewise linear
 basis psi_i = 4 lambda_i - 1. On the axis of rings a node of degree 2 or more has no weight, as 2 pi r

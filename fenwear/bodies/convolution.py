@@ -1,4 +1,4 @@
-"""Forces and displacements on a regular grid: a convolution, and what finite bodies do besides.
+"""Forces and displacements on a regular grid: a convolution, and the correction of finite bodies.
 
     C_ij = T(x_i - x_j) + sum of L(x_i) R L(x_j)^T,
 

@@ -1,4 +1,4 @@
-"""Creep at a constant Poisson's ratio: what a body's compliance grows to, without any state in its volume.
+"""Creep at a constant Poisson's ratio: the growth of a body's compliance, without any state in its volume.
 
 Where all of a body creeps alike, its displacement by forces f(t) on its surface is that of an elastic body whose
 compliance has a history (the correspondence principle; E. H. Lee, Q. Appl. Math. 13, 1955, 183),

@@ -7,7 +7,7 @@ With the rotation R that a guide takes, and the couple B that it holds it by,
     K u = f - B y,    B^T u = 0,    y = R^T f,    R^T B = 1.
 
 B is spread over the whole body as its inertia against turning would be, so that it dents nothing: M A (A^T M A)^-1 e,
-M the mass of unit density, A all rigid motions and e the rotation about the guide's axis. It has no resultant. Guides
+M the mass of unit density, A all rigid motions and e the rotation about the guide's axis. B has no resultant. Guides
 hold the mean rotation that such forces work on: what couples do and what they hold agree (Maxwell and Betti). With K^-1
 of supports that take the same rotation up at a few nodes, which y leaves unloaded,
 

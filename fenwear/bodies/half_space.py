@@ -1,6 +1,6 @@
 """A body that is large against its contact, as an elastic half-space, in the plane a half-plane; without a mesh.
 
-Each node of a regular grid has a rectangle, in the plane a strip, over which its force is spread evenly. Its
+Each node of a regular grid has a rectangle, in the plane a strip, over which its force is spread evenly. The
 displacements are known in closed form, and depend on the distance of two nodes alone: products go by fast Fourier
 transforms, numbers are looked up. With r the distance, q the tractions, u_z into the body, G and nu of the material,
 
@@ -13,7 +13,7 @@ transforms, numbers are looked up. With r the distance, q the tractions, u_z int
 
 (Flamant, Johnson sections 2.2, 2.3 and 5.6), and -+ pi (1/2 - nu) / 2 sign x between both.
 
-It leaves out all of the body that is not near the contact: supports and other boundaries, the curvature of the surface,
+The half-space leaves out all far from the contact: supports and other boundaries, the curvature of the surface,
 and what loads displace. That is of the order of the contact's width over the distance of the next boundary, and over
 the radius. The difference of the finite body is smooth at the contact: another operator could add it.
 """

@@ -14,7 +14,7 @@ at the contact: with K for the mesh without supports,
     F_j . u_i(y_j) = r_j . u_i + r_i . U_j - (K u_i - r_i) . g_j,
 
 which is symmetric in i and j but for the second term, where the half-space's own field is taken by its nodal values.
-Its error falls with twice the order of the elements. On a curved surface the half-space leaves tractions near the
+The error falls with twice the order of the elements. On a curved surface the half-space leaves tractions near the
 contact, too, of the order of its width over the radius, as Hertz's theory leaves them out: facets below the grid bear
 none, and surfaces beside it nearly in its plane bear them more and more up to twice the grid. Loads f move the contact
 likewise, F_j . u(y_j) = f . (U_j + u_j).

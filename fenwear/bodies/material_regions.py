@@ -1,4 +1,4 @@
-"""Which material regions a contact surface belongs to, and the density of what is worn off them."""
+"""Material regions of a contact surface, and the densities of their worn material."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Geometries in .geo files: the parameters of any, and what the ready ones say of themselves."""
+"""Geometries in .geo files: the parameters of any, and the descriptions of the ready ones."""
 
 from __future__ import annotations
 

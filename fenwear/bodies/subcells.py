@@ -1,4 +1,4 @@
-"""Elements of a higher degree as linear cells between their nodes: what drawing programs know."""
+"""Elements of a higher degree as linear cells between their nodes, for drawing programs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Substructuring: every rank eliminates the inside of its own cells of a body, and one rank joins what is left.
 
-A rank's own cells give a part of K. Its boundary b are the degrees of freedom that it shares with other ranks and those
+A rank's own cells give a part of K. The boundary b has the degrees of freedom that the rank shares with others, and all
 of the contact surface; the others i lie inside:
 
     S = K_bb - K_bi K_ii^-1 K_ib    by MUMPS, on each rank at once.

@@ -1,6 +1,6 @@
 """The response of bodies' surfaces to forces: operators.
 
-An operator takes forces on the nodes of a contact surface to displacements of the same nodes. It is asked for products,
+An operator takes forces on the nodes of a contact surface to displacements of the same nodes. Callers ask for products,
 for some of its numbers and for its diagonal, never for an array made in advance: what stands behind it, numbers in
 memory or a formula and a Fourier transform, is its own affair. By Maxwell and Betti it is symmetric.
 

@@ -1,4 +1,4 @@
-"""A closed track: what the strip's material carries out of the mesh warms the rest of the disc or ring, and comes back.
+"""Closed tracks: heat that the strip's material carries out of the mesh warms the rest of the ring, and comes back.
 
 Beyond the mesh it goes through a row of cells, in each of which it mixes. With the capacity C / N of one of N, its
 part G / N of the mW/K by which the track loses heat to the surroundings, F the flow of heat capacity, and what is
@@ -17,7 +17,7 @@ it decays by lambda_j. These modes carry no heat in all.
 Differences of temperature over the section of a closed track that remain until its material returns.
 
 Of material that enters the mesh through its free end, v . n < 0, a slab as thick as what enters in a second conducts
-heat over the section alone. Its modes phi_j, orthonormal in the flow of heat capacity, decay by lambda_j:
+heat over the section alone. The slab's modes phi_j, orthonormal in the flow of heat capacity, decay by lambda_j:
 
     integral of rho c |v . n| phi_i phi_j = F delta_ij,
     integral of k |v . n| grad phi_i . grad phi_j = lambda_j F delta_ij

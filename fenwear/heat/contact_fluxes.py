@@ -5,7 +5,7 @@ At a node that conducts, with the friction heat Q,
     q_1 + q_2 = (1 - gamma_d) Q,    kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2),
 
 elsewhere q_i = -h (theta_i - theta_a), and theta_i = bare_i + T_i q_i: a dense system M q = r. Of few nodes its
-solution is made into matrices, which serve many steps. It is eliminated down to q_1 and what open nodes of the second
+solution is made into matrices, which serve many steps. M is eliminated down to q_1 and what open nodes of the second
 body lose, n unknowns or a few more in place of 2 n, and kept as a factor.
 
 From one step to the next few nodes begin or cease to conduct: of M and r other rows c than those of the factor's M_0

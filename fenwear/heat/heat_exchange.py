@@ -15,7 +15,7 @@ at its end:
     theta* = E(theta),    theta' = E(theta + r (theta* - theta)),    r = (1 - gamma) / gamma,
 
 which is the L-stable, singly diagonally implicit Runge-Kutta rule of second order (Alexander, SIAM J. Numer. Anal. 14,
-1977). Its first stage counts r times in all balances.
+1977). The first stage counts r times in all balances.
 """
 
 from __future__ import annotations

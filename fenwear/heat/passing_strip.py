@@ -2,7 +2,7 @@
 
 The temperature of a strip that passes under the punch to and fro or through a cycle, in its own frame.
 
-Its mesh is fixed to its material, its ends move with it, and the source moves over it (see `fenwear.heat.passage`):
+The strip's mesh and its ends move with the material, and the source moves over it (see `fenwear.heat.passage`):
 no velocity is in its equation, so that capacity M and conductivity K are symmetric. All of its contact surface
 convects in K. Under the contact what convects is given back by the flux, with the temperature theta_c = C theta of the
 same step: with C the transfer of a step's places, W the nodes' areas and A = M / dt + K,

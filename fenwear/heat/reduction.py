@@ -2,7 +2,7 @@
 
 Only n fluxes go into a body, so its temperatures stay near the responses to these fluxes over all
 time scales, from a step to the steady state: a rational Krylov space with the time steps as poles.
-Its parts that matter are picked by the singular values in the norm of the heat capacity, scale by
+The basis takes its main parts by the singular values in the norm of the heat capacity, scale by
 scale, the slowest first: of each, what lies beside the basis so far. Of few fluxes they are picked again
 in the end, of all scales together.
 

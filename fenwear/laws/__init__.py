@@ -1,6 +1,6 @@
 """The laws of sliding: friction, wear, coatings, and what lies between the surfaces.
 
-`friction.ContactConditions` has the variables of coefficients, `local_laws.Wear` the wear of a pressure. They
+`friction.ContactConditions` has the variables of coefficients, `local_laws.Wear` the wear of a pressure. Both
 are asked in every phase of gross sliding (`fenwear.steps.phase`) and every time step of partial slip
 (`fenwear.steps.stick_losses`).
 

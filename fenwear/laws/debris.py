@@ -1,4 +1,4 @@
-"""The third body: debris that stays between the surfaces at the place where it was worn, until it is ejected.
+"""The third body: debris that stays between the surfaces at its place until it is ejected.
 
 With the depth w worn off both bodies, the thickness t of what lies at a place follows its sliding distance s:
 

@@ -9,7 +9,7 @@ g = 1 - 1/sqrt(2)
     y_1 = y + g N (M(y_1) + R(g N)),
     y_2 = y + (1 - g) N (M(y_1) + R(g N)) + g N (M(y_2) + R(N)).
 
-Its weights 1 - g and g are positive, so that no depth decreases by M, and its end y_2 is itself a solved contact. A
+The weights 1 - g and g are positive, so that no depth decreases by M. The end y_2 is itself a solved contact. A
 jump is made whole and in two halves; the halves are kept.
 
 A node that comes into contact within a step has M(y_1) = 0: all that it must lose to follow its neighbours it loses by

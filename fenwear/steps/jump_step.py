@@ -11,7 +11,7 @@ with the wear of h = g N cycles at their own pressures,
 
     gap_k = S_k p_k + H a_k + g_k + w_n + h beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
 
-and, with heat, the thermal gap at the end of each phase, which is linear in the same pressures. Its
+and, with heat, the thermal gap at the end of each phase, which is linear in the same pressures. The
 cycle begins at h - 1/2 cycles. Friction, wear and conductance are those of the stage itself: the
 pressure of each phase, and the temperature at its start. All phases meet the shape in the middle of the
 cycle, where those of a march come one after the other: they differ by the wear of half a cycle, as an

@@ -1,4 +1,4 @@
-"""Creep with stick: what bodies and layer have crept, from time step to time step, and over whole cycles.
+"""Creep with stick: displacements of bodies and layer by creep, from time step to time step, and over whole cycles.
 
 As in gross sliding (`fenwear.bodies.creep_law`), with displacements along all axes. Over a time step v, that of the
 forces of a time, changes evenly from u to v: y takes up shares a of u and b of v, and at its end a body is displaced by

@@ -1,4 +1,4 @@
-"""One time step of contact with stick: Newton's method on its equations, and what to do where it fails."""
+"""One time step of contact with stick: Newton's method on its equations, and remedies where it fails."""
 
 from __future__ import annotations
 

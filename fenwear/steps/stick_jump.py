@@ -7,7 +7,7 @@ With M(y) the wear of a cycle whose nodes slip as in the last one (`stick_frozen
 it, a jump is that of `fenwear.steps.jump_method`, as in gross sliding, where nothing is beside M.
 
 R is known from the cycle at the begin and one halfway, to which a first step with R as it is at the begin leads. A
-second step starts there; the cycle at its end begins the next jump. Its error has two
+second step starts there; the cycle at its end begins the next jump. The error has two
 parts: of M a third of the difference to one step over the whole jump, and of R Simpson's rule against the line, each as
 the last stage damps it.
 

@@ -1,4 +1,4 @@
-"""Two bodies in contact with stick: what tractions in every direction do to the relative displacement.
+"""Two bodies in contact with stick: relative displacements by tractions in every direction.
 
 In the contact frame of each node, its normal e_n first and then the d - 1 tangents, tractions f = (p, t) on
 the punch and their reactions on the strip move the punch's surface against the strip's by

@@ -7,7 +7,7 @@ dt = mu n dp + u. With the projector Q on what is unknown, and f = N x of x = (d
     Q (C N x + H a - V delta) + D x = -residual,
 
 D of slipping nodes is (|z| - r) / (r c): the derivative of the cone's projection (`cone`), solved for the slip across
-n; of nodes in contact, the slope of the compliance beside the bodies. It is solved by GMRES to some digits, from which
+n; of nodes in contact, the slope of the compliance beside the bodies. GMRES solves the system to some digits;
 Newton's method continues. The preconditioner is the inverse of C on an endless grid, restricted to the unknowns,
 between roots of 1 + D / C_ii, with the balances of forces held exactly: about as many iterations at any number of
 nodes. The sign of the determinant is not known: other solutions are not sought.

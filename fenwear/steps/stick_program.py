@@ -1,6 +1,6 @@
 """Motion and loads of the rig over a cycle, cut into time steps: displacement or force, bulk stress, loads.
 
-A cycle as a table goes row by row: its loads and the place of the strip are those of each row at the end of a step. Its
+A cycle as a table goes row by row: its loads and the place of the strip are those of each row at the end of a step. The
 displacement is the motion along the direction of the longest step; the other components of the motion are in the `way`
 of the step.
 """

@@ -1,4 +1,4 @@
-"""Two bodies joined: how their surfaces move against each other by forces on the contact, rigid motion and loads.
+"""Two bodies joined: relative displacements of their surfaces by forces on the contact, rigid motion and loads.
 
 Forces f on the punch's nodes, and their reactions on the strip, move the punch's surface against the strip's by
 

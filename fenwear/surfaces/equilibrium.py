@@ -1,4 +1,4 @@
-"""The equilibrium of the rigid modes at the interface: what pressure must balance, without any elasticity."""
+"""The equilibrium of the rigid modes at the interface: loads that pressure must balance, without any elasticity."""
 
 from __future__ import annotations
 

@@ -5,15 +5,15 @@ translation is counted in mm, a rotation in rad: then speed, wear and heat vary 
 
 Sliding of nodes around an axis that passes through the contact of a solid.
 
-At the axis nothing slides, and a node there would never wear. It stands for its area, though. Where wear is even,
+At the axis nothing slides, and a node there would never wear. The node stands for its area, though. Where wear is even,
 k p^b v^a is the same all over it, so that its mean pressure is that of a node that slides
 
     v_m = (mean of v^-m over its area)^(-1/m),    m = a / b,
 
 which also gives the heat of friction, with m = 1. An even pressure would take the mean of v^a; the two differ
 by the third order of the node's size in the worn volume. In a plane piece of the surface v = omega_n r, with r the
-distance from where the axis of its motion meets it. Its corners a, b, ... and this point x_0 span triangles, over each
-of which
+distance from where the axis of its motion meets it. The piece's corners a, b, ... and this point x_0 span triangles,
+over each of which
 
     integral of r^-m dA = A / (1 - m / 2) (integral of r^-m along the edge) / (length of the edge).
 

@@ -1,4 +1,4 @@
-"""The track of a counter-body: its border; and where it is closed, what is worn off it spreads along the whole of it.
+"""The track of a counter-body: its border, and wear that spreads along all of a closed track.
 
 The track is made of rings: circles about the axis of a rotation, or lines along a translation, identified by a
 coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. The wear of a node on its

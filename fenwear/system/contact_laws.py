@@ -1,7 +1,7 @@
 """The laws of contact by their names: each sets up bodies, steps over half-cycles and cycles, and finds their end.
 
 A law is registered here by its name in a case, `contact.law`, as the module that has it as `LAW`, or as an object by
-`register_contact_law`; nothing else in this package names one. They share the loop (`steps.driver`), the state
+`register_contact_law`; nothing else in this package names one. Laws share the loop (`steps.driver`), the state
 (`steps.run_state`), blocks, runs and results. Each law answers its differences beyond the steps: the questions are
 those of `ContactLaw`.
 """

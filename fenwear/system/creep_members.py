@@ -1,4 +1,4 @@
-"""Members that creep, bodies and a layer between them: their elastic displacements and what these open."""
+"""Members that creep, bodies and a layer between them: their elastic displacements and openings."""
 
 from __future__ import annotations
 

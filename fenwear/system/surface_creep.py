@@ -1,4 +1,4 @@
-"""Creep of the bodies and of what lies between: what the surfaces have crept opens the gap, and grows with pressure.
+"""Creep of the bodies and of layers between them: crept depths open the gap, and grow with pressure.
 
 A body that creeps has a displacement y of its contact surface for each term of its compliance (`bodies.creep_law`), at
 the patterns of its operator: of a strip that moves as a whole on its material. A layer has one of its nodes. With v_k

@@ -116,7 +116,7 @@ def test_a_solid_sticks_in_torsion(assembled: Callable[..., Tribosystem]) -> Non
         *("punch.operator=half-space", "strip.operator=half-space", "stick.steps=4", "stick.step_tolerance=1"),
         "motion={kind='oscillation', axis=[0, 0, 1], amplitude='5e-5 rad', period='1 s'}",
     )
-    (block,) = march(system, 1, block=1)
+    (block,) = march(system, 1)
     history, weights = to_dataset(block), system.pair.weights
     arm = weights * np.hypot(*system.pair.punch.x[:, :2].T)
     torque = np.hypot(history.traction.values[0, -1], history.traction_across.values[0, -1]) @ arm

@@ -42,7 +42,7 @@ from fenwear.case.program import cycle_of, speeds_of
 from fenwear.checks.surface_ends import contact_modulus
 from fenwear.common.arrays import Array
 from fenwear.common.compat import geometry_dofmap
-from fenwear.common.errors import CaseError
+from fenwear.common.errors import CaseError, readable
 from fenwear.results.history_surfaces import ContactNet, Zone
 from fenwear.surfaces import ContactPair, RigidEquilibrium
 from fenwear.surfaces.common_normal import facet_normals
@@ -330,7 +330,7 @@ def _measures(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> list[Measu
     if rigid.translations:
         used = case.used_materials
         strain = rigid.mean_pressure / min(case.initial_materials[name].young for name in used)
-        text = f"the load presses with {rigid.mean_pressure:,.3g} MPa on the whole surface"
+        text = f"the load presses with {readable(rigid.mean_pressure, 3)} MPa on the whole surface"
         estimates.append(Measure(strain, -1 if case.model.kind == "plane" else -2, 1e-9, 0.05, text))
     return estimates
 

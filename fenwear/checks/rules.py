@@ -430,7 +430,7 @@ class _Readable(Formatter):
     def format_field(self, value: Any, format_spec: str) -> Any:
         """Return a field as text."""
         text = super().format_field(value, format_spec)
-        return readable(value, 4) if "e+" in text else text
+        return readable(value, 4) if format_spec.endswith("g") and "e+" in text else text
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,9 @@ class WearRates:
 
     def without_threshold(self, pressure: float) -> Array:
         """Return the rates of a pressure (n,), mm/s, were there no thresholds."""
-        return np.sum([k * pressure**law.exponent for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
+        with np.errstate(over="ignore"):  # infinite where the exponent is far too large
+            powers = [np.float64(pressure) ** law.exponent for law in self.laws]
+        return np.sum([k * power for k, power in zip(self.rates, powers, strict=True)], axis=0)
 
     def pressure(self, rate: Array) -> Array:
         """Return the pressure (n,) that wears at a rate (n,) >= 0, at least the threshold."""

@@ -22,7 +22,8 @@ from fenwear.checks import (
 )
 from fenwear.checks.uncertain_values import values_of_steady
 from fenwear.checks.uncertainty_sources import by_short_jumps, of_mesh
-from fenwear.steps import jump
+from fenwear.steps.cycle_jumps import jump_within
+from fenwear.steps.driver import RunLimits
 from fenwear.system import with_reduced_heat
 
 Assembled = Callable[..., Tribosystem]
@@ -141,7 +142,7 @@ def test_what_jumps_leave_is_found_beside_them(assembled: Assembled, kind: str) 
     half_cycles = system.case.run.half_cycles
 
     def end(tolerance: float, *, finer: bool = False) -> Block:
-        *_, last = jump(system, half_cycles, tolerance=tolerance, finer=finer)
+        *_, last = jump_within(system, RunLimits(half_cycles), tolerance=tolerance, finer=finer)
         return last
 
     alone, exact, last = end(3e-3), end(3e-5), end(3e-3, finer=True)

@@ -150,6 +150,9 @@ def test_no_optimum(assembled: Callable[..., Tribosystem]) -> None:
     capped = assembled("example1", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}")
     with pytest.raises(ConvergenceError, match=r"would need 2\d.* pressure_cap of 20 MPa"):
         capped.optimum(1)
+    steep = assembled("example1", *small, "wear.punch={coefficient=1e-7, pressure_exponent=400}")
+    with pytest.raises(ConvergenceError, match="too large or small"):
+        steep.optimum(1)
     assert (
         np.ptp(assembled("example2", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}").optimum(1).pressure)
         < 1e-9

@@ -96,7 +96,11 @@ class ThermalContact:
             after, terms = exchange.conduct(temperature, self.phase, pressure, conductance)
             response = self._respond(conductance)
             free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
-            contact = self._contact.solve(free, contact, wearing, response.gap[None, :, None, :])
+            try:
+                contact = self._contact.solve(free, contact, wearing, response.gap[None, :, None, :])
+            except ConvergenceError:  # as no contact does at temperatures without bounds
+                exchange.check_bounds(temperature, after, float(terms[0] - terms[1]))
+                raise
             others = response.conductance, exchange.conductance(contact.pressure[0])
             exact = all(np.array_equal(other, conductance, equal_nan=True) for other in others)
             if exact:

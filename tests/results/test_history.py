@@ -16,7 +16,7 @@ from fenwear.common.arrays import Array
 from fenwear.report.run_figures import mean_pressure, nominal_width
 from fenwear.results.history import HistoryWriter, free_directory, make_directory
 from fenwear.results.stored_history import load_history
-from fenwear.steps.program_stages import Span
+from fenwear.steps.driver import RunLimits
 from fenwear.studies import run
 from fenwear.studies.run import run_case
 
@@ -182,8 +182,8 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
     """A solver that fails after two blocks: history, summary and figures of what was computed, and the error."""
     case = load_case("example1", [*SMALL, "run.half_cycles=1000"])
 
-    def failing(system: Tribosystem, how: str, span: Span, *_: object, **course: object):  # type: ignore[no-untyped-def]
-        for number, block in enumerate(march(system, span.until)):
+    def failing(system: Tribosystem, how: str, limits: RunLimits, *_: object, **course: object):  # type: ignore[no-untyped-def]
+        for number, block in enumerate(march(system, limits.half_cycles)):
             if number == 2:
                 raise ConvergenceError("DIVERGED_ON_PURPOSE")
             yield block

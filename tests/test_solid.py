@@ -48,7 +48,7 @@ def test_a_pin_that_turns_off_its_disc() -> None:
 
 def test_an_axis_that_leans() -> None:
     """A disc that turns about an axis 3 degrees off its normal would not stay under the pad."""
-    with pytest.raises(CaseError, match=r"motion\.axis: .* revolution"):
+    with pytest.raises(CaseError, match=r"^motion\.axis: "):
         place_case(load_case("brake-pad", [*COARSE, "motion.axis=[0, 0.05, 1]"]))
 
 

@@ -98,7 +98,7 @@ def test_file(tmp_path: Path) -> None:
         (["motion.columns=['time (s)', 'angle_x (deg)']"], "motion.columns: expected no column angle_x"),
         (["motion.columns=['time (s)', 'shift_y (mm)']", "contact.law=coulomb"], "no column shift_y in a plane model"),
         (["contact.law=coulomb", "stick.force=5"], "stick.force: expected none in a cycle, whose forces are columns"),
-        (["motion.rows=[[0, 1], [1, 1]]"], "the strip stays in its place"),
+        (["motion.rows=[[0, 1], [1, 1]]"], "motion.columns: the strip"),
         (["program={steps=[{distance=5}]}"], "distance: expected cycles or time"),
     ],
 )

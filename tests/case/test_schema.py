@@ -121,13 +121,12 @@ coefficient = "1e-9 1/MPa"
     assert later.wear.punch.coefficient is None
     for wrong, message in (
         ("heat.inflo", "heat.inflo: no such key; did you mean heat.inflow or"),
-        ("heat.debris", "unset: 'heat.debris' is not given in the case"),
+        ("heat.debris", r"unset: .*'heat\.debris'"),
         ("punch.loads.7", "punch.loads.7: no such key"),
         ("[1]", "unset: expected a list of keys"),
     ):
-        with pytest.raises(CaseError) as raised:
+        with pytest.raises(CaseError, match=message):
             load_case(base, [f"unset={wrong}"])
-        assert message in str(raised.value)
     own.write_text('unset = ["heat"]\n')
     with pytest.raises(CaseError, match="unset: expected with a base"):
         load_case(own)

@@ -246,8 +246,8 @@ def test_surfaces_that_never_meet(assembled: Callable[..., Tribosystem]) -> None
             r"contact.friction: expected zero or more, got .* at T = 0 K, p = 1",
         ),
         ("wear.strip={coefficient={expression='log(p - p)'}}", "wear.strip.coefficient: expected zero or more, got -i"),
-        ("wear.strip={coefficient={expression='T'}}", "wear.strip.coefficient: depends on the temperature T, which"),
-        ("contact.friction={table=[[0, 0.1], [1, 0.2]]}", "contact.friction: depends on the temperature T, which"),
+        ("wear.strip={coefficient={expression='T'}}", r"wear.strip.coefficient: .*\bheat\b"),
+        ("contact.friction={table=[[0, 0.1], [1, 0.2]]}", r"contact.friction: .*\bheat\b"),
     ],
 )
 def test_bad_input(assembled: Callable[..., Tribosystem], setting: str, message: str) -> None:

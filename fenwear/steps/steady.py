@@ -197,9 +197,9 @@ def _temperatures(state: SteadyState) -> HeatState | None:
 def _of_these_bodies(system: Tribosystem) -> SteadyState:
     """Return the state of the bodies as they are, whatever its temperatures; collective."""
     system.team.lead(lambda: _check_exists(system))
-    prepared = system.team.serve(with_reduced_heat(system))  # as which a state of one rank names its bodies
+    prepared = system.team.serve(_elastic(with_reduced_heat(system)))  # as which a state of one rank names its bodies
     _check_sinks(prepared)
-    end = _End(prepared)
+    end = _End(prepared, system.layers.hardness)
 
     def found() -> SteadyState:
         try:
@@ -208,6 +208,15 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
             raise ConvergenceError(_why_none(prepared, error)) from error
 
     return replace(prepared.team.lead(found), system=system)
+
+
+def _elastic(system: Tribosystem) -> Tribosystem:
+    """Return the system with surfaces of unlimited hardness: at the end nothing flows any more."""
+    if system.layers.hardness == np.inf:
+        return system
+    friction = system.sliding.friction
+    contact = friction.contact.model_copy(update={"hardness": None})
+    return replace(system, sliding=replace(system.sliding, friction=replace(friction, contact=contact)))
 
 
 def _why_none(system: Tribosystem, error: ConvergenceError) -> str:
@@ -321,11 +330,12 @@ class _End:
     """The end of ever so many cycles of bodies as they are; made on all ranks.
 
     Args:
-        system: The bodies, with reduced heat.
+        system: The bodies, with reduced heat, of unlimited hardness.
+        hardness: From which on surfaces flow, MPa.
     """
 
-    def __init__(self, system: Tribosystem) -> None:
-        self.system, self.stepper = system, Stepper(system, DIGITS, periodic=True)
+    def __init__(self, system: Tribosystem, hardness: float) -> None:
+        self.system, self.hardness, self.stepper = system, hardness, Stepper(system, DIGITS, periodic=True)
         above = max(law.pressure_threshold for law in system.sliding.wear)
         even = np.full((len(system.motion.phases), len(system.pair.weights)), system.interface.pressure_scale + above)
         self._rate = float(system.phases_wear.opening(even).max()) / len(even)
@@ -375,11 +385,10 @@ class _End:
     def _state(self, end: JumpMoment) -> SteadyState:
         """Return the state at the end of steps."""
         system, contact, stepper = self.system, end.contact, self.stepper
-        hardness, peak = system.layers.hardness, float(contact.pressure.max())
-        if peak >= hardness:
+        if float(contact.pressure.max()) >= self.hardness:
             raise ConvergenceError(
                 f"no cyclic steady state without plastic flow exists: its largest pressure reaches contact.hardness = "
-                f"{hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
+                f"{self.hardness:.4g} MPa. The surface would flow in every cycle. Follow it by `run`"
             )
         assert end.rate is not None
         wear, conductances = stepper.wear, end.rate.conductances

@@ -216,12 +216,14 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
             f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, "
             "and nothing wears. Reduce it, or increase the loads"
         )
-    if not np.isfinite(rate / even).all():
+    with np.errstate(all="ignore"):  # checked here
+        share = rate / even
+    if not np.isfinite(share).all():
         raise ConvergenceError(
             "no optimum: wear rates of the mean pressure are too large or small to compute. Check the wear law"
         )
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
-    y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
+    y = np.linalg.lstsq(shape * share[:, None], np.ones(n), rcond=None)[0]
     if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
         y = -resultant / np.linalg.norm(resultant)
     for ramp in RAMPS if law.threshold > 0 else (RAMP,):

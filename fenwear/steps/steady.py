@@ -9,8 +9,9 @@ with the equilibrium of each phase. Where the motion outruns the wear for ever t
 
 The steady state is the root of the change M of the state y in a cycle, up to that motion. Stages of a jump find it,
 z = y + N M(z), of N cycles each (`jump_step`): implicit Euler's steps of one length, FAR over the rate of running in.
-Each divides the distance from the end by about that factor (pseudo-transient continuation, C. T. Kelley, D. E. Keyes,
-SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states reach their ends within such a step.
+Each divides the distance from the end by about that factor, so that its change over its length is left (pseudo-transient
+continuation, C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states reach their ends
+within such a step.
 
 Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
@@ -57,8 +58,9 @@ from fenwear.system import (
 # Lengths of steps over the elastic gap of the mean pressure by its wear of a cycle; from afar they grow.
 FAR = 1e3
 NEAR = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-MOST, RESTING = 12, 1e-8  # steps that far; change of the shape in one over the elastic gap, that ends them
+MOST, RESTING = 12, 1e-9  # steps that far; what is left of the way to the end over the elastic gap, that ends them
 DIGITS = 1e-9  # of contacts and heat
+NEARLY = 1e-4 / DIGITS  # of these digits: what contacts on the way are solved to
 APART = 1e-9  # of gaps by rigid motions: what is rounding
 ALONG = 1e-9  # cosine between loads and a motion: what is along none
 ZERO = 1e-12  # of the largest: a velocity that is rounding
@@ -349,9 +351,9 @@ class _End:
         if self._rate == 0:
             raise ConvergenceError(NOTHING_WEARS)
         wear = self.system.phases_wear
-        if wear.punch.linear and wear.strip.linear:
-            with suppress(ConvergenceError):
-                return self._state(self._resting(NEAR[::2] if self.system.motion.steps else ()))
+        easy = wear.punch.linear and wear.strip.linear and not self.system.motion.steps
+        with suppress(ConvergenceError):
+            return self._state(self._resting(() if easy else NEAR[::2]))
         return self._state(self._resting(NEAR))
 
     def _resting(self, lengths: Sequence[float]) -> JumpMoment:
@@ -359,12 +361,14 @@ class _End:
         system, interface, begin = self.system, self.system.interface, beginning(self.system)
         gap = interface.pressure_scale * interface.elastic_length
         at = self.stepper.moment(replace(begin, worn=begin.worn + self._coatings))
-        for length in (*lengths, *(FAR,) * MOST):
-            then = self.stepper.stage(at, length * gap / self._rate, 0.0, at.contact, FINE)
+        near, far = [(length, NEARLY) for length in (*lengths, FAR)], [(FAR, FINE)] * MOST
+        for length, digits in (*near, *far):
+            then = self.stepper.stage(at, length * gap / self._rate, 0.0, at.contact, digits)
             touched = then.contact.pressure.max(axis=0) > 0
             moved = _rigid_part(system, self._shape(then.worn), touched)
             changed = self._shape(then.worn) - self._shape(at.worn)
-            if np.abs(changed - _rigid_part(system, changed, touched))[touched].max() <= RESTING * gap:
+            change = np.abs(changed - _rigid_part(system, changed, touched))[touched].max()
+            if digits == FINE and change <= length * RESTING * gap:
                 return then
             at = then if system.coated else replace(then, worn=replace(then.worn, punch=then.worn.punch - moved))
         raise ConvergenceError(f"the cyclic steady state did not converge in {MOST} steps")

@@ -310,11 +310,11 @@ class CondensedContact:
         return f
 
     def _rounding(self) -> float:
-        """Return the norm of the wear of a step at the mean pressure, over the elastic gap: thousands in long steps."""
+        """Return the wear of a step at the mean pressure over the elastic gap: thousands where bodies are stiff."""
         if self._wearing is None:
             return 1.0
         mean = np.full(self.shape, self._pressure_scale)
-        return float(np.abs(self._wearing.opening(mean)).max() * np.sqrt(mean.size)) / self._gap_scale
+        return float(np.abs(self._wearing.opening(mean)).max()) / self._gap_scale
 
     @cached_property
     def _linear(self) -> Operator:

@@ -298,7 +298,8 @@ class Inequality:
         x: Array = start.copy()
         self.singular = False
         limit = snes.getTolerances()[3]
-        snes.setTolerances(atol=self._tolerance, max_it=limit if most is None else min(most, limit))
+        rounding = EPSILON * self._rounding() * np.sqrt(len(x))  # of the norm of as many rows
+        snes.setTolerances(atol=max(TOLERANCE, rounding), max_it=limit if most is None else min(most, limit))
         try:
             snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
         except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it

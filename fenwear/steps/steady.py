@@ -9,9 +9,8 @@ with the equilibrium of each phase. Where the motion outruns the wear for ever t
 
 The steady state is the root of the change M of the state y in a cycle, up to that motion. Stages of a jump find it,
 z = y + N M(z), of N cycles each (`jump_step`): implicit Euler's steps of one length, FAR over the rate of running in.
-Each divides the distance from the end by about that factor, so that its change over its length is left (pseudo-transient
-continuation, C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states reach their ends
-within such a step.
+Each divides the distance from the end by about that factor (pseudo-transient continuation, C. T. Kelley, D. E. Keyes,
+SIAM J. Numer. Anal. 35, 1998). Heat, creep, layers and states reach their ends within such a step.
 
 Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
@@ -58,7 +57,7 @@ from fenwear.system import (
 # Lengths of steps over the elastic gap of the mean pressure by its wear of a cycle; from afar they grow.
 FAR = 1e3
 NEAR = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-MOST, RESTING = 12, 1e-9  # steps that far; what is left of the way to the end over the elastic gap, that ends them
+MOST, RESTING = 12, 1e-10  # steps that far; what a step leaves of the way to the end over the elastic gap
 DIGITS = 1e-9  # of contacts and heat
 NEARLY = 1e-4 / DIGITS  # of these digits: what contacts on the way are solved to
 APART = 1e-9  # of gaps by rigid motions: what is rounding

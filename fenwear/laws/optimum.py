@@ -160,11 +160,11 @@ class WearRates:
         """Return W (n,), mm/s, of pressures (n,)."""
         return np.sum([k * law.value(pressure) for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
 
+    @np.errstate(over="ignore")
     def without_threshold(self, pressure: float) -> Array:
-        """Return the rates of a pressure (n,), mm/s, were there no thresholds."""
-        with np.errstate(over="ignore"):  # infinite where the exponent is far too large
-            powers = [np.float64(pressure) ** law.exponent for law in self.laws]
-        return np.sum([k * power for k, power in zip(self.rates, powers, strict=True)], axis=0)
+        """Return the rates of a pressure (n,), mm/s, were there no thresholds; infinite where they overflow."""
+        size = np.float64(pressure)
+        return np.sum([k * size**law.exponent for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
 
     def pressure(self, rate: Array) -> Array:
         """Return the pressure (n,) that wears at a rate (n,) >= 0, at least the threshold."""
@@ -216,14 +216,12 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
             f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, "
             "and nothing wears. Reduce it, or increase the loads"
         )
-    with np.errstate(all="ignore"):  # checked here
-        share = rate / even
-    if not np.isfinite(share).all():
+    if not (np.isfinite(even).all() and np.isfinite(rate / even).all()):
         raise ConvergenceError(
             "no optimum: wear rates of the mean pressure are too large or small to compute. Check the wear law"
         )
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
-    y = np.linalg.lstsq(shape * share[:, None], np.ones(n), rcond=None)[0]
+    y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
     if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
         y = -resultant / np.linalg.norm(resultant)
     for ramp in RAMPS if law.threshold > 0 else (RAMP,):

@@ -398,7 +398,7 @@ class _End:
         weights, motion, worn = system.pair.weights, system.motion, wear.opening(contact.pressure)[0]
         if worn.max() <= DIGITS * self._rate:
             raise ConvergenceError(NOTHING_WEARS)
-        touched = (contact.pressure > 0).any(axis=0)
+        touched = contact.pressure.max(axis=0) > 0
         capped = contact.pressure[contact.pressure > 0] >= (1 - DIGITS) * wear.cap
         per_area = any(law.per_area is not None for law in system.sliding.wear)
         if (not per_area and capped.all()) or (len(contact.pressure) == 1 and capped.any()):

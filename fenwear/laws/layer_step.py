@@ -187,9 +187,9 @@ class LayerStep:
         found = self._worn.local(pressure)
         if found is None:
             return None
-        if self.passing.layers.softens:
-            found = found * self._felt(pressure)[0].mean(axis=0)  # of all phases: a step to the solution
-        return self._length * found - self._covered(pressure)
+        softens = self.passing.layers.softens
+        share = self._felt(pressure)[0].mean(axis=0) if softens else 1.0  # of all phases: a step to the solution
+        return self._length * share * found - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of the openings L_k R_j by pressures in all phases."""

@@ -123,7 +123,7 @@ class PhaseMeter:
             wear: Of this phase alone.
         """
         rubbed = mu * pressure
-        parts = [*(self._by_pressure @ pressure).tolist(), *(self._by_friction @ rubbed).tolist()]
+        parts = [*map(float, self._by_pressure @ pressure), *map(float, self._by_friction @ rubbed)]
         for own, weigh in zip((wear.punch, wear.strip), self._weigh, strict=True):
             parts += (weigh @ own.depth(pressure[None])[0]).tolist()
         force, moved, path, carried, x, y, z, work, dragged, by_x, by_y, by_z, *worn = parts

@@ -354,7 +354,8 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     """
     position = problem.interface.creep.grown(problem.interface.middle, np.inf)
     x, n, zone = position.pair.x, len(problem.weights), np.arange(first, last + 1)
-    pairs = ((last if side > 0 else first) + side * np.array(AWAY)).tolist()
+    end = last if side > 0 else first
+    pairs = [(end + side * one, end + side * other) for one, other in AWAY]
     inside = [pair for pair in pairs if min(pair) >= 0 and max(pair) < n]
     if not inside:
         return None

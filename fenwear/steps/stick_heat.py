@@ -124,9 +124,9 @@ class StickHeat:
         exchange, dim = self.exchange, sum(len(basis) for basis in self.exchange.bases)
         through: Array = np.eye(dim)
         source: Array = np.zeros(dim)
-        for number, (heat, conductance) in enumerate(zip(heats, conductances, strict=True)):
-            through, _ = exchange.change(number, conductance, changes=through)
-            source = exchange.conduct(exchange.at(source), number, heat, conductance)[0].values
+        for number in range(len(heats)):
+            through, _ = exchange.change(number, conductances[number], changes=through)
+            source = exchange.conduct(exchange.at(source), number, heats[number], conductances[number])[0].values
         return CycleMap(through, source)
 
 

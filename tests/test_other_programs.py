@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import load_case
+from fenwear import load_case, sweep
 from fenwear.files.height_maps import read_heights
 from fenwear.studies import Forward, forward
 
@@ -94,3 +94,16 @@ def test_surface_topography_reads_a_map(tmp_path: Path) -> None:
     assert [len(axis) for axis in found.places] == [6, 4]
     assert np.ptp(found.heights) == pytest.approx(6e-3, rel=1e-9)
     assert np.diff(found.places[0])[0] == pytest.approx(5e-4, rel=1e-9)
+
+
+def test_a_sweep_on_dask(tmp_path: Path) -> None:
+    """A local cluster of dask computes the rows that this process computes alone."""
+    distributed = pytest.importorskip("distributed")
+    case = load_case("example1", ["geometry.degree=1", "geometry.parameters.elements_along_contact=8"])
+    over = {"contact.friction": [0.1, 0.2, 0.25]}
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=tmp_path
+    )
+    with distributed.Client(cluster).get_executor() as executor:
+        found = sweep(case, over, executor=executor, folder=tmp_path / "out")
+    np.testing.assert_array_equal(found.pressure, sweep(case, over).pressure)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import random
 import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import AbstractContextManager
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -119,31 +118,15 @@ def test_killed_at_ten_moments(forks: str, tmp_path: Path) -> None:
         study.outcomes(Nothing(), runs, study.open(load_case("example1"), "key"))
 
 
-def pool(_: Path) -> AbstractContextManager[Executor]:
-    """Return processes of the standard library."""
-    return ProcessPoolExecutor(2, get_context("spawn"))
-
-
-def dask(folder: Path) -> AbstractContextManager[Executor]:
-    """Return the executor of a local cluster of dask."""
-    distributed = pytest.importorskip("distributed", reason="pip installs it: docker/fenwear test --wheel")
-    cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=folder
-    )
-    executor: AbstractContextManager[Executor] = distributed.Client(cluster).get_executor()
-    return executor
-
-
 @pytest.fixture(scope="module")
 def alone() -> xarray.Dataset:
     """Return a sweep by this process."""
     return sweep(load_case("example1", SMALL), OVER)
 
 
-@pytest.mark.parametrize("make", [pool, dask])
-def test_executors(make: Callable[[Path], Any], alone: xarray.Dataset, tmp_path: Path) -> None:
-    """Whoever computes the variants: equal rows."""
-    with make(tmp_path) as executor:
+def test_executor_of_processes(alone: xarray.Dataset, tmp_path: Path) -> None:
+    """Processes of the standard library compute equal rows; `tests/test_other_programs.py` has dask."""
+    with ProcessPoolExecutor(2, get_context("spawn")) as executor:
         found = sweep(load_case("example1", SMALL), OVER, executor=executor, folder=tmp_path / "out")
     xarray.testing.assert_equal(found.drop_vars("seconds"), alone.drop_vars("seconds"))
 

@@ -57,7 +57,7 @@ from fenwear.system import (
 # Lengths of steps over the elastic gap of the mean pressure by its wear of a cycle; from afar they grow.
 FAR = 1e3
 NEAR = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-MOST, RESTING = 12, 1e-10  # steps that far; what a step leaves of the way to the end over the elastic gap
+MOST, RESTING = 12, 1e-8  # steps that far; change of the shape in a step over the elastic gap, that ends them
 DIGITS = 1e-9  # of contacts and heat
 NEARLY = 1e-4 / DIGITS  # of these digits: what contacts on the way are solved to
 APART = 1e-9  # of gaps by rigid motions: what is rounding
@@ -367,7 +367,7 @@ class _End:
             moved = _rigid_part(system, self._shape(then.worn), touched)
             changed = self._shape(then.worn) - self._shape(at.worn)
             change = np.abs(changed - _rigid_part(system, changed, touched))[touched].max()
-            if digits == FINE and change <= length * RESTING * gap:
+            if digits == FINE and change <= RESTING * gap:
                 return then
             at = then if system.coated else replace(then, worn=replace(then.worn, punch=then.worn.punch - moved))
         raise ConvergenceError(f"the cyclic steady state did not converge in {MOST} steps")

@@ -228,7 +228,7 @@ class Inequality:
                     f = self._function(x)
                 rest = f if free is None else f[free]
                 size = float(rest @ rest) ** 0.5
-                small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
+                small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance())
                 if small and self._wanted(x, f, free) == key:
                     self.residual = f
                     return x
@@ -262,14 +262,13 @@ class Inequality:
         held = ~np.frombuffer(key, dtype=bool)
         x[held] = np.where(x[held] >= self._upper[held], self._upper[held], self._lower[held])
 
-    @property
-    def _tolerance(self) -> float:
-        """Of the residual, where rounding leaves more than `TOLERANCE`."""
-        return max(TOLERANCE, EPSILON * self._rounding())
+    def _tolerance(self, rows: int = 1) -> float:
+        """Return the tolerance of the residual's norm, where rounding of so many rows leaves more than `TOLERANCE`."""
+        return max(TOLERANCE, EPSILON * self._rounding() * float(np.sqrt(rows)))
 
     def _improved(self, start: Array) -> Array | None:
         """Return the solution by some digits after each other; None where they do not come."""
-        x, least = start.copy(), max(CLOSE, self._tolerance)
+        x, least = start.copy(), max(CLOSE, self._tolerance())
         below = max(self.close, least)
         f = self._function(x)
         for self.iterations in range(ROUNDS):
@@ -298,8 +297,7 @@ class Inequality:
         x: Array = start.copy()
         self.singular = False
         limit = snes.getTolerances()[3]
-        rounding = EPSILON * self._rounding() * np.sqrt(len(x))  # of the norm of as many rows
-        snes.setTolerances(atol=max(TOLERANCE, rounding), max_it=limit if most is None else min(most, limit))
+        snes.setTolerances(atol=self._tolerance(len(x)), max_it=limit if most is None else min(most, limit))
         try:
             snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
         except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it

@@ -196,8 +196,9 @@ def _stationary_growth(
     drift = change / system.motion.period
     if drift > APART * abs(rate):
         return None, (
-            f"pressures still drift by {100 * drift:.2g} % per second, more than a tenth of the "
-            f"{100 * abs(rate):.2g} % by which disturbances {'grow' if rate > 0 else 'decay'}. {LONGER}"
+            f"pressures still drift by {100 * drift:.2g} % per second. Disturbances "
+            f"{'grow' if rate > 0 else 'decay'} by {100 * abs(rate):.2g} % per second, "
+            f"and a drift above a tenth of that hides them. {LONGER}"
         )
     return rate, ""
 

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -351,9 +350,11 @@ class _End:
             raise ConvergenceError(NOTHING_WEARS)
         wear = self.system.phases_wear
         easy = wear.punch.linear and wear.strip.linear and not self.system.motion.steps
-        with suppress(ConvergenceError):
-            return self._state(self._resting(() if easy else NEAR[::2]))
-        return self._state(self._resting(NEAR))
+        try:
+            end = self._resting(() if easy else NEAR[::2])
+        except ConvergenceError:
+            end = self._resting(NEAR)
+        return self._state(end)
 
     def _resting(self, lengths: Sequence[float]) -> JumpMoment:
         """Return the end of steps of these lengths, and then of FAR, when the shape rests but for a rigid motion."""

@@ -25,7 +25,7 @@ import numpy as np
 
 from fenwear import assemble, jump, load_case, march, steady, vary
 from fenwear.steps.stick_final import final_shape
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 ELEMENTS = 30 if COARSE else 40

@@ -17,7 +17,7 @@ source is a contribution of its own, and their sum bounds what they come to toge
     mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements; of a
                  contact grid, with every second or fourth of its nodes;
     wear steps   of marched half-cycles by what they wear; of jumps by their own errors, which continue from jump to
-                 jump (`fenwear.steps.cycle_jumps`), in the run that the mesh is compared with, by their fields;
+                 jump (`fenwear.steps.evolve`), in the run that the mesh is compared with, by their fields;
                  temperatures by half of what the last cycle changes at least, as jumps see whole cycles;
     positions    of the strip in a half-cycle, from the same run with half as many;
     following    of meshes that follow the wear, from the same run in which they follow half as often;

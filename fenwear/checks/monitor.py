@@ -15,7 +15,7 @@ from fenwear.steps.stick_program import passes
 from fenwear.system import Tribosystem
 
 if TYPE_CHECKING:
-    from fenwear.steps.stick_records import TimeStepRecords
+    from fenwear.steps.stick_state import TimeStepRecords
 
 STEPS, CHANGE, DIFFERENCE = "heat_steps", "heat_change_by_halving_steps", "heat_difference_from_whole_mesh"
 GAIN = "heat_gain"

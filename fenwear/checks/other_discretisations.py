@@ -14,8 +14,7 @@ from fenwear.checks.uncertain_values import Values, values_of
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError
 from fenwear.steps import Block, Span, follow_program
-from fenwear.steps.cycle_jumps import jump_within
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.run_state import RunState
 from fenwear.system import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
 

@@ -299,7 +299,7 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
 
 
 def by_short_jumps(last: Block) -> Block:
-    """Return the end of a run as short jumps would have it (`fenwear.steps.cycle_jumps`); as it is where not followed.
+    """Return the end of a run as short jumps would have it (`fenwear.steps.evolve`); as it is where not followed.
 
     Its last half-cycle alone, and the pressures of the last cycle. With stick temperatures are those of the run, whose
     jumps know of them only how far the last one is off.

@@ -235,7 +235,7 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     from fenwear.checks import RULES, Seen, law_warnings, unique_text
     from fenwear.results.time_steps import REGIMES, regime_of
     from fenwear.steps.stick_interface import meshed
-    from fenwear.steps.stick_records import TimeStepRecords
+    from fenwear.steps.stick_state import TimeStepRecords
 
     system.check_touching()
     problem = system.law_state.problem

@@ -182,7 +182,7 @@ def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
         ConvergenceError: nothing sticks.
     """
     from fenwear.results.quantity import degrees_of
-    from fenwear.steps.run_totals import approach
+    from fenwear.steps.run_state import approach
     from fenwear.surfaces.sliding_chart import sliding_chart
 
     system.check_touching()

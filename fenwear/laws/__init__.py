@@ -2,7 +2,7 @@
 
 `friction.ContactConditions` has the variables of coefficients, `local_laws.Wear` the wear of a pressure. Both
 are asked in every phase of gross sliding (`fenwear.steps.phase`) and every time step of partial slip
-(`fenwear.steps.stick_losses`).
+(`fenwear.steps.stick_cycle`).
 
 `layers.Layers` is all that lies between: debris, compliant layers, states that laws remember (`law_states`).
 """

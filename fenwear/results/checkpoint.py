@@ -32,8 +32,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import WornDepths
 from fenwear.results.disk import check_room, replacing
-from fenwear.steps.run_state import RunState
-from fenwear.steps.run_totals import none_yet
+from fenwear.steps.run_state import RunState, none_yet
 from fenwear.system import Tribosystem, grows, regridded, renewed
 
 FILE = "checkpoint.npz"

@@ -32,7 +32,7 @@ from fenwear.results import checkpoint
 from fenwear.steps import march
 from fenwear.steps.coulomb import Steps
 from fenwear.steps.run_state import all_phases
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.surfaces.motion import Motion
 from fenwear.system import (
     ContactSetup,

@@ -1,6 +1,6 @@
 """Numbers of a tribometer's sheet, of every half-cycle and of a whole run: volumes, rates, scars, forces, work.
 
-Depths belong to the shape, all else to what has been added up, see `fenwear.steps.run_totals`:
+Depths belong to the shape, all else to what has been added up, see `fenwear.steps.run_state`:
 
     normal force         F, the load: what the contact carries along the approach of the bodies, mean of the half-cycle;
     pressure integral    of p over the contact, mean of the half-cycle: more than F where the contact is curved;

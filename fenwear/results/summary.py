@@ -32,7 +32,7 @@ from fenwear.results.history_surfaces import ContactNet, at_places, conforming, 
 from fenwear.results.quantity import degrees_of, numbers
 from fenwear.results.registry import quantities_of
 from fenwear.steps import Block
-from fenwear.steps.run_totals import SUMS, approach
+from fenwear.steps.run_state import SUMS, approach
 from fenwear.steps.steady_cycle import SteadyCycle
 from fenwear.system import ContactSetup, Tribosystem
 

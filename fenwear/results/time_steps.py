@@ -27,7 +27,7 @@ from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.steps import Block
 from fenwear.steps.block import BlockHeat
 from fenwear.steps.run_state import all_phases
-from fenwear.steps.stick_edge import beside, stick_edges, zone_width
+from fenwear.steps.stick_final import beside, stick_edges, zone_width
 from fenwear.steps.stick_position import along_sliding, directions
 from fenwear.surfaces import ContactPair
 from fenwear.surfaces.placement import in_space
@@ -35,7 +35,7 @@ from fenwear.system import Tribosystem
 
 if TYPE_CHECKING:
     from fenwear.steps.coulomb import Steps
-    from fenwear.steps.stick_records import TimeStepRecords
+    from fenwear.steps.stick_state import TimeStepRecords
     from fenwear.system import ContactSetup
 
 STEP = "step"

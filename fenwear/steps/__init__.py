@@ -5,13 +5,12 @@ which of them a case asks for is read in `evolve.integrate`. The law of contact 
 is one, whose wear is taken off in `phase` and over many cycles in `jump_step`; `coulomb` with stick is the other.
 
 Modules `stick_*` belong to the latter: which nodes stick, slip or open is decided in `stick_equations`, a time step of
-it solved in `stick_increment`; `stick_cycle` goes through the steps of a cycle and keeps their `stick_records`; what
-they wear and leave between is in `stick_losses`, many cycles in `stick_jump`, the end in `stick_final`.
+it solved in `stick_increment`; `stick_cycle` goes through the steps of a cycle, records them, and has their wear;
+states and records are in `stick_state`, many cycles in `stick_jump`, the end in `stick_final`.
 """
 
 from fenwear.steps.block import Block
-from fenwear.steps.cycle_jumps import jump
-from fenwear.steps.evolve import evolve, integrate, march
+from fenwear.steps.evolve import evolve, integrate, jump, march
 from fenwear.steps.monotonic import Monotonic, monotonic
 from fenwear.steps.program_stages import Span, at_step, follow_program, held
 from fenwear.steps.slow_changes import Renewal, follow

@@ -18,8 +18,7 @@ from fenwear.contact.complementarity import complementarity_error
 from fenwear.heat.heat_exchange import TERMS
 from fenwear.laws.sliding_tensors import SlidingTensor
 from fenwear.laws.wear import WornDepths
-from fenwear.steps.run_state import RunState, pressure_scales
-from fenwear.steps.run_totals import Totals, stacked
+from fenwear.steps.run_state import RunState, Totals, pressure_scales, stacked
 from fenwear.surfaces import RigidEquilibrium
 from fenwear.system import Tribosystem
 

@@ -22,13 +22,11 @@ from fenwear.laws.wear import WornDepths
 from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.steps.driver import Loading, Watch
 from fenwear.steps.gross_sliding import LAW as SLIDING
-from fenwear.steps.run_state import RunState
-from fenwear.steps.run_totals import SUMS, Totals, approach, with_worn
+from fenwear.steps.run_state import SUMS, RunState, Totals, approach, with_worn
 from fenwear.steps.stick_cycle import PartialSlipProblem, on_other_grid
 from fenwear.steps.stick_final import FinalShape, final_shape
 from fenwear.steps.stick_interface import StickInterface, meshed
 from fenwear.steps.stick_jump import first_cycle, jumped
-from fenwear.steps.stick_records import FrettingCycle, TimeStepRecords
 from fenwear.steps.stick_setup import (
     Ends,
     Fineness,
@@ -40,7 +38,7 @@ from fenwear.steps.stick_setup import (
     unheated_problem,
     with_ends,
 )
-from fenwear.steps.stick_state import NO_HEAT, PartialSlipState
+from fenwear.steps.stick_state import NO_HEAT, FrettingCycle, PartialSlipState, TimeStepRecords
 from fenwear.surfaces.motion import Motion, make_motion
 from fenwear.system import (
     Bodies,
@@ -364,7 +362,7 @@ class HalfCycles(_Run):
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = begin.pressures[own]
-        lost = problem.losses.worn(records, begin)
+        lost = problem.worn(records, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)
         totals = state.totals + adds
@@ -421,7 +419,7 @@ class Jumps(_Run):
         at_all = np.asarray(stuck.all(axis=0))
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
-        lost = [problem.losses.worn(then.records, then.begin, which) for *_, which in parts]
+        lost = [problem.worn(then.records, then.begin, which) for *_, which in parts]
         adds = [self.meter(records, first, own) for (first, records, _), own in zip(parts, lost, strict=True)]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
@@ -509,7 +507,7 @@ def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[i
 
 
 class Meter:
-    """Additions of time steps to the totals: see `fenwear.steps.run_totals`.
+    """Additions of time steps to the totals: see `fenwear.steps.run_state`.
 
     Args:
         system: The bodies.

@@ -24,8 +24,7 @@ from fenwear.steps.driver import Loading, Watch
 from fenwear.steps.jump_method import Attempt, Estimate, Lengths
 from fenwear.steps.jump_step import Stepper
 from fenwear.steps.phase import PhaseEnd, PhaseStep
-from fenwear.steps.run_state import RunState, all_phases, carried_by
-from fenwear.steps.run_totals import Totals
+from fenwear.steps.run_state import RunState, Totals, all_phases, carried_by
 from fenwear.steps.steady import SteadyState, steady_state
 from fenwear.surfaces.motion import DEFAULT_POSITIONS
 from fenwear.system import (

@@ -49,7 +49,7 @@ from fenwear.common.errors import CaseError, ConvergenceError, InputError
 from fenwear.steps.run_state import pressure_scale
 from fenwear.steps.steady import SteadyState, steady
 from fenwear.steps.stick_final import FinalShape
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.surfaces import is_translation
 from fenwear.system import Tribosystem
 from fenwear.system.variants import with_case

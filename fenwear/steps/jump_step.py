@@ -36,8 +36,7 @@ from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord, heat_of_p
 from fenwear.steps.coupled_phases import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.steps.driver import Loading, Watch, as_given, unwatched
 from fenwear.steps.jump_method import HALVES, Attempt, Estimate, JumpLaw, Moment, Sizes, attempt
-from fenwear.steps.run_state import RunState, all_phases, beginning, parted
-from fenwear.steps.run_totals import PhaseMeter, Totals, with_coated
+from fenwear.steps.run_state import PhaseMeter, RunState, Totals, all_phases, beginning, parted, with_coated
 from fenwear.system import CreepStage, Tribosystem, with_reduced_heat
 
 LOOSEST = 5e-3  # tolerance that contacts are solved to: of a rough run, too, they are told to fulfil their conditions

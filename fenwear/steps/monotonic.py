@@ -13,7 +13,7 @@ import numpy as np
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.heat.temperature import HeatState
-from fenwear.steps.temperature_properties import with_own_properties
+from fenwear.steps.slow_changes import with_own_properties
 from fenwear.system import Tribosystem, steady_exchange
 
 DIRECTIONS = (-1, 1)

@@ -17,7 +17,7 @@ track. Under a punch that goes to and fro the strip's track deepens for ever, mo
 position touches it: there is no state that repeats.
 
 Where properties of materials depend on the temperature, state and bodies follow each other; see
-`fenwear.steps.temperature_properties`.
+`fenwear.steps.slow_changes`.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import STIFF, WornDepths
 from fenwear.steps.block import Block
 from fenwear.steps.coupled_phases import end_temperatures
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.jump_method import FINE
 from fenwear.steps.jump_step import JumpMoment, Stepper
 from fenwear.steps.program_stages import at_step
 from fenwear.steps.run_state import RunState, beginning, pressure_scale
-from fenwear.steps.temperature_properties import with_own_properties
+from fenwear.steps.slow_changes import with_own_properties
 from fenwear.system import (
     Tribosystem,
     friction_power,

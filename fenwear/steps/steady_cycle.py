@@ -13,7 +13,7 @@ from fenwear.common.arrays import Array
 from fenwear.heat.heat_exchange import CROSSING, TERMS
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.block import BlockHeat
-from fenwear.steps.run_totals import Totals, phase_totals, stacked
+from fenwear.steps.run_state import Totals, phase_totals, stacked
 from fenwear.steps.steady import SteadyState
 from fenwear.system import Tribosystem
 

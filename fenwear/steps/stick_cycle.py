@@ -8,33 +8,37 @@ continue to stick.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
+from fenwear.laws import Evolution, LayerEvolution
 from fenwear.laws.coating import CoatedBody
-from fenwear.laws.local_laws import LocalLaws, LocalWear
-from fenwear.laws.wear import WornDepths
+from fenwear.laws.friction import ContactConditions
+from fenwear.laws.local_laws import LocalLaws, LocalWear, phases_wear
+from fenwear.laws.sliding_tensors import CycleShear, SlidingWays
+from fenwear.laws.wear import PhasesWear, WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
-from fenwear.steps.stick_losses import BARE, StepLosses
-from fenwear.steps.stick_position import LoadEffect, Position
+from fenwear.steps.stick_position import LoadEffect, Position, surface_strain
 from fenwear.steps.stick_program import Program, TimeStep
-from fenwear.steps.stick_records import TimeStepRecords, record
-from fenwear.steps.stick_state import NO_SHIFT, Imposed, PartialSlipState, StickState
+from fenwear.steps.stick_state import NO_HEAT, NO_SHIFT, Imposed, PartialSlipState, StickState, TimeStepRecords
+from fenwear.surfaces import ContactPair
 from fenwear.surfaces.placement import HERE, Placement, in_model
 from fenwear.surfaces.sliding_field import Screw
 from fenwear.system import on_nodes
 
 T = TypeVar("T")
+ALL = slice(None)  # time steps of a record
+BARE = CoatedBody(np.zeros(1), np.ones(1))  # without a coating
 MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
 
 
@@ -70,11 +74,6 @@ class PartialSlipProblem:
     def weights(self) -> Array:
         """Areas of the contact nodes (n,)."""
         return self.interface.middle.pair.weights
-
-    @property
-    def losses(self) -> StepLosses:
-        """Wear of the time steps."""
-        return StepLosses(self)
 
     def led(self, function: Callable[[], T]) -> T:
         """Call the function that continues from condensed bodies, on rank 0 for all; collective.
@@ -218,8 +217,8 @@ class PartialSlipProblem:
 
     def _step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         after = self._stepped(at, step)
-        made = record(self.interface, self.heat, at, after, step)
-        evolution = self.losses.evolution(made, at)
+        made = self._record(at, after, step)
+        evolution = self.evolution(made, at)
         if evolution is None:
             return after, made
         return replace(after, held=evolution.after(at.held or self.interface.layers.held(at.worn))), made
@@ -233,7 +232,7 @@ class PartialSlipProblem:
             conditions = laws.conditions(
                 position.pair,
                 pressure,
-                **self.losses.at_start(at),
+                **self.at_start(at),
                 states=layers.known(position.pair, at.worn, at.held),
                 debris=layers.facing(position.pair, at.worn),
                 touching=at.contact.pressure > 0,  # in the step before: nodes that open and close in turn end nowhere
@@ -266,6 +265,179 @@ class PartialSlipProblem:
     def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
         worn = self.interface.layers.flown(at.worn, state.flowed)
         return at.then(state, replace(imposed, closure=None), worn, step.duration)  # it follows from the depths
+
+    def _record(self, at: PartialSlipState, after: PartialSlipState, step: TimeStep) -> TimeStepRecords:
+        """Return the record of a time step between two states."""
+        state, position = after.contact, self.interface.position(step.offset)
+        weights, (work, stored) = position.pair.weights, self._work(position, at, after)
+        values = (
+            state.displacement,
+            state.force,
+            state.pressure,
+            state.traction,
+            state.slip,
+            state.gap,
+            work,
+            stored,
+            state.heat,
+            weights @ (state.pressure * state.approach),
+            surface_strain(position, self.interface.gradient, state.on_strip),
+            float(state.iterations),
+            state.unique,
+            step.duration,
+            *self._heat_of(at, after),
+            float(after.coupling),
+            state.rigid,
+            state.flowed,
+        )
+        return TimeStepRecords(*(np.asarray(value)[None] for value in values))
+
+    def _work(self, position: Position, at: PartialSlipState, after: PartialSlipState) -> tuple[float, float]:
+        """Return the work of rig and loads in a time step in a place of the strip, and the energy that bodies store."""
+        interface, before, state = self.interface, at.contact, after.contact
+        f = np.concatenate([state.pressure, state.traction.T.ravel()])
+        force, back = position.forces(f)
+        on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
+        layers, closure = interface.layers, interface.layers.closure_at(position.pair, at.worn)
+        closed = layers.given(state.pressure, closure) - layers.given(before.pressure, closure)
+        if interface.creep.creeps:
+            crept = zip(*map(interface.creep.displaced, (state.crept, before.crept)), strict=True)
+            on_punch, on_strip, closed = (
+                own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
+            )
+        stored = float(np.vdot(force, on_punch) - np.vdot(back, on_strip))
+        lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
+        work = state.force * (state.displacement - before.displacement) + lowered
+        carried = position.beside(state.beside) - position.beside(before.beside)
+        work += float((f * position.weights) @ carried)
+        return work, stored + float(position.pair.weights @ (state.pressure * closed))
+
+    def _heat_of(self, at: PartialSlipState, after: PartialSlipState) -> tuple[Array, Array, Array]:
+        """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
+        heat = self.heat
+        if heat is None:
+            return NO_HEAT, np.zeros((2, 0)), NO_HEAT
+        warm, terms = heat.step(at.next_step, at.temperature, after.heating, after.conductance)
+        return terms, np.array(heat.exchange.contact_temperatures(warm, at.next_step)), after.conductance
+
+    @property
+    def asks_cycle(self) -> bool:
+        """Whether a law depends on the cross-shear or the mean pressure of a whole cycle."""
+        laws = self.laws
+        return laws is not None and (laws.asks("cs") or laws.asks("pm"))
+
+    def at_start(self, at: PartialSlipState) -> dict[str, Any]:
+        """Return the conditions of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
+        warm, heat = None, self.heat
+        if heat is not None and len(at.temperature):
+            punch, strip = heat.surfaces(at.temperature)
+            warm = punch, strip
+        return {
+            "temperatures": warm,
+            "worn": at.worn,
+            "slid": at.slid,
+            "speed": at.speed,
+            "cycle": self._shear(at),
+        }
+
+    def _shear(self, at: PartialSlipState) -> CycleShear | None:
+        """Return the shear of the last cycle before a state, as laws use it; None where no law asks.
+
+        A time step that has not been computed slips nothing at the mean pressure.
+        """
+        if not self.asks_cycle:
+            return None
+        interface, middle = self.interface, self.interface.middle
+        positions, mean = (
+            [interface.position(step.offset) for step in self.program.steps],
+            middle.rigid.mean_pressure,
+        )
+        slips: Array = np.nan_to_num(at.slips)
+        ways = np.array([position.slid(slips[k]) for k, position in enumerate(positions)])
+        lengths = np.linalg.norm(ways, axis=2)
+        directions = ways / np.where(lengths > 0, lengths, 1.0)[:, :, None]
+        pairs, wears = [position.pair for position in positions], self.wear.strip.wears
+        known = SlidingWays(pairs, middle.pair, lengths, directions, wears, mean, asked=True)
+        return known.shear(np.where(np.isnan(at.pressures), mean, at.pressures))
+
+    def of_steps(self, records: TimeStepRecords, before: PartialSlipState) -> list[ContactConditions]:
+        """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
+        laws, known = self.laws, self.at_start(before)
+        assert laws is not None
+        lengths = records.slip_magnitude
+        slid = before.slid + np.cumsum(lengths, axis=0)
+        warm = [known["temperatures"]] * len(slid)
+        if known["temperatures"] is not None:
+            warm[1:] = [(punch, strip) for punch, strip in records.temperature[:-1]]
+        return [
+            laws.conditions(
+                pair,
+                records.pressure[k],
+                speed=lengths[k] / records.duration[k],
+                temperatures=warm[k],
+                worn=before.worn,
+                slid=slid[k],
+                debris=self.interface.layers.facing(pair, before.worn),
+                cycle=known["cycle"],
+            )
+            for k, pair in enumerate(self.pairs(records, before))
+        ]
+
+    def pairs(self, records: TimeStepRecords, before: PartialSlipState) -> list[ContactPair]:
+        """Return the surfaces opposite each other in steps that begin at a state."""
+        steps = self.program.steps
+        places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(records))]
+        return [self.interface.position(place).pair for place in places]
+
+    def worn(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> WornDepths:
+        """Return the depths after time steps, with the changes of the layers' states; arguments as of `passing`."""
+        passing, flowed = self.passing(records, begin, which), records.flowed[which].sum(axis=0)
+        return passing.worn(records.pressure[which], begin.worn, flowed=flowed)
+
+    def passing(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> LayerEvolution:
+        """Return the wear of time steps by their pressures, with the changes of layers and laws.
+
+        Args:
+            records: Of time steps one after the other.
+            begin: State in which the first of them begins.
+            which: Time steps of the record; by default all.
+        """
+        laws = self.laws
+        evolution, conditions = self.evolution(records, begin), list[ContactConditions]()
+        if evolution is not None:
+            conditions = evolution.through(self.interface.layers.held(begin.worn))[0]
+        elif laws is not None:
+            conditions = self.of_steps(records, begin)
+        chosen = range(len(records))[which]
+        conditions, pairs = conditions[which], self.pairs(records, begin)[which]
+        slid, durations = records.slip_magnitude[which], records.duration[which]
+        wears = [self.wear] * len(chosen) if laws is None else [laws.wear_at(one) for one in conditions]
+        wear = self._wear(wears, slid, durations, pairs)
+        evolution = None if evolution is None else evolution.some(chosen)
+        return LayerEvolution.over(self.interface.layers, wear, slid, evolution, conditions)
+
+    def _wear(
+        self, wears: Sequence[LocalWear], slid: Array, durations: Array, pairs: Sequence[ContactPair]
+    ) -> PhasesWear:
+        """Return the wear of time steps by their laws, slips (k, n) and durations (k,)."""
+        punch, strip = (law.slide(slid, durations[:, None]) for law in (wears[0].punch, wears[0].strip))
+        coatings = self.coatings[0].thickness, self.coatings[1].thickness
+        return phases_wear(wears, (punch, strip), pairs, coatings)
+
+    def evolution(self, records: TimeStepRecords, begin: PartialSlipState) -> Evolution | None:
+        """Return the evolution of laws' states in the steps of a record that begin at a state; None without any."""
+        memory, laws = self.interface.layers.memory, self.laws
+        if not memory.names or laws is None:
+            return None
+        pairs = self.pairs(records, begin)
+
+        def wearing(k: int, at: ContactConditions) -> Array:
+            own, wears = slice(k, k + 1), [laws.wear_at(at)]
+            wear = self._wear(wears, records.slip_magnitude[own], records.duration[own], pairs[own])
+            return np.asarray(wear.begun(begin.worn, 0.0).taken(at.pressure[None])[0] / records.duration[k])
+
+        conditions = self.of_steps(records, begin)
+        return Evolution(memory, conditions, records.duration, pairs, wearing, begin.worn.strip)
 
     def half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""

@@ -26,7 +26,7 @@ from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_heat import stick_heat
 from fenwear.steps.stick_interface import StickInterface, meshed
 from fenwear.steps.stick_program import Program, far_enough, make_program, passes, steps_of
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.surfaces.sliding_field import Screw
 from fenwear.system import Bodies, build_bodies, make_sliding
 from fenwear.system.both_bodies import laws_of

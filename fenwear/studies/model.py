@@ -22,10 +22,9 @@ from fenwear.common.errors import CaseError, InputError
 from fenwear.laws.wear import WornDepths
 from fenwear.results.summary import within
 from fenwear.steps import Block, Renewal, critical_speed, follow, running_in, steady
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.run_state import RunState, all_phases, beginning
-from fenwear.steps.run_totals import Totals, cycle_totals
+from fenwear.steps.evolve import jump_within
+from fenwear.steps.run_state import RunState, Totals, all_phases, beginning, cycle_totals
 from fenwear.steps.steady_cycle import SteadyCycle, cycle_of_state
 from fenwear.steps.stick_final import FinalShape, cycle_of_final
 from fenwear.studies.numeric_keys import with_values

@@ -16,8 +16,8 @@ import numpy as np
 from fenwear import assemble, load_case
 from fenwear.common.arrays import Array
 from fenwear.steps import Block
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 
 CYCLES = (1_000, 5_000, 10_000, 18_000)
 LOAD, RADIUS, YOUNG, POISSON = 18.5, 6.0, 200e3, 0.3  # N/mm, mm, MPa, 1

@@ -10,8 +10,8 @@ import time
 import numpy as np
 
 from fenwear import assemble, load_case
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.stick_setup import partial_slip_problem
 
 

@@ -25,9 +25,8 @@ from fenwear import Tribosystem
 from fenwear.case import Case, make_case
 from fenwear.contact import SlidingContact
 from fenwear.steps import steady
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.system import elastic, place_case, with_exchange
 from fenwear_verify.full_space import FullContact
 

@@ -42,8 +42,8 @@ from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import march_within
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.studies.run import position_warnings, run_case
 from fenwear.system import place_case, regridded, with_case, with_reduced_heat
 from fenwear_verify.solid import STEEL, describe

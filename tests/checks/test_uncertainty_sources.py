@@ -22,8 +22,8 @@ from fenwear.checks import (
 )
 from fenwear.checks.uncertain_values import values_of_steady
 from fenwear.checks.uncertainty_sources import by_short_jumps, of_mesh
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.system import with_reduced_heat
 
 Assembled = Callable[..., Tribosystem]

@@ -23,9 +23,8 @@ from fenwear.laws.friction import Friction
 from fenwear.laws.wear import PhasesWear
 from fenwear.steps import Block, critical_speed, cycles_to_reach, growth_rate, stability_number
 from fenwear.steps import run_state as cycle_state
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.jump_method import Sizes
 from fenwear.steps.stick_equations import Step
 from fenwear.steps.stick_final import final_shape

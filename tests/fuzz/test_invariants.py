@@ -15,8 +15,7 @@ import invariants
 
 from fenwear.laws.wear import WornDepths
 from fenwear.results import checkpoint
-from fenwear.steps.run_state import RunState
-from fenwear.steps.run_totals import PhaseMeter
+from fenwear.steps.run_state import PhaseMeter, RunState
 from fenwear.system import Tribosystem
 
 # One seed of most kinds, and most things that are asked at least once; a night tries thousands of others.

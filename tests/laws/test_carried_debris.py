@@ -116,7 +116,7 @@ def test_with_stick_by_hand_and_by_jumps() -> None:
     start = problem.beginning()
     for block in evolve(system, integration="explicit"):
         for steps in block.steps:
-            wear = problem.losses.over(steps.records, replace(start, next_step=steps.first)).wear
+            wear = problem.passing(steps.records, replace(start, next_step=steps.first)).wear
             depth = wear.punch.depth(steps.records.pressure) + wear.strip.depth(steps.records.pressure)
             for k, step in enumerate(problem.program.steps[steps.first :][: len(steps.records)]):
                 onto = problem.interface.position(step.offset).pair.wear_projection

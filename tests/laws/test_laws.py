@@ -15,9 +15,8 @@ from fenwear.case.dependence import evaluate_law
 from fenwear.common.errors import CaseError, ConvergenceError
 from fenwear.laws import LayerStep
 from fenwear.laws.compliant_layer import RoughClosure
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.stability import growth_rate
 from fenwear.studies.model import Model
 

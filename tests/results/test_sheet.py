@@ -20,9 +20,8 @@ from fenwear.results.sheet import sheet_rows, sheet_text
 from fenwear.results.stored_history import load_history
 from fenwear.results.summary import sheet_of
 from fenwear.steps import Block, follow
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.studies.run import run_case
 from fenwear.surfaces.placement import in_model
 

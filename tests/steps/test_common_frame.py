@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from cylinders import RADIUS, cattaneo, cylinders, line_load, on_flat, pressed, pulled
 
-from fenwear.steps.stick_edge import stick_edges, zone_width
+from fenwear.steps.stick_final import stick_edges, zone_width
 
 
 def test_mirror_images_are_pressed_without_traction() -> None:

@@ -12,8 +12,8 @@ from fenwear import Case, Tribosystem, assemble, jump, load_case, march
 from fenwear.common.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.steps import Block
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.jump_method import force_difference
 
 MEAN = 1e4 / 600

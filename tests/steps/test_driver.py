@@ -11,9 +11,8 @@ import pytest
 from fenwear import Tribosystem, march
 from fenwear.common.errors import InterruptedRunError
 from fenwear.steps import Block
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.run_state import RunState
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")

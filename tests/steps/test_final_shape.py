@@ -14,8 +14,8 @@ from fenwear.case import Case
 from fenwear.common.arrays import Array
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_final import INSIDE, final_shape, stick_zone
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
+from fenwear.steps.stick_state import TimeStepRecords
 
 LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
 C = 0.0609  # half-width that stays

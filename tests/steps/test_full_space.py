@@ -17,9 +17,8 @@ from fenwear import load_case
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import StickInterface, untouched
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
-from fenwear.steps.stick_state import Imposed
+from fenwear.steps.stick_state import Imposed, TimeStepRecords
 from fenwear_verify.full_space import nothing_condensed
 
 MU = 0.5

@@ -18,11 +18,9 @@ from fenwear.heat import heat_exchange
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, coupled_phases, growth_rate, stationary_growth
 from fenwear.steps.coupled_phases import cycle_heat
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
-from fenwear.steps.run_state import RunState
-from fenwear.steps.run_totals import none_yet
+from fenwear.steps.evolve import jump_within, march_within
+from fenwear.steps.run_state import RunState, none_yet
 from fenwear.steps.stability import repeating_temperatures
 from fenwear.steps.tangent import phase_tangent
 

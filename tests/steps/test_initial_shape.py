@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
 from fenwear.results.export import TRIANGLE, profile_of, with_shape
 from fenwear.steps.initial_shape import initial_shape, pressure_at, shape_for_pressure
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
 

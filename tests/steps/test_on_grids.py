@@ -20,9 +20,8 @@ from fenwear.steps.stick_increment import _step, advance
 from fenwear.steps.stick_interface import OppositeBodies, untouched
 from fenwear.steps.stick_jump import first_cycle, jumped
 from fenwear.steps.stick_products import CLOSE, GridStep
-from fenwear.steps.stick_records import FrettingCycle
 from fenwear.steps.stick_setup import partial_slip_problem
-from fenwear.steps.stick_state import Imposed, StickState
+from fenwear.steps.stick_state import FrettingCycle, Imposed, StickState
 from fenwear.surfaces import compliance
 from fenwear_verify.half_space_stick import Elastic, on_grid
 from fenwear_verify.stick_solids import to_and_fro

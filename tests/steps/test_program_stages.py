@@ -18,9 +18,8 @@ from fenwear.checks import Seen
 from fenwear.common.errors import CaseError
 from fenwear.steps import Block, Span, at_step, evolve, follow_program
 from fenwear.steps import program_stages as program
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from tests.results.test_contacts import two_pads
 
 Edited = Callable[..., Case]

@@ -24,7 +24,7 @@ from fenwear.results.export import export
 from fenwear.results.sheet import sheet_text
 from fenwear.results.stored_history import by_cycles, cycle_at, load_history
 from fenwear.steps.coulomb import Meter
-from fenwear.steps.run_totals import Totals
+from fenwear.steps.run_state import Totals
 from fenwear.studies.run import run_case
 
 SMALL = ("geometry.parameters.elements_along_contact=20", "stick.steps=10", "run.jump_tolerance=0.05")

@@ -13,9 +13,8 @@ from fenwear import Tribosystem, assemble, evolve, make_case, march
 from fenwear.case.templates import fill_in, find_template
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, follow
-from fenwear.steps.cycle_jumps import LATE, jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import LATE, jump_within, march_within
 from fenwear.steps.run_state import RunState
 from fenwear.steps.slow_changes import _in_place
 

@@ -15,7 +15,7 @@ from fenwear import Tribosystem, assemble, load_case, march
 from fenwear.report.figures import all_figures
 from fenwear.results.stored_history import by_cycles, load_history
 from fenwear.steps.stick_heat import read_at
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.studies.run import run_case
 
 WARM = (

@@ -18,8 +18,8 @@ from fenwear.report.page import write_report
 from fenwear.results.stored_history import by_cycles, load_history
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_position import surface_gradient, surface_strain
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.studies.run import run_case
 
 COARSE = (
@@ -174,7 +174,7 @@ def test_cross_shear_of_an_ellipse() -> None:
     )
     at, _ = driven.cycle(driven.beginning())
     found = TimeStepRecords.joined(driven.cycle(at)[1])
-    depth = driven.losses.over(found, at).wear.depth(found.pressure).sum(axis=0)
+    depth = driven.passing(found, at).wear.depth(found.pressure).sum(axis=0)
     rubbed = found.pressure * found.slip_magnitude
     rubs = found.touched
     crosses = depth[rubs] / (1e-9 * rubbed.sum(axis=0)[rubs])

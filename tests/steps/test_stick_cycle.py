@@ -13,15 +13,14 @@ from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps import evolve
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_jump import first_cycle as begin_cycle
 from fenwear.steps.stick_jump import jumped
 from fenwear.steps.stick_program import make_program
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import HALVINGS, fine_enough, partial_slip_problem, with_steps
-from fenwear.steps.stick_state import PartialSlipState
+from fenwear.steps.stick_state import PartialSlipState, TimeStepRecords
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
 SMALL = (*COARSE, "motion.amplitude='3 um'")
@@ -36,7 +35,7 @@ def worn_in_steps(
     driven: PartialSlipProblem, records: TimeStepRecords, begin: PartialSlipState | None = None
 ) -> tuple[Array, Array]:
     """Return what punch and strip lose in each time step at the contact nodes (k, n), mm."""
-    wear = driven.losses.over(records, begin or driven.beginning()).wear
+    wear = driven.passing(records, begin or driven.beginning()).wear
     return wear.punch.depth(records.pressure), wear.strip.depth(records.pressure)
 
 
@@ -192,7 +191,7 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
     driven = problem()
     records = first_cycle(driven)
-    energy, worn = records.energy(driven.weights), driven.losses.worn(records, driven.beginning())
+    energy, worn = records.energy(driven.weights), driven.worn(records, driven.beginning())
     assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
     strip = driven.interface.middle.pair.strip.weights
     assert strip @ worn.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)

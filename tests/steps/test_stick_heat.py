@@ -14,7 +14,7 @@ from work import half_cycles_whose_work_is_heat
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
 from fenwear.cli.state_commands import final_of
 from fenwear.results.stored_history import by_cycles, load_history
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.studies.run import run_case
 
 WARM = (

@@ -18,9 +18,8 @@ from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.steps.stick_equations import project
 from fenwear.steps.stick_increment import advance
 from fenwear.steps.stick_interface import StickInterface, untouched
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
-from fenwear.steps.stick_state import Imposed, StickState
+from fenwear.steps.stick_state import Imposed, StickState, TimeStepRecords
 from fenwear.surfaces import Interface
 
 RADIUS, LOAD = 200.0, 100.0

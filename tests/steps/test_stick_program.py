@@ -12,8 +12,8 @@ from combinations import STICK
 from fenwear import assemble, load_case, march
 from fenwear.common.arrays import Array
 from fenwear.steps.stick_cycle import PartialSlipProblem
-from fenwear.steps.stick_records import TimeStepRecords
 from fenwear.steps.stick_setup import partial_slip_problem
+from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.surfaces.placement import in_space
 
 STEPS = 6

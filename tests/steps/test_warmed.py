@@ -18,9 +18,8 @@ from fenwear.common.errors import CaseError
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, SteadyState, evolve, follow, monotonic
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
-from fenwear.steps.evolve import march_within
+from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.run_state import RunState, beginning
 from fenwear.studies.model import Model
 from fenwear.studies.quantities import evaluate, parse_quantity

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from fenwear import Tribosystem, march
-from fenwear.steps.stick_records import TimeStepRecords
+from fenwear.steps.stick_state import TimeStepRecords
 
 
 def half_cycles_whose_work_is_heat(warm: Tribosystem) -> Iterator[TimeStepRecords]:

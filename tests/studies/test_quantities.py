@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from fenwear import Case, CaseError, Tribosystem, assemble, load_case, make_case
 from fenwear.steps import Block, critical_speed, follow
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity
 from fenwear.studies.model import cycle_of

@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 from fenwear import Case, CaseError, Tribosystem, assemble, load_case
 from fenwear.steps import Block, follow
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity, sensitivity
 from fenwear.studies.model import Snapshot, edge_moved

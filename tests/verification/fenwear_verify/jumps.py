@@ -9,8 +9,8 @@ import numpy as np
 from fenwear.case import load_case, make_case
 from fenwear.common.arrays import Array
 from fenwear.steps import Block, jump, march
-from fenwear.steps.cycle_jumps import jump_within
 from fenwear.steps.driver import RunLimits
+from fenwear.steps.evolve import jump_within
 from fenwear.system import Tribosystem, assemble
 from fenwear_verify.suite import Line, Plot, Result, Row, number, verification
 

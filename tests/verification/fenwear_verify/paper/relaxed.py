@@ -14,7 +14,7 @@ import numpy as np
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
-from fenwear.steps.heated_phase import gap_volume
+from fenwear.steps.phase import gap_volume
 from fenwear.system import Tribosystem
 
 MOST = 100.0  # iterations times relaxation: long before, the pressure is the contact's

@@ -64,13 +64,13 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
     of_ranks = fem.assemble_matrix(form, bcs=list(bcs))
     of_ranks.scatter_reverse()
     maps, blocks = [of_ranks.index_map(k) for k in (0, 1)], of_ranks.block_size
-    own = maps[0].size_local
-    starts = np.asarray(of_ranks.indptr)[: own + 1]
+    owned = maps[0].size_local
+    starts = np.asarray(of_ranks.indptr)[: owned + 1]
     columns = maps[1].local_to_global(np.asarray(of_ranks.indices)[: starts[-1]].astype(np.int32))
     values = np.asarray(of_ranks.data)[: starts[-1] * blocks[0] * blocks[1]].reshape(-1, *blocks)
     if first_column:
         values, blocks = values[:, :, :1], [blocks[0], 1]
-    shape = (own * blocks[0], maps[1].size_global * blocks[1])
+    shape = (owned * blocks[0], maps[1].size_global * blocks[1])
     part = bsr_array((values, columns, starts), shape=shape, blocksize=tuple(blocks)).tocsr()
     part.sort_indices()
     sizes = ((shape[0], maps[0].size_global * blocks[0]), (maps[1].size_local * blocks[1], shape[1]))
@@ -169,5 +169,5 @@ def dense(sizes: tuple[int, int], fields: Array, comm: PETSc.Comm) -> PETSc.Mat:
 
 def destroy(*objects: PETSc.Object) -> None:
     """Destroy objects of PETSc; collective where they are."""
-    for one in objects:
-        one.destroy()
+    for petsc_object in objects:
+        petsc_object.destroy()

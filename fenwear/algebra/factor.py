@@ -102,15 +102,15 @@ class Factor:
         self.comm, self._sizes = comm, matrix.getSizes()[0]
         self._rows: NDArray[np.int64] = np.asarray(matrix.getOwnershipRanges(), dtype=np.int64)
         having = np.flatnonzero(np.diff(self._rows))
-        whole = len(having) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
+        single = len(having) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
         self._prefix, self._kind = prefix, kind
-        self.owner = int(having[0]) if whole else owner % self.comm.size
+        self.owner = int(having[0]) if single else owner % self.comm.size
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
-        self.is_spread = self.comm.size > 1 and not whole and needed > SPREAD
+        self.is_spread = self.comm.size > 1 and not single and needed > SPREAD
         self._surface = None if self.is_spread else surface
         self.has_schur = self._surface is not None
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
-        self.copies = range(self.owner, self.owner + (1 if whole or self.is_spread or self.has_schur else copies))
+        self.copies = range(self.owner, self.owner + (1 if single or self.is_spread or self.has_schur else copies))
         self._matrix: PETSc.Mat | None = _moved(matrix, self.copies, kind) if self.is_moved else matrix
         self._solver: PETSc.Mat | None = None
         self.schur: Array | None = None
@@ -155,19 +155,19 @@ class Factor:
         if self.is_spread or self.comm.size == 1:
             return right
         columns = right.shape[1]
-        whole: Array = np.empty((self._sizes[1] if self.is_owner else 0, columns))
+        rights: Array = np.empty((self._sizes[1] if self.is_owner else 0, columns))
         counts: Any = np.diff(self._rows) * columns
-        self.comm.Gatherv(np.ascontiguousarray(right), (whole, counts), root=self.owner)
-        return whole
+        self.comm.Gatherv(np.ascontiguousarray(right), (rights, counts), root=self.owner)
+        return rights
 
-    def scatter(self, found: Array, columns: int) -> Array:
+    def scatter(self, solutions: Array, columns: int) -> Array:
         """Return this rank's part of solutions (owned, k); collective."""
         if self.is_spread or self.comm.size == 1:
-            return found
-        own: Array = np.empty((self._sizes[0], columns))
+            return solutions
+        local_part: Array = np.empty((self._sizes[0], columns))
         counts: Any = np.diff(self._rows) * columns
-        self.comm.Scatterv((np.ascontiguousarray(found), counts), own, root=self.owner)
-        return own
+        self.comm.Scatterv((np.ascontiguousarray(solutions), counts), local_part, root=self.owner)
+        return local_part
 
     def solve_here(self, right: Array) -> Array:
         """Return the solutions of right-hand sides (rows, k) where they are solved; collective where it is spread."""
@@ -188,11 +188,11 @@ class Factor:
         csr = (right.indptr.astype(PETSc.IntType), right.indices.astype(PETSc.IntType), right.data)
         rows = PETSc.Mat().createAIJ((count, size), csr=csr, comm=PETSc.COMM_SELF)
         columns = PETSc.Mat().createTranspose(rows)
-        found = PETSc.Mat().createDense((size, count), comm=PETSc.COMM_SELF)
-        found.setUp()
-        self._solver.matSolve(columns, found)
-        solution = np.array(found.getDenseArray())
-        destroy(columns, rows, found)
+        dense = PETSc.Mat().createDense((size, count), comm=PETSc.COMM_SELF)
+        dense.setUp()
+        self._solver.matSolve(columns, dense)
+        solution = np.array(dense.getDenseArray())
+        destroy(columns, rows, dense)
         return solution
 
     def free_copies(self) -> None:
@@ -212,9 +212,9 @@ class Factor:
 
     def free(self) -> None:
         """Free its memory: it solves no more; collective where it is spread."""
-        for one in (self._solver, self._matrix if self.is_moved else None):
-            if one is not None:
-                one.destroy()
+        for petsc_object in (self._solver, self._matrix if self.is_moved else None):
+            if petsc_object is not None:
+                petsc_object.destroy()
         self._solver = self._matrix = None
 
 
@@ -322,9 +322,9 @@ def raised_together(comm: MPI.Comm, error: ConvergenceError | None) -> None:
         ConvergenceError: there is one.
     """
     all_together(comm)
-    found = [one for one in comm.allgather(error) if one is not None]
-    if found:
-        raise found[0]
+    errors = [raised for raised in comm.allgather(error) if raised is not None]
+    if errors:
+        raise errors[0]
 
 
 def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None) -> Array:
@@ -355,11 +355,11 @@ def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[A
     for factor in factors:
         all_together(factor.comm)
     columns = [right.reshape(len(right), math.prod(right.shape[1:])) for right in rights]
-    whole = [factor.gather(one) for factor, one in zip(factors, columns, strict=True)]
-    solutions = [factor.solve_here(one) for factor, one in zip(factors, whole, strict=True)]
+    gathered = [factor.gather(right) for factor, right in zip(factors, columns, strict=True)]
+    solutions = [factor.solve_here(gathered_right) for factor, gathered_right in zip(factors, gathered, strict=True)]
     return [
-        factor.scatter(one, right.shape[1]).reshape(given.shape)
-        for factor, one, right, given in zip(factors, solutions, columns, rights, strict=True)
+        factor.scatter(solution, right.shape[1]).reshape(given.shape)
+        for factor, solution, right, given in zip(factors, solutions, columns, rights, strict=True)
     ]
 
 
@@ -373,18 +373,18 @@ def moved(matrix: PETSc.Mat, ranks: Container[int]) -> PETSc.Mat | None:
     )
     for chosen, block in zip((rows, columns), matrix.getBlockSizes(), strict=True):
         chosen.setBlockSize(block)  # MUMPS orders by blocks
-    (whole,) = matrix.createSubMatrices([rows], [columns])
+    (copied,) = matrix.createSubMatrices([rows], [columns])
     if here:
-        return whole
-    whole.destroy()
+        return copied
+    copied.destroy()
     return None
 
 
 def _moved(matrix: PETSc.Mat, ranks: Container[int], kind: str) -> PETSc.Mat | None:
-    whole = moved(matrix, ranks)
-    if whole is not None:
-        whole.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
-    return whole
+    copied = moved(matrix, ranks)
+    if copied is not None:
+        copied.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
+    return copied
 
 
 def factored_here(matrix: PETSc.Mat, prefix: str, surface: NDArray[np.int64]) -> PETSc.Mat:

@@ -53,8 +53,8 @@ def flexible(
         The solution, its residual over the right-hand side, how many iterations it took, and its product.
     """
     x, product, r = np.zeros_like(b), np.zeros_like(b), b
-    whole = size = float(np.linalg.norm(b))
-    iterations, enough = 0, accuracy * whole
+    first_size = size = float(np.linalg.norm(b))
+    iterations, enough = 0, accuracy * first_size
     for _ in range(restarts):
         if not size > enough:
             break
@@ -83,10 +83,10 @@ def flexible(
             x += part * direction
             product += part * of_direction
         if rest <= enough:
-            return x, rest / whole, iterations, product
+            return x, rest / first_size, iterations, product
         product = multiply(x)
         r = b - product * kept
         before, size = size, float(np.linalg.norm(r))
         if not size < before:
             break
-    return x, size / max(whole, 1e-300), iterations, product
+    return x, size / max(first_size, 1e-300), iterations, product

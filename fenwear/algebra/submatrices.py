@@ -210,14 +210,16 @@ class Blocks:
 
     def __init__(self, matrices: Array, nodes: int) -> None:
         self.matrices, self.nodes = matrices, nodes
-        self.parts = [Dense(own) for own in matrices]
+        self.parts = [Dense(matrix) for matrix in matrices]
         self._near: list[tuple[Array, Dense]] = []  # of the last steps, by their wear
 
     @cached_property
     def _mean(self) -> Array:
         """The mean of the phases' S with the balance of forces added, for rigid modes open gaps, too."""
         n = self.nodes
-        return np.asarray(sum(own[:n, :n] + own[:n, n:] @ own[n:, :n] for own in self.matrices) / len(self.matrices))
+        return np.asarray(
+            sum(matrix[:n, :n] + matrix[:n, n:] @ matrix[n:, :n] for matrix in self.matrices) / len(self.matrices)
+        )
 
     def added(self, diagonal: Array) -> Blocks:
         """Return the blocks with numbers (m, n) added to the diagonal of each phase."""
@@ -234,18 +236,18 @@ class Blocks:
             wear: D_k summed up (n,).
             touched: Numbers of the nodes.
         """
-        self._near.sort(key=lambda one: _unlike(one[0], wear))
+        self._near.sort(key=lambda kept: _unlike(kept[0], wear))
         if not self._near or _unlike(self._near[0][0], wear) > ALIKE:
             self._near.insert(0, (wear, Dense(self._mean + np.diag(wear))))
             del self._near[KEPT:]
-        own, matrix = self._near[0]
+        near_wear, matrix = self._near[0]
         solve = matrix.factor(touched)
-        return lambda v: v - own[touched] * solve(v)
+        return lambda v: v - near_wear[touched] * solve(v)
 
 
-def _unlike(one: Array, other: Array) -> float:
+def _unlike(wear: Array, other: Array) -> float:
     """Return the largest ratio of two wears (n,)."""
-    both = np.array([one, other])
+    both = np.array([wear, other])
     least, most = both.min(axis=0), both.max(axis=0)
     return float((most / np.where(least > 0, least, np.where(most > 0, TINY, 1.0))).max(initial=0.0))
 
@@ -269,7 +271,7 @@ def joined(
     if m == 1 and apart:
         return blocks.parts[0]
     if m == 1 or coupling is not None or m * size <= DENSE:
-        return Dense(whole(blocks.matrices, coupling, border, local))
+        return Dense(dense_matrix(blocks.matrices, coupling, border, local))
     if local is not None:
         return Bordered(blocks, *_as_border(local)) if blocks.nodes <= DIRECT else Worn(blocks, local)
     return Phases(blocks) if border is None else Bordered(blocks, *border)
@@ -283,8 +285,8 @@ class _Cut:
         self.kept = kept
         self.cuts = list(pairwise(np.searchsorted(kept, np.arange(m + 1) * size)))
         rows = [kept[low:high] - np.int32(k * size) for k, (low, high) in enumerate(self.cuts)]
-        self.nodes: list[Indices] = [own[own < blocks.nodes] for own in rows]
-        self.solves = [part.factor(own) for part, own in zip(blocks.parts, rows, strict=True)]
+        self.nodes: list[Indices] = [indices[indices < blocks.nodes] for indices in rows]
+        self.solves = [part.factor(indices) for part, indices in zip(blocks.parts, rows, strict=True)]
 
     def solve(self, b: Array) -> list[Array]:
         """Return the solution of each phase by itself."""
@@ -304,7 +306,7 @@ class Phases:
     @cached_property
     def matrix(self) -> Array:
         """All of it (m size, m size)."""
-        return whole(self.blocks.matrices)
+        return dense_matrix(self.blocks.matrices)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (m size,)."""
@@ -339,7 +341,7 @@ class Bordered(Phases):
     @cached_property
     def matrix(self) -> Array:
         """All of it (m size, m size)."""
-        return whole(self.blocks.matrices, border=(self.left, self.right))
+        return dense_matrix(self.blocks.matrices, border=(self.left, self.right))
 
     def _open(self, pressure: Array, gaps: Array) -> None:
         gaps += self.left @ np.einsum("kqn,kn->q", self.right, pressure)
@@ -386,7 +388,7 @@ class Worn(Phases):
     @cached_property
     def matrix(self) -> Array:
         """All of it (m size, m size)."""
-        return whole(self.blocks.matrices, local=self.wear)
+        return dense_matrix(self.blocks.matrices, local=self.wear)
 
     def _open(self, pressure: Array, gaps: Array) -> None:
         gaps += (self.wear * pressure).sum(axis=0)
@@ -426,7 +428,7 @@ def _as_border(local: Array) -> tuple[Array, Array]:
     return np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
 
 
-def whole(
+def dense_matrix(
     blocks: Array,
     coupling: Array | None = None,
     border: tuple[Array, Array] | None = None,

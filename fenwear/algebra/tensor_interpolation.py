@@ -35,18 +35,18 @@ class TensorWeights:
 
     def rows(self, nodes: Nodes = slice(None)) -> Array:
         """Return the rows of some nodes (k, m)."""
-        found: Array = np.ones((1, 1))
+        products: Array = np.ones((1, 1))
         for factor, place in zip(self.factors, self.at[nodes].T, strict=True):
-            found = found[:, :, None] * factor[place][:, None]
-            found = found.reshape(len(found), found.shape[1] * found.shape[2])  # of no nodes, too
-        return found
+            products = products[:, :, None] * factor[place][:, None]
+            products = products.reshape(len(products), products.shape[1] * products.shape[2])  # of no nodes, too
+        return products
 
     def to_nodes(self, values: Array) -> Array:
         """Return values at the nodes (q, ...) of those at points (m, ...)."""
-        whole = values.reshape(*(factor.shape[1] for factor in self.factors), -1)
+        at_points = values.reshape(*(factor.shape[1] for factor in self.factors), -1)
         for axis, factor in enumerate(self.factors):
-            whole = along(factor, whole, axis)
-        return np.asarray(whole[tuple(self.at.T)]).reshape(-1, *values.shape[1:])
+            at_points = along(factor, at_points, axis)
+        return np.asarray(at_points[tuple(self.at.T)]).reshape(-1, *values.shape[1:])
 
     def to_points(self, values: Array) -> Array:
         """Return the product of the transpose (m, ...) with values at the nodes (q, ...)."""
@@ -59,23 +59,23 @@ class TensorWeights:
     def _gathered(self, values: Array, factors: Sequence[Array]) -> Array:
         """Return the product of one matrix for each axis (c, k) with values at the nodes."""
         flat = values.reshape(len(values), -1)
-        whole = np.zeros((*(factor.shape[0] for factor in self.factors), flat.shape[1]))
-        whole[tuple(self.at.T)] = flat
+        at_nodes = np.zeros((*(factor.shape[0] for factor in self.factors), flat.shape[1]))
+        at_nodes[tuple(self.at.T)] = flat
         for axis, factor in enumerate(factors):
-            whole = along(factor, whole, axis)
-        return whole.reshape(int(np.prod(whole.shape[:-1])), *values.shape[1:])
+            at_nodes = along(factor, at_nodes, axis)
+        return at_nodes.reshape(int(np.prod(at_nodes.shape[:-1])), *values.shape[1:])
 
     def diagonal(self, between: Array) -> Array:
         """Return the diagonal (q, ...) of L C L^T, with C (m, m, ...) between points."""
         counts = [factor.shape[1] for factor in self.factors]
         rest = between.shape[2:]
-        whole = between.reshape(*counts, *counts, -1)
+        tensor = between.reshape(*counts, *counts, -1)
         if len(counts) == 1:
-            found = np.einsum("xa,abr,xb->xr", self.factors[0], whole, self.factors[0], optimize=True)
+            at_all = np.einsum("xa,abr,xb->xr", self.factors[0], tensor, self.factors[0], optimize=True)
         else:
-            across = np.einsum("xa,aibjr,xb->xijr", self.factors[0], whole, self.factors[0], optimize=True)
-            found = np.einsum("yi,xijr,yj->xyr", self.factors[1], across, self.factors[1], optimize=True)
-        return np.asarray(found[tuple(self.at.T)]).reshape(-1, *rest)
+            across = np.einsum("xa,aibjr,xb->xijr", self.factors[0], tensor, self.factors[0], optimize=True)
+            at_all = np.einsum("yi,xijr,yj->xyr", self.factors[1], across, self.factors[1], optimize=True)
+        return np.asarray(at_all[tuple(self.at.T)]).reshape(-1, *rest)
 
     def within(self, low: Sequence[int], counts: Sequence[int]) -> tuple[Array, ...]:
         """Return the factors over a box of places."""

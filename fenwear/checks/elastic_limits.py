@@ -30,9 +30,9 @@ LARGE = 0.05  # strain, or rotation in rad: the linear theory leaves out terms o
 def strain_and_rotation(elastic: ElasticBody, displacement: fem.Function) -> tuple[float, float]:
     """Return the strain and the rotation (rad) of a body where it is strained; collective."""
     mesh, dim = elastic.body.mesh, elastic.dim
-    corners, own = cell_num_vertices(mesh.topology.cell_type), mesh.topology.index_map(dim).size_local
-    x = mesh.geometry.x[geometry_dofmap(mesh)[:own, :corners], :dim]
-    u = displacement.x.array.reshape(-1, dim)[elastic.space.dofmap.list[:own, :corners]]
+    corners, owned = cell_num_vertices(mesh.topology.cell_type), mesh.topology.index_map(dim).size_local
+    x = mesh.geometry.x[geometry_dofmap(mesh)[:owned, :corners], :dim]
+    u = displacement.x.array.reshape(-1, dim)[elastic.space.dofmap.list[:owned, :corners]]
     x, u = x - x.mean(axis=1, keepdims=True), u - u.mean(axis=1, keepdims=True)
     metric = np.einsum("cki,ckj->cij", x, x)
     gradient = np.linalg.solve(metric, np.einsum("cki,ckj->cij", x, u))
@@ -52,10 +52,10 @@ def large(system: Tribosystem, contact: ContactState) -> Fields:
     for elastic, displacement in displacements(system, contact.pressure[0], contact.rigid[0]):
         stretched, turned = strain_and_rotation(elastic, displacement)
         if max(stretched, turned) > LARGE:
-            own = np.linalg.norm(displacement.x.array.reshape(-1, elastic.dim), axis=1).max(initial=0.0)
+            farthest = np.linalg.norm(displacement.x.array.reshape(-1, elastic.dim), axis=1).max(initial=0.0)
             return {
                 "body": elastic.body.name,
-                "farthest": float(elastic.body.mesh.comm.allreduce(float(own), op=MPI.MAX)),
+                "farthest": float(elastic.body.mesh.comm.allreduce(float(farthest), op=MPI.MAX)),
                 "stretched": 100 * stretched,
                 "turned": np.degrees(turned),
                 "percent": 100 * max(stretched, turned),

@@ -155,8 +155,8 @@ def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float 
     half = max(float(((zone.nodes - 1) * zone.spacing / ends).min()), width / 2, ALIKE * degree * zone.spacing.min())
     places = net.surface.x[net.piece(pressure)]
     bodies = [body for body in (system.bodies.punch, system.bodies.strip) if body.reading is None]
-    found: list[Deep] = [deep for body in bodies for deep in (_deepest(body, places, half),) if deep is not None]
-    return max(found, key=attrgetter("excess"), default=None)
+    by_body: list[Deep] = [deep for body in bodies for deep in (_deepest(body, places, half),) if deep is not None]
+    return max(by_body, key=attrgetter("excess"), default=None)
 
 
 def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:
@@ -170,11 +170,11 @@ def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:
     depth = np.where(at, below[cells].max(axis=1), away[cells].max(axis=1) - least)
     allowed = np.where(at, DEEPEST * half, FARTHER * body.space.ufl_element().degree * (half + least))
     excess = np.where(least < NEAR * half, depth / allowed, 0.0)
-    own = (0.0, 0.0, 1.0, 0.0)
+    local_worst = (0.0, 0.0, 1.0, 0.0)
     if len(cells):
         k = int(excess.argmax())
-        own = (float(excess[k]), float(depth[k]), float(allowed[k]), float(least[k]) if not at[k] else 0.0)
-    worst = max(mesh.comm.allgather(own))
+        local_worst = (float(excess[k]), float(depth[k]), float(allowed[k]), float(least[k]) if not at[k] else 0.0)
+    worst = max(mesh.comm.allgather(local_worst))
     return Deep(worst[0], worst[1], worst[2], worst[3], body.body.name)
 
 
@@ -267,12 +267,14 @@ def _passing(system: ContactSetup, speed: float) -> float:
 def _diffusivities(system: ContactSetup) -> Array:
     """Return k / (rho c) at the strip's pressure nodes (n,), mm²/s: the smallest where regions meet."""
     regions, materials = system.case.strip.regions, system.case.initial_materials
-    found: Array = np.full(len(system.pair.strip.weights), np.inf)
+    diffusivities: Array = np.full(len(system.pair.strip.weights), np.inf)
     for name, share in system.bodies.regions[1].items():
         m = materials[regions[name]]
         capacity = (m.density or 0.0) * (m.heat_capacity or 0.0)
-        found = np.where(share > 0, np.minimum(found, (m.conductivity or 0.0) / capacity), found)
-    return found
+        diffusivities = np.where(
+            share > 0, np.minimum(diffusivities, (m.conductivity or 0.0) / capacity), diffusivities
+        )
+    return diffusivities
 
 
 @dataclass(frozen=True)
@@ -348,12 +350,12 @@ def turned(pair: ContactPair, depth: Array) -> float:
     """Return by how much worn depths of both bodies together (n,), mm, turn the normals of round contacts, rad."""
     rounds, number = pair.punch.rounds
     number = number[pair.punch.nodes]
-    found = 0.0
-    for k, one in enumerate(rounds):
-        own = (number == k) & (depth > WORN * depth.max(initial=0.0))
-        if not own.any():
+    angle = 0.0
+    for k, round_contact in enumerate(rounds):
+        nodes = (number == k) & (depth > WORN * depth.max(initial=0.0))
+        if not nodes.any():
             continue
-        deepest = pair.normal[own][depth[own].argmax()]
-        across = np.sqrt(np.maximum(1 - (pair.normal[own] @ deepest) ** 2, 0.0))
-        found = max(found, float(depth[own].max() * across.max() / one.radius))
-    return found
+        deepest = pair.normal[nodes][depth[nodes].argmax()]
+        across = np.sqrt(np.maximum(1 - (pair.normal[nodes] @ deepest) ** 2, 0.0))
+        angle = max(angle, float(depth[nodes].max() * across.max() / round_contact.radius))
+    return angle

@@ -24,14 +24,14 @@ KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is sa
 
 def fineness_text(system: Tribosystem) -> str:
     """Return how fine the steps and bases of the heat are, "" without heat."""
-    found = fineness_of(system)
-    if found is None:
+    fineness = fineness_of(system)
+    if fineness is None:
         return ""
-    parts = [f"heat: {found.steps} steps in a half-cycle"]
-    if found.change is not None:
-        parts.append(f"halving them changes contact temperatures by {100 * found.change:.2g} %")
-    if found.difference is not None:
-        parts.append(f"the basis changes contact temperatures and thermal gap by {100 * found.difference:.2g} %")
+    parts = [f"heat: {fineness.steps} steps in a half-cycle"]
+    if fineness.change is not None:
+        parts.append(f"halving them changes contact temperatures by {100 * fineness.change:.2g} %")
+    if fineness.difference is not None:
+        parts.append(f"the basis changes contact temperatures and thermal gap by {100 * fineness.difference:.2g} %")
     return "; ".join(parts)
 
 
@@ -53,11 +53,11 @@ class StateMonitor:
 
     def see(self, block: Block) -> list[str]:
         """Take the next block and return the warnings about it that no earlier one had; collective."""
-        found = remarks(Seen.of_block(self._made, block), *self._kinds)
+        texts = remarks(Seen.of_block(self._made, block), *self._kinds)
         self._kinds = ("run",)
-        new = [text for name, text in found.items() if name not in self._texts]
-        latest = {name: text for name, text in found.items() if RULES[name].latest}
-        self._texts = {**found, **self._texts, **latest}
+        new = [text for name, text in texts.items() if name not in self._texts]
+        latest = {name: text for name, text in texts.items() if RULES[name].latest}
+        self._texts = {**texts, **self._texts, **latest}
         return new
 
     def warnings(self) -> list[str]:
@@ -93,13 +93,13 @@ class HeatMonitor:
         if fineness is not None:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)
             values |= {CHANGE: fineness.change, DIFFERENCE: fineness.difference}
-        found = remarks(Seen.of_system(system), "heat")
+        texts = remarks(Seen.of_system(system), "heat")
         jumps = system.case.run.integration == "jump"
         for text in heat_warnings(gain, jumps=jumps):
-            found["answers"] = text
-        new = [text for kind, text in found.items() if kind not in self._texts]
+            texts["answers"] = text
+        new = [text for kind, text in texts.items() if kind not in self._texts]
         worst = {KINDS[name] for name, value in values.items() if value and value >= self.numbers.get(name, value)}
-        self._texts |= {kind: text for kind, text in found.items() if kind in worst or kind not in self._texts}
+        self._texts |= {kind: text for kind, text in texts.items() if kind in worst or kind not in self._texts}
         for name, value in values.items():
             if value is not None:
                 self.numbers[name] = max(self.numbers.get(name, value), value)
@@ -131,7 +131,7 @@ def unique_text(unique: Mask) -> str:
 def sliding_text(last: Block) -> str:
     """Return the warning about time steps of the last cycle in which nothing sticks; "" if something does."""
     steps = _last_steps(last)
-    slipping = [(one.pressure > 0).any(axis=1) & ~one.sticking.any(axis=1) for one in steps]
+    slipping = [(stroke.pressure > 0).any(axis=1) & ~stroke.sticking.any(axis=1) for stroke in steps]
     if not steps or not np.concatenate(slipping).any():
         return ""
     share = 100 * float(np.mean(np.concatenate(slipping)))
@@ -144,7 +144,7 @@ def passing_text(last: Block) -> str:
     if not steps or system.law_state is None or not system.law_state.problem.interface.moves:
         return ""
     pair = system.pair
-    slipped = sum(one.slip_amplitude(pair.weights, len(steps)) for one in steps)
+    slipped = sum(stroke.slip_amplitude(pair.weights, len(steps)) for stroke in steps)
     if passes(slipped, pair.punch):
         return ""
     return (
@@ -155,10 +155,10 @@ def passing_text(last: Block) -> str:
 
 def _last_steps(last: Block) -> list[TimeStepRecords]:
     steps: tuple[Any, ...] = last.steps[-last.system.motion.half_cycles :]
-    return [one.records for one in steps]
+    return [stroke.records for stroke in steps]
 
 
 def uniques(block: Block) -> Mask:
     """Return of each time step of a block whether its answer was the only one near (k,)."""
     steps: tuple[Any, ...] = block.steps
-    return np.concatenate([np.ones(0, dtype=bool), *(one.records.unique.astype(bool) for one in steps)])
+    return np.concatenate([np.ones(0, dtype=bool), *(stroke.records.unique.astype(bool) for stroke in steps)])

@@ -159,11 +159,11 @@ class Seen:
         )  # fmt: skip
 
     @classmethod
-    def of_final(cls, found: FinalShape) -> Seen:
+    def of_final(cls, final: FinalShape) -> Seen:
         """Look at the shape to which partial slip wears; collective."""
-        seen = cls.of_pressure(found.system, found.pressures, "in the end of the wear")
-        touching = (found.pressures > 0) | (found.depth > 0)
-        return replace(seen, worn={"punch": found.worn.punch[None]}, end=found.worn, touching=touching, kind="final")
+        seen = cls.of_pressure(final.system, final.pressures, "in the end of the wear")
+        touching = (final.pressures > 0) | (final.depth > 0)
+        return replace(seen, worn={"punch": final.worn.punch[None]}, end=final.worn, touching=touching, kind="final")
 
     @cached_property
     def limits(self) -> Limits:
@@ -184,7 +184,7 @@ def _balances(made: Made, block: Block) -> dict[str, Array]:
     steps: tuple[Any, ...] = block.steps
     if steps:
         weights = system.law_state.problem.weights
-        errors["energy"] = np.array([one.records.balance_error(weights) for one in steps])
+        errors["energy"] = np.array([stroke.records.balance_error(weights) for stroke in steps])
     if system.bodies.followed is None:  # else on other meshes
         lost, worn = block.totals.of("volume_punch"), block.wear @ system.pair.weights
         errors["worn volume"] = made.error("worn volume", lost - system.bodies.punch.thickness * worn, lost)
@@ -390,18 +390,23 @@ def beside_radius(seen: Seen) -> Fields:
 
 def coarse_heat_steps(seen: Seen) -> Fields:
     """Return by how much halving the steps of the heat changes temperatures, beyond the tolerance."""
-    heat, found = seen.system.heat, fineness_of(seen.system)
-    if heat is None or found is None or found.change is None or found.change <= heat.step_tolerance:
+    heat, fineness = seen.system.heat, fineness_of(seen.system)
+    if heat is None or fineness is None or fineness.change is None or fineness.change <= heat.step_tolerance:
         return {}
-    return {"steps": found.steps, "percent": 100 * found.change, "limit": heat.step_tolerance}
+    return {"steps": fineness.steps, "percent": 100 * fineness.change, "limit": heat.step_tolerance}
 
 
 def coarse_heat_basis(seen: Seen) -> Fields:
     """Return by how much the reduced temperatures differ from those of the whole mesh, beyond the tolerance."""
-    heat, found = seen.system.heat, fineness_of(seen.system)
-    if heat is None or found is None or found.difference is None or found.difference <= heat.reduction_difference:
+    heat, fineness = seen.system.heat, fineness_of(seen.system)
+    if (
+        heat is None
+        or fineness is None
+        or fineness.difference is None
+        or fineness.difference <= heat.reduction_difference
+    ):
         return {}
-    return {"percent": 100 * found.difference, "limit": heat.reduction_difference}
+    return {"percent": 100 * fineness.difference, "limit": heat.reduction_difference}
 
 
 def fineness_of(system: Tribosystem) -> Fineness | None:

@@ -75,8 +75,8 @@ def boundary_of(elastic: ElasticBody) -> Facets:
     normal *= np.sign((normal * out).sum(axis=1) / np.linalg.norm(normal, axis=1))[:, None]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     numbers = mesh.geometry.index_map().local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
-    own = numbers, x, normal, np.isin(facets, body.facet_tags.find(contact_tag(body)))
-    return Facets(*(np.concatenate(part) for part in zip(*mesh.comm.allgather(own), strict=True)))
+    local_facets = numbers, x, normal, np.isin(facets, body.facet_tags.find(contact_tag(body)))
+    return Facets(*(np.concatenate(part) for part in zip(*mesh.comm.allgather(local_facets), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -124,17 +124,17 @@ def _at_nodes(surface: ContactSurface, x: Array, values: Array) -> Array:
 
     Nodes on an outer edge have the lesser of both its corners.
     """
-    found: Array = np.zeros(len(surface.trace))
+    nodal: Array = np.zeros(len(surface.trace))
     if len(x):
         far, nearest = cKDTree(x).query(surface.trace, distance_upper_bound=NEAR * surface.extent())
-        found = np.where(np.isfinite(far), np.append(values, 0.0)[nearest], 0.0)
+        nodal = np.where(np.isfinite(far), np.append(values, 0.0)[nearest], 0.0)
     if surface.dim == 3 and surface.degree > 1:
         closures = _closures(surface.cell, surface.degree)
         nodes = surface.facets[:, closures].reshape(-1, closures.shape[1])
         _, which, count = np.unique(np.sort(nodes[:, :2], axis=1), axis=0, return_inverse=True, return_counts=True)
         outer = nodes[count[which.ravel()] == 1]
-        found[outer[:, 2:]] = found[outer[:, :2]].min(axis=1)[:, None]
-    return found[surface.nodes]
+        nodal[outer[:, 2:]] = nodal[outer[:, :2]].min(axis=1)[:, None]
+    return nodal[surface.nodes]
 
 
 @lru_cache
@@ -168,14 +168,14 @@ class Limits:
 
     def where(self, carried: Mask) -> str:
         """Return in words where the contact is clipped, of nodes that carry pressure or wear (n,); "" for nowhere."""
-        found = self.x[carried & self.clips]
-        if not len(found):
+        clipped = self.x[carried & self.clips]
+        if not len(clipped):
             return ""
-        if found.shape[1] == 2:
-            return f"at x = {' and '.join(f'{x:.4g}' for x in np.unique(np.round(found[:, 0], 9) + 0.0))} mm"
-        middle = found[np.linalg.norm(found - found.mean(axis=0), axis=1).argmin()]
+        if clipped.shape[1] == 2:
+            return f"at x = {' and '.join(f'{x:.4g}' for x in np.unique(np.round(clipped[:, 0], 9) + 0.0))} mm"
+        middle = clipped[np.linalg.norm(clipped - clipped.mean(axis=0), axis=1).argmin()]
         place = ", ".join(f"{value:.4g}" for value in np.round(middle, 9) + 0.0)
-        return f"at {len(found)} nodes of its rim, ({place}) mm among them"
+        return f"at {len(clipped)} nodes of its rim, ({place}) mm among them"
 
     def width_needed(self, worn: float, load: float) -> float:
         """Return about how wide the contact surface should be, mm; 0 where that is not known.
@@ -279,9 +279,9 @@ def curvatures(system: Tribosystem) -> tuple[float, ...]:
     s = _along(pair.punch.x, pair.normal.mean(axis=0))
     rows, columns = np.triu_indices(s.shape[1])
     powers = np.column_stack([np.ones(len(s)), s, s[:, rows] * s[:, columns]])
-    found = np.linalg.lstsq(powers, pair.initial_gap, rcond=None)[0][1 + s.shape[1] :]
+    coefficients = np.linalg.lstsq(powers, pair.initial_gap, rcond=None)[0][1 + s.shape[1] :]
     hessian = np.zeros((s.shape[1],) * 2)
-    hessian[rows, columns] += found
+    hessian[rows, columns] += coefficients
     values = np.linalg.eigvalsh(hessian + hessian.T)
     flat = values[-1] * pair.punch.extent() ** 2 < 1e-9 * pair.punch.extent()
     return () if flat or values[0] < ROUND * values[-1] else tuple(map(float, values[::-1]))
@@ -327,10 +327,10 @@ def thickness(elastic: ElasticBody) -> Array:
     begin, inward = surface.x, -surface.outward
     size = max(1, AT_ONCE // max(1, len(opposite)))
     parts = [_lengths(begin[k : k + size], inward[k : k + size], opposite) for k in range(0, len(begin), size)]
-    found = np.concatenate(parts)
+    nodal_thickness = np.concatenate(parts)
     # A line that slips out along an edge: as far as the body reaches at all.
     reach = np.array([((opposite - x) @ d).max(initial=0.0) for x, d in zip(begin, inward, strict=True)])
-    return np.where(np.isfinite(found), found, reach)
+    return np.where(np.isfinite(nodal_thickness), nodal_thickness, reach)
 
 
 def _lengths(begin: Array, along: Array, facets: Array) -> Array:

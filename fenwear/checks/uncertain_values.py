@@ -61,18 +61,18 @@ class Value:
         mean of those at the common nodes where there is anything. Two of them may be small by chance. Of pressures the
         mean falls by the same order as differences inside, 3/2, the mean square by that beside the ends alone.
         """
-        found = abs(self.number - other.number)
+        difference = abs(self.number - other.number)
         if not len(self.x) or not len(other.x):
-            return found
+            return difference
         distance, nearest = cKDTree(other.x).query(self.x)
         common = distance < SAME * max(float(np.ptp(self.x, axis=0).max()), 1e-300)
         if not common.any():
-            return found
+            return difference
         differences = np.where(common, np.abs(self.along - other.along[nearest]), 0.0)
         far = np.linalg.norm(self.x - self.x[self.along.argmax()], axis=1)
         weights = np.where(common & (self.along > 0), self.weights, 0.0)
         mean = float(weights @ differences / max(float(weights.sum()), 1e-300))
-        return max(found, float(differences[np.where(common, far, np.inf).argmin()]), mean)
+        return max(difference, float(differences[np.where(common, far, np.inf).argmin()]), mean)
 
 
 Values = dict[Quantity, Value]
@@ -110,19 +110,19 @@ def values_of_steady(state: SteadyState) -> Values:
 def _pressures(system: ContactSetup, last: Block) -> Values:
     surface, strokes = system.pair.punch, system.motion.half_cycles
     if last.steps:
-        steps: Array = np.concatenate([one.pressure for one in last.steps[-strokes:]])
+        steps: Array = np.concatenate([stroke.pressure for stroke in last.steps[-strokes:]])
         return {Quantity("largest_pressure_in_cycle"): _largest(steps[np.argmax(steps.max(axis=1))], surface)}
     return _of_half_cycles(system, last.half_cycle[-strokes:], last.pressure[-strokes:])
 
 
 def _of_half_cycles(system: ContactSetup, numbers: NDArray[np.int64], pressure: Array) -> Values:
     """Return the largest and the mean pressure of half-cycles of these numbers (k,), from their pressures (k, n)."""
-    found, surface, weights = Values(), system.pair.punch, system.pair.weights
+    values, surface, weights = Values(), system.pair.punch, system.pair.weights
     for number, row in zip(numbers, np.asarray(pressure), strict=True):
         of, area = str(int(number) % system.motion.half_cycles), float(weights @ (row > 0))
-        found[Quantity("largest_pressure", of)] = _largest(np.asarray(row), surface)
-        found[Quantity("mean_pressure", of)] = Value(float(weights @ row) / (area or 1.0))
-    return found
+        values[Quantity("largest_pressure", of)] = _largest(np.asarray(row), surface)
+        values[Quantity("mean_pressure", of)] = Value(float(weights @ row) / (area or 1.0))
+    return values
 
 
 def _largest(values: Array, surface: ContactSurface) -> Value:

@@ -70,15 +70,15 @@ def _of(last: Block, values: Values, share: float) -> Contribution:
     system = last.system
     rise = float(last.heat.largest_temperature[-1]) - system.initial_temperature
     pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
-    found: Contribution = {}
+    contribution: Contribution = {}
     for quantity, value in values.items():
         relative = pressure * abs(value.number)
-        found[quantity] = {
+        contribution[quantity] = {
             "largest_temperature": share * abs(rise),
             "largest_depth": min(relative, depth),
             "worn_volume": 0.0,
         }.get(quantity.name, relative)
-    return found
+    return contribution
 
 
 def _felt(last: Block, share: float) -> tuple[float, float]:
@@ -128,7 +128,8 @@ class Uncertainty:
     def total(self) -> Contribution:
         """The sum of all contributions."""
         return {
-            quantity: sum(own.get(quantity, 0.0) for own in self.contributions.values()) for quantity in self.values
+            quantity: sum(contribution.get(quantity, 0.0) for contribution in self.contributions.values())
+            for quantity in self.values
         }
 
     def largest(self, quantity: Quantity) -> str:
@@ -145,7 +146,7 @@ def uncertainty(case: Case, last: Block) -> Uncertainty:
     """
     begin = time.perf_counter()
     values, until = values_of(last), int(last.half_cycle[-1])
-    found: dict[str, Contribution] = {}
+    contributions: dict[str, Contribution] = {}
     untold: dict[str, str] = {}
     lower = coarser(case, last.system, nodes_across(last.system, last.pressure[-last.system.motion.half_cycles :]))
     if not lower.differs:
@@ -160,7 +161,7 @@ def uncertainty(case: Case, last: Block) -> Uncertainty:
         before, short = values_of(end), values_of(by_short_jumps(end))
         if lower.differs:
             coarse = {quantity: short[quantity].towards(value, share) for quantity, value in before.items()}
-            found["mesh"] = of_mesh(values, coarse, lower.ratio)
+            contributions["mesh"] = of_mesh(values, coarse, lower.ratio)
         of_jumps = {quantity: SAFETY * share * value.apart(short[quantity]) for quantity, value in before.items()}
         warmest = Quantity("largest_temperature")
         if warmest in before and by_jumps:
@@ -169,12 +170,12 @@ def uncertainty(case: Case, last: Block) -> Uncertainty:
                 of_jumps[warmest] = getattr(last.steps[-1], "jump_error", 0.0) * abs(values[warmest].number)
             of_jumps[warmest] = max(of_jumps[warmest], late)
         for source, contribution in _steps(again, before, of_jumps, first, last):
-            found[source] = contribution
+            contributions[source] = contribution
     except (CaseError, ConvergenceError) as error:
-        untold["steps" if "mesh" in found else "mesh"] = _why(error)
-    found |= of_heat(last, values)
-    found["solver"] = _of_solver(values, last)
-    return Uncertainty(values, found, untold, time.perf_counter() - begin)
+        untold["steps" if "mesh" in contributions else "mesh"] = _why(error)
+    contributions |= of_heat(last, values)
+    contributions["solver"] = _of_solver(values, last)
+    return Uncertainty(values, contributions, untold, time.perf_counter() - begin)
 
 
 def of_mesh(values: Values, coarse: Values, ratio: float) -> Contribution:
@@ -235,8 +236,8 @@ def _steps(
         yield "following", _apart(before, again.otherwise(geometry={"follow_wear": follow * worn / 2}).values(), 2.0)
 
 
-def _apart(one: Values, other: Values, factor: float) -> Contribution:
-    return {quantity: factor * abs(value.number - other[quantity].number) for quantity, value in one.items()}
+def _apart(values: Values, other: Values, factor: float) -> Contribution:
+    return {quantity: factor * abs(value.number - other[quantity].number) for quantity, value in values.items()}
 
 
 def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
@@ -247,17 +248,17 @@ def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
     """
     strokes = last.system.motion.half_cycles
     late = float(last.periodicity[-1]) * pressure_scale(last.system, last.pressure[-1]) / (2 * strokes)
-    found: Contribution = {}
+    contribution: Contribution = {}
     for body, depth, start in (("punch", last.wear, first.wear), ("strip", last.wear_strip, first.wear_strip)):
         rate = float(start[0].max()) / int(first.half_cycle[0])
         mean = float(depth[-1].max()) / int(last.half_cycle[-1])
-        found[Quantity("largest_depth", body)] = abs(rate - mean) / 2
+        contribution[Quantity("largest_depth", body)] = abs(rate - mean) / 2
     if last.heat is not None and len(last.half_cycle) > strokes:
         sides = (last.heat.temperature_punch, last.heat.temperature_strip)
         change = max(float(np.abs(side[-1] - side[-1 - strokes]).max()) for side in sides)
-        found[Quantity("largest_temperature")] = change / (2 * strokes)
+        contribution[Quantity("largest_temperature")] = change / (2 * strokes)
     return {
-        quantity: found.get(quantity, late if "pressure" in quantity.name and np.isfinite(late) else 0.0)
+        quantity: contribution.get(quantity, late if "pressure" in quantity.name and np.isfinite(late) else 0.0)
         for quantity in before
     }
 
@@ -283,19 +284,19 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     system, values = state.system, values_of_steady(state)
     case = system.case
     lower = coarser(case, system, nodes_across(system, np.array(state.pressure)))
-    found, untold = dict[str, Contribution](), dict[str, str]()
+    contributions, untold = dict[str, Contribution](), dict[str, str]()
     if not lower.differs:
         untold["mesh"] = NOTHING_BELOW
     else:
         try:
             before = values_of_steady(steady(set_up(lower.case, system, lower)))
-            found["mesh"] = of_mesh(values, before, lower.ratio)
+            contributions["mesh"] = of_mesh(values, before, lower.ratio)
         except (CaseError, ConvergenceError) as error:
             untold["mesh"] = _why(error)
-    found |= of_steady_heat(system, values)
+    contributions |= of_steady_heat(system, values)
     left = state.complementarity_error + ROUNDING
-    found["solver"] = {quantity: left * abs(value.number) for quantity, value in values.items()}
-    return Uncertainty(values, found, untold, time.perf_counter() - begin)
+    contributions["solver"] = {quantity: left * abs(value.number) for quantity, value in values.items()}
+    return Uncertainty(values, contributions, untold, time.perf_counter() - begin)
 
 
 def by_short_jumps(last: Block) -> Block:
@@ -311,15 +312,15 @@ def by_short_jumps(last: Block) -> Block:
     if finer is None:
         return last
     off, totals = end.worn - finer.worn, end.totals - finer.totals
-    found = replace(
+    block = replace(
         last,
         wear=_last_less(last.wear, off.punch),
         wear_strip=_last_less(last.wear_strip, off.strip),
         totals=replace(last.totals, sums=_last_less(last.totals.sums, totals.sums)),
     )
     if last.steps:
-        return _with_steps(found, finer)
-    return _with_heat(_with_pressures(found, finer), finer)
+        return _with_steps(block, finer)
+    return _with_heat(_with_pressures(block, finer), finer)
 
 
 def _with_steps(last: Block, finer: RunState) -> Block:
@@ -330,12 +331,12 @@ def _with_steps(last: Block, finer: RunState) -> Block:
 
 def _with_pressures(last: Block, finer: RunState) -> Block:
     """Return a block with the pressures of another state in its last cycle."""
-    motion, (own, other) = last.system.motion, (all_phases(state.contacts).pressure for state in (last.end, finer))
-    if not len(own) or not len(other):
+    motion, (coarse, other) = last.system.motion, (all_phases(state.contacts).pressure for state in (last.end, finer))
+    if not len(coarse) or not len(other):
         return last
     middle = slice(motion.positions // 2, None, motion.positions)
     pressure = last.pressure.copy()
-    pressure[-motion.half_cycles :] -= (own - other)[middle]
+    pressure[-motion.half_cycles :] -= (coarse - other)[middle]
     return replace(last, pressure=np.maximum(pressure, 0.0))
 
 
@@ -344,8 +345,8 @@ def _with_heat(last: Block, finer: RunState) -> Block:
     exchange, heat = last.system.exchange, last.heat
     if heat is None:
         return last
-    own, other = (exchange.contact_temperatures(exchange.own(one.temperature)) for one in (last.end, finer))
-    punch, strip = own[0] - other[0], own[1] - other[1]
+    coarse, other = (exchange.contact_temperatures(exchange.own(state.temperature)) for state in (last.end, finer))
+    punch, strip = coarse[0] - other[0], coarse[1] - other[1]
     heat = replace(
         heat,
         temperature_punch=_last_less(heat.temperature_punch, punch),
@@ -356,22 +357,24 @@ def _with_heat(last: Block, finer: RunState) -> Block:
 
 def _last_less(rows: Array, change: Array) -> Array:
     """Return rows whose last one is less by a change."""
-    found = rows.copy()
-    found[-1] -= change
-    return found
+    changed = rows.copy()
+    changed[-1] -= change
+    return changed
 
 
 HIGHEST = 8  # degree of elements
 
 
-def uncertainty_table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
+def uncertainty_table(system: Tribosystem, estimate: Uncertainty) -> dict[str, Any]:
     """Return an uncertainty as summary.json has it: under the names of the numbers, in all and by its sources."""
     return {
-        **(_named(system, found.total) if found.is_whole else {}),
-        "contributions": {source: _named(system, own) for source, own in found.contributions.items()},
-        **({"untold": found.untold} if found.untold else {}),
-        "remedies": remedies(system, found),
-        "seconds": found.seconds,
+        **(_named(system, estimate.total) if estimate.is_whole else {}),
+        "contributions": {
+            source: _named(system, contribution) for source, contribution in estimate.contributions.items()
+        },
+        **({"untold": estimate.untold} if estimate.untold else {}),
+        "remedies": remedies(system, estimate),
+        "seconds": estimate.seconds,
     }
 
 
@@ -396,13 +399,13 @@ def _way(system: Tribosystem, quantity: Quantity) -> str:
     return system.direction_words[int(motion.phases[stroke * motion.positions].direction)]
 
 
-def remedies(system: Tribosystem, found: Uncertainty) -> dict[str, str]:
+def remedies(system: Tribosystem, estimate: Uncertainty) -> dict[str, str]:
     """Return for each kind of number what would lower its uncertainty most, a key and its value."""
     worst: dict[str, tuple[float, str]] = {}
-    for quantity, value in found.values.items():
-        share = found.total[quantity] / max(abs(value.number), 1e-300)
+    for quantity, value in estimate.values.items():
+        share = estimate.total[quantity] / max(abs(value.number), 1e-300)
         if share > worst.get(quantity.name, (0.0, ""))[0]:
-            worst[quantity.name] = share, found.largest(quantity)
+            worst[quantity.name] = share, estimate.largest(quantity)
     return {name: remedy for name, (_, source) in worst.items() if (remedy := _remedy(system, source))}
 
 

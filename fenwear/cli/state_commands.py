@@ -306,10 +306,10 @@ def _way_text(rate: float, followed: bool, cycles: RunningIn | None, seconds: di
         text = "pressure within 1 % of the pressure scale: not found within ten million cycles from the initial shape"
     else:
         digit = 10 ** math.floor(math.log10(max(cycles.uncertainty, 1)))  # no more are known
-        number, wrong = (digit * round(one / digit) for one in (cycles.cycles, cycles.uncertainty))
+        number, wrong = (digit * round(value / digit) for value in (cycles.cycles, cycles.uncertainty))
         about = f"after about {number:,} ± {wrong:,} cycles"
         text = f"pressure within 1 % of the pressure scale {about} from the initial shape"
-    setup, state, way, in_all = (_duration(one) for one in seconds.values())
+    setup, state, way, in_all = (_duration(duration) for duration in seconds.values())
     return f"{text}\n{in_all} in all: meshes and operators {setup}, steady state {state}, running-in {way}"
 
 

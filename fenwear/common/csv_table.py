@@ -99,8 +99,8 @@ def read_profile(path: Path, key: str, measured: Mapping[str, str] = DEPTHS) -> 
     names = table.names
     places = [name for name in names if name not in measured]
     if tuple(sorted(places)) not in PLACES or len(places) + 1 != len(names):
-        what = " or ".join(measured)
-        raise table.wrong(f"expected the columns x and {what}, r of rings, s along a curve, or x, y, (z) of solids")
+        columns = " or ".join(measured)
+        raise table.wrong(f"expected the columns x and {columns}, r of rings, s along a curve, or x, y, (z) of solids")
     order = [names.index(name) for name in sorted(places)]
     (at,) = (k for k, name in enumerate(names) if name not in places)
     sign = -1.0 if names[at] == "height" else 1.0

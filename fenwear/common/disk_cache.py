@@ -70,8 +70,8 @@ def summary() -> dict[str, Any]:
         CaseError: the limit is no number.
     """
     sizes = [size for _, size in files()]
-    found = {"folder": str(folder()), "files": len(sizes), "MiB": round(sum(sizes) / 2**20, 1)}
-    return {**found, "limit_MiB": limit() / 2**20}
+    numbers = {"folder": str(folder()), "files": len(sizes), "MiB": round(sum(sizes) / 2**20, 1)}
+    return {**numbers, "limit_MiB": limit() / 2**20}
 
 
 @cache
@@ -145,9 +145,9 @@ class Kept:
                 _reported.append(str(error))
                 text = f"set-ups are not kept in {folder()}: {error.strerror}; {LIMIT}=0 keeps none"
                 print(f"fenwear: {text}", file=sys.stderr)
-        found = files()
-        rest = sum(size for _, size in found) - limit()
-        for path, size in found:
+        kept = files()
+        rest = sum(size for _, size in kept) - limit()
+        for path, size in kept:
             if rest > 0:
                 rest -= size
                 path.unlink(missing_ok=True)

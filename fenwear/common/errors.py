@@ -41,8 +41,8 @@ class CaseError(FenwearError):
     """The case, its geometry or the usage is wrong; lists every problem found."""
 
     def __init__(self, problems: Sequence[InputError] | InputError) -> None:
-        found = [problems] if isinstance(problems, InputError) else problems
-        self.problems = [InputError(_shortened(p.key), _shortened(p.message)) for p in found]
+        listed = [problems] if isinstance(problems, InputError) else problems
+        self.problems = [InputError(_shortened(p.key), _shortened(p.message)) for p in listed]
         super().__init__("\n".join(f"{p.key}: {p.message}" if p.key else p.message for p in self.problems))
 
     def __reduce__(self) -> tuple[type[CaseError], tuple[list[InputError]]]:

@@ -58,9 +58,9 @@ def all_together(comm: MPI.Comm) -> None:
         raise TimeUpError
 
 
-def agreed(comm: MPI.Comm, found: T) -> T:
+def agreed(comm: MPI.Comm, value: T) -> T:
     """Return the value of rank 0 on every rank, by which further collective calls are decided; collective."""
-    return Team.of(comm).lead(lambda: found)
+    return Team.of(comm).lead(lambda: value)
 
 
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -276,9 +276,9 @@ class _Packer(pickle.Pickler):
         super().__init__(file, protocol=5)
         self._number = number
 
-    def persistent_id(self, one: object) -> int | None:
+    def persistent_id(self, part: object) -> int | None:
         """Return the number of a part; None for what is packed as it is."""
-        return self._number(one)
+        return self._number(part)
 
 
 class _Unpacker(pickle.Unpickler):
@@ -316,7 +316,7 @@ def memory_size(memory: float) -> str:
     return f"{memory / GIB:.1f} GiB" if memory > 0.1 * GIB else f"{memory / 2**20:.0f} MiB"
 
 
-def check_memory(comm: MPI.Comm, taken: float, key: str, what: str, advice: str, *, spread: bool = False) -> None:
+def check_memory(comm: MPI.Comm, taken: float, key: str, subject: str, advice: str, *, spread: bool = False) -> None:
     """Make sure that a step fits into the memory that is free; collective.
 
     Args:
@@ -333,7 +333,7 @@ def check_memory(comm: MPI.Comm, taken: float, key: str, what: str, advice: str,
     free = free_on_ranks(comm) if spread else agreed(comm, free_memory())
     if taken > max(free, SMALL):
         sizes = f"{memory_size(taken)}, but {memory_size(free)} are free"
-        raise CaseError(InputError(key, f"{what} takes about {sizes}. {advice}"))
+        raise CaseError(InputError(key, f"{subject} takes about {sizes}. {advice}"))
 
 
 def free_on_ranks(comm: MPI.Comm) -> float:

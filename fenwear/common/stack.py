@@ -158,7 +158,7 @@ def versions() -> dict[str, str]:
 
     import fenwear
 
-    found = {
+    by_name = {
         "fenwear": fenwear.__version__,
         "dolfinx": dolfinx.__version__,
         "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
@@ -167,8 +167,8 @@ def versions() -> dict[str, str]:
     }
     for name in ("fenics-ufl", "fenics-basix", "gmsh", "numpy", "scipy", "xarray", "h5netcdf", "pydantic", "pint"):
         try:
-            found[name] = metadata.version(name)
+            by_name[name] = metadata.version(name)
         except metadata.PackageNotFoundError:  # a Debian package without Python metadata
             module = __import__(name.removeprefix("fenics-"))
-            found[name] = str(getattr(module, "__version__", "present"))
-    return found
+            by_name[name] = str(getattr(module, "__version__", "present"))
+    return by_name

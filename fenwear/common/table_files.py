@@ -121,11 +121,11 @@ class Table:
                 raise ValueError(f"expected a unit such as {unit}, got a pure number")
             if not head.unit:
                 return 1.0, 0.0
-            zero, one = (convert(f"{number} {head.unit}", unit) for number in (0, 1))
+            at_zero, at_one = (convert(f"{number} {head.unit}", unit) for number in (0, 1))
         except ValueError as error:
             message = str(error).replace(f"got '0 {head.unit}'", f"got {head.unit!r}")  # no row has that number
             raise TableError(f"column {head.name!r}", f"unit: {message}") from None
-        return one - zero, zero
+        return at_one - at_zero, at_zero
 
     def _cell(self, row: int, cell: str, head: Head, unit: str, scale: float, zero: float) -> float:
         """Return a cell that may have a unit of its own."""
@@ -296,7 +296,7 @@ def _heading_at(body: Sequence[tuple[int, str]], known: Collection[str], *, keys
 def _separator(line: str) -> str:
     """Return the separator of the cells of a heading."""
     bare = re.sub(r"[(\[][^)\]]*[)\]]|\"[^\"]*\"", "", line)
-    return next((one for one in "\t;," if one in bare), " ")
+    return next((separator for separator in "\t;," if separator in bare), " ")
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -427,8 +427,8 @@ def _complete(
             left_out.append(line)
         else:
             cell = cells[[head.name for head in heads].index(empty[0])].strip()
-            what = f"expected a finite number, got {cell!r}" if cell else "expected a number, got none"
-            message = f"{what}. Fill it, remove the row, or write '# missing = skip' above."
+            expected = f"expected a finite number, got {cell!r}" if cell else "expected a number, got none"
+            message = f"{expected}. Fill it, remove the row, or write '# missing = skip' above."
             raise TableError(f"row {line}, column {empty[0]!r}", message)
     return kept, left_out
 

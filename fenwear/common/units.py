@@ -113,7 +113,7 @@ def _convert_text(text: str, unit: str, expected: str) -> float:
     if not _HARMLESS_UNIT.fullmatch(given) or re.search(r"\d{3}|\^\s*\^", given):
         raise ValueError(f"{expected}, got {text!r}")
     units = list(_units(given))
-    values = [value for value in (_in_unit(number, one, unit) for one in units) if value is not None]
+    values = [value for value in (_in_unit(number, spelling, unit) for spelling in units) if value is not None]
     if any(not math.isclose(value, values[0], rel_tol=1e-12) for value in values):
         raise ValueError(f"{expected}, got {text!r}, which may be read in several ways: write parentheses")
     if not values:
@@ -145,9 +145,9 @@ def _plain(text: str) -> str:
 def _units(given: str) -> Iterator[str]:
     """Yield the ways in which people mean a unit: W/mK as W/(m*K), where its kind lets only one of them be."""
     given = _EXPONENT.sub(r"\1^\2 ", given)
-    for one in dict.fromkeys((given, _TOGETHER.sub(lambda match: " ".join(filter(None, match.groups())), given))):
-        yield one
-        above, slash, below = one.partition("/")
+    for spelling in dict.fromkeys((given, _TOGETHER.sub(lambda match: " ".join(filter(None, match.groups())), given))):
+        yield spelling
+        above, slash, below = spelling.partition("/")
         if slash and not re.search(r"[/()]", below):
             yield f"{above}/({below})"
 
@@ -173,7 +173,7 @@ def _reason(given: str, units: Sequence[str], unit: str) -> str:
     """Return the reason why a unit is rejected, and how to write it."""
     if _SCALES.search(given):
         return ", a hardness: 1 HV is 9.81 MPa, other scales have tables (ASTM E140)"
-    known = [parsed for one in units if (parsed := _parsed(one)) is not None]
+    known = [parsed for spelling in units if (parsed := _parsed(spelling)) is not None]
     if not known:
         other = next((way for way in _other_capitals(units) if _in_unit(1.0, way, unit) is not None), "")
         return ", whose unit is not known" + (f": write {other!r} if you mean that" if other else "")
@@ -183,16 +183,19 @@ def _reason(given: str, units: Sequence[str], unit: str) -> str:
         ("m/s^2", ": a mass is no force: write 'kgf', 'gf' or 'lbf' for its weight"),
     )
     for factor, hint in hints:
-        if any((one * one._REGISTRY.parse_units(factor)).is_compatible_with(unit or "dimensionless") for one in known):
+        if any(
+            (parsed_unit * parsed_unit._REGISTRY.parse_units(factor)).is_compatible_with(unit or "dimensionless")
+            for parsed_unit in known
+        ):
             return f", which is of another kind{hint}"
     return ", which is of another kind"
 
 
 def _other_capitals(units: Sequence[str]) -> Iterator[str]:
     """Yield a unit in other capitals: MPa for Mpa."""
-    for one in units:
+    for spelling in units:
         for way in ("MPa", "GPa", "kPa", "Pa", "kN", "MN", "N", "mm", "m", "s", "h", "K", "W", "J"):
-            yield re.sub(rf"(?<![A-Za-zµ°]){way}(?![A-Za-zµ°])", way, one, flags=re.IGNORECASE)
+            yield re.sub(rf"(?<![A-Za-zµ°]){way}(?![A-Za-zµ°])", way, spelling, flags=re.IGNORECASE)
 
 
 def _power_of_ten(given: str, unit: str) -> int | None:
@@ -202,11 +205,11 @@ def _power_of_ten(given: str, unit: str) -> int | None:
     """
     if given == unit:
         return 0
-    one, other = _METRIC.fullmatch(given), _METRIC.fullmatch(unit)
-    if one is None or other is None or one[3] != other[3]:
+    first, other = _METRIC.fullmatch(given), _METRIC.fullmatch(unit)
+    if first is None or other is None or first[3] != other[3]:
         return None
-    signs = [-1 if bool(match[1]) != bool(match[4]) else 1 for match in (one, other)]
-    return signs[0] * (POWERS[one[2]] - POWERS[other[2]]) if signs[0] == signs[1] else None
+    signs = [-1 if bool(match[1]) != bool(match[4]) else 1 for match in (first, other)]
+    return signs[0] * (POWERS[first[2]] - POWERS[other[2]]) if signs[0] == signs[1] else None
 
 
 def shown(value: object) -> str:  # noqa: PLR0911

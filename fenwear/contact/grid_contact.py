@@ -164,11 +164,11 @@ class GriddedPhases:
         self.grid, self.opened = grid, opened
         self.m, (self.n, r) = len(grid.of), grid.modes[0].shape
         self.size = self.n + r
-        self._slopes = grid.boxes.whole.slopes(opened)
+        self._slopes = grid.boxes.of_all.slopes(opened)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        parts, on = x.reshape(self.m, -1), self.grid.boxes.whole
+        parts, on = x.reshape(self.m, -1), self.grid.boxes.of_all
         gaps, forces = on.multiply(on.box.spread(parts[:, : self.n]), parts[:, self.n :], self._slopes)
         return np.concatenate([on.box.values(gaps), forces], axis=1).ravel()
 

@@ -344,7 +344,7 @@ def deformed(data: xarray.Dataset, body: str, view: View) -> Array:
     plane = np.eye(3) - np.outer(view.normal, view.normal)
     tree = cKDTree(contact @ plane)
     count = min(NEIGHBOURS, len(contact))
-    distance, near = (found.reshape(len(x), count) for found in tree.query(x @ plane, k=count))
+    distance, near = (table.reshape(len(x), count) for table in tree.query(x @ plane, k=count))
     share = 1 / np.maximum(distance, 1e-9 * view.length)
     depth = (share * data[f"{body}_contact_wear"].values[near]).sum(axis=1) / share.sum(axis=1)
     apart = float(np.median(tree.query(contact @ plane, k=2)[0][:, 1]))

@@ -216,14 +216,14 @@ def _shapes(history: xarray.Dataset) -> Iterator[Drawn]:
         by_direction = name == "pressure" and not solid
         for d in directions_present(history) if by_direction else (0,):
             rows = history[name].values if d == 0 else history[name].values[history.direction.values == d]
-            own = f"{title}, {strip_moves(history)} {words[d]}" if d else title
+            shape_title = f"{title}, {strip_moves(history)} {words[d]}" if d else title
             for along in (True, False) if solid else (True,):
                 track = tracks_of(history, along=along)[0]
                 cut = f", {'along' if along else 'across'} the sliding" if solid else ""
                 label = track.label.partition(",")[0]
                 x, y = track.line(field.factor * rows[-1], field.body)
                 ends = worn_range(history) if field.body == "strip" and not solid else None
-                yield Drawn(own + cut, label, field.label, x, y, ends=ends)
+                yield Drawn(shape_title + cut, label, field.label, x, y, ends=ends)
 
 
 def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:

@@ -108,7 +108,7 @@ class Surface:
             (seen[self.part == k].min(axis=0), seen[self.part == k].max(axis=0)) for k in range(self.part.max() + 1)
         ]
         return any(
-            (np.minimum(one[1], other[1]) > np.maximum(one[0], other[0])).all() for one, other in combinations(boxes, 2)
+            (np.minimum(box[1], other[1]) > np.maximum(box[0], other[0])).all() for box, other in combinations(boxes, 2)
         )
 
     @cached_property
@@ -145,12 +145,12 @@ class Surface:
         if not self.overlaps:
             return
         places, texts = list[float](), list[str]()
-        whole = float(np.ptp(self.map[:, self._beside]))
+        width = float(np.ptp(self.map[:, self._beside]))
         for k in range(self.part.max() + 1):
-            own = self._flat[self.part == k, self._beside]
-            values = MaxNLocator(TICKS).tick_values(own.min(), own.max())
-            values = values[(values >= own.min()) & (values <= own.max())]
-            if len(values) > 1 and values[0] + self._apart - values[-1] < CLOSE * whole:
+            beside = self._flat[self.part == k, self._beside]
+            values = MaxNLocator(TICKS).tick_values(beside.min(), beside.max())
+            values = values[(values >= beside.min()) & (values <= beside.max())]
+            if len(values) > 1 and values[0] + self._apart - values[-1] < CLOSE * width:
                 values = values[1:]  # its text would run into the last one of the part before
             places += [float(value + k * self._apart) for value in values]
             texts += [f"{value:g}" for value in values]
@@ -159,14 +159,14 @@ class Surface:
     @cached_property
     def labels(self) -> list[tuple[str, Array]]:
         """Names of contacts and where they stand on the map (2,), mm: in the middle of their parts; unrolled aside."""
-        found = []
+        placed = []
         for name in np.unique(self.contact):
-            own = self.map[self.contact == name]
-            at = own.mean(axis=0)
+            places = self.map[self.contact == name]
+            at = places.mean(axis=0)
             if self.unrolled:
-                at[0] = own[:, 0].min() + ASIDE * np.ptp(own[:, 0])
-            found.append((name, at))
-        return found
+                at[0] = places[:, 0].min() + ASIDE * np.ptp(places[:, 0])
+            placed.append((name, at))
+        return placed
 
     @cached_property
     def border(self) -> Array:
@@ -245,8 +245,8 @@ class Surface:
         free, fixed = (0, 1) if along else (1, 0)
         # Where a track is closed, triangles between its two ends lie all over it.
         size = np.ptp(self.sliding[self.triangles, 0], axis=1)
-        whole = size < 0.5 * max(float(np.ptp(self.sliding[:, 0])), 1e-300)
-        kept = self.triangles[whole] if whole.any() else self.triangles
+        small = size < 0.5 * max(float(np.ptp(self.sliding[:, 0])), 1e-300)
+        kept = self.triangles[small] if small.any() else self.triangles
         if nodes is None:
             nodes = self.part == 0 if self.overlaps else np.ones(len(self.x), dtype=bool)
         kept = kept[nodes[kept].all(axis=1)]
@@ -257,8 +257,8 @@ class Surface:
             return places, np.full(POINTS, np.nan)
         corners, kept = np.unique(kept, return_inverse=True)
         plane = Triangulation(self.sliding[corners, free], self.sliding[corners, fixed], kept.reshape(-1, 3))
-        found: Any = LinearTriInterpolator(plane, values[corners])(places, np.full(POINTS, at[fixed]))
-        return places, np.asarray(found.filled(np.nan))
+        interpolated: Any = LinearTriInterpolator(plane, values[corners])(places, np.full(POINTS, at[fixed]))
+        return places, np.asarray(interpolated.filled(np.nan))
 
 
 def surface_of(history: xarray.Dataset, body: str = "punch") -> Surface:
@@ -300,11 +300,15 @@ def cut_places(history: xarray.Dataset) -> list[CutPlace]:
         owns = {f"part {k + 1}": punch.part == k for k in range(punch.part.max() + 1)}
     else:
         owns = {"": np.ones(len(punch.x), dtype=bool)}
-    found = []
-    for name, own in owns.items():
-        nodes = {"punch": own} if strip is None else {"punch": own, "strip": _opposite(strip, name, punch.x[own])}
-        found.append(CutPlace(name, centre_of_wear(history, nodes), nodes))
-    return found
+    cuts = []
+    for name, contact_nodes in owns.items():
+        nodes = (
+            {"punch": contact_nodes}
+            if strip is None
+            else {"punch": contact_nodes, "strip": _opposite(strip, name, punch.x[contact_nodes])}
+        )
+        cuts.append(CutPlace(name, centre_of_wear(history, nodes), nodes))
+    return cuts
 
 
 def _opposite(strip: Surface, name: str, x: Array) -> Mask:
@@ -325,17 +329,17 @@ def centre_of_wear(history: xarray.Dataset, nodes: Mapping[str, Mask] | None = N
         nodes: That count of each body (n,); by default all.
     """
     last = history.isel(half_cycle=-1)
-    own: dict[str, Any] = {body: slice(None) for body in BODIES} if nodes is None else dict(nodes)
+    chosen: dict[str, Any] = {body: slice(None) for body in BODIES} if nodes is None else dict(nodes)
 
     def centre(weights: Array, body: str) -> Array:
         end = BODIES[body]
-        ways = [last[f"{name}{end}"].values[own[body]] for name in ("along", "across")]
-        return np.array([np.average(way, weights=weights[own[body]]) for way in ways])
+        ways = [last[f"{name}{end}"].values[chosen[body]] for name in ("along", "across")]
+        return np.array([np.average(way, weights=weights[chosen[body]]) for way in ways])
 
     for body, end in BODIES.items():
         if f"wear{end}" in last:
             volume = (last[f"wear{end}"] * last[f"weight{end}"]).values
-            if volume[own[body]].sum() > 0:
+            if volume[chosen[body]].sum() > 0:
                 return centre(volume, body)
     return centre(last.weight.values, "punch")
 

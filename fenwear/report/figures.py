@@ -110,14 +110,14 @@ def _of_cycles(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> d
     fields = [field for field in OF_CYCLES if field.variable in sums]
     ends = nearest_half_cycles(sums, chosen)
     if model_of(history) == "solid":
-        return drawn | {f"{one.variable}_map": map_figure(sums, one, [ends[0], ends[-1]], look) for one in fields}
+        return drawn | {f"{field.variable}_map": map_figure(sums, field, [ends[0], ends[-1]], look) for field in fields}
     return drawn | {"sliding": lines_figure(sums, fields, ends, look)}
 
 
 def _on_surfaces(history: xarray.Dataset, chosen: Sequence[int], look: Style) -> dict[str, Figure]:
     """Return maps of a solid, and cuts along and across the sliding."""
     surfaces, between = with_surfaces(history, chosen[-MAPS:]), between_of(history)
-    drawn = {f"{n}_map": map_figure(surfaces, one, chosen[-MAPS:], look) for n, one in fields_of(surfaces).items()}
+    drawn = {f"{n}_map": map_figure(surfaces, field, chosen[-MAPS:], look) for n, field in fields_of(surfaces).items()}
     if has_tracks(history):
         drawn["tracks"] = tracks_figure(history, look)
     cut = [field for name, field in fields_of(history).items() if name not in between]
@@ -180,7 +180,7 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
     text = TEXTS.get(name, "")
     if name.endswith("_map") and (solid or not text) and name.removesuffix("_map") in (fields := _mapped(history)):
         text = f"Maps of the {fields[name.removesuffix('_map')]} at {{chosen}}, the largest value above each."
-    found = text.format(
+    sentences = text.format(
         bodies=" and ".join(f"the {body}" for body in bodies),
         chosen=chosen,
         panels=panels,
@@ -190,15 +190,15 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
         last=f"{int(history.half_cycle[-1]):,}",
     )
     if name in ALONG and (sides := sides_of(history)) is not None:
-        found += f" Solid: the contact {sides[0]}; dotted: {sides[1]}."
+        sentences += f" Solid: the contact {sides[0]}; dotted: {sides[1]}."
     if name.startswith("cuts") and len(cut_places(history)) > 1:
-        found += " Each contact through the middle of its own wear."
-    return found
+        sentences += " Each contact through the middle of its own wear."
+    return sentences
 
 
 def _mapped(history: xarray.Dataset) -> dict[str, str]:
     """Return the titles of what there are maps of, by the variable."""
     text = "height of the {} over its smooth shape, without the form of its scar (S-F, ISO 25178),"
     rough = {f"surface{end}": text.format(body) for body, end in BODIES.items()}
-    of_cycles = {one.variable: one.title for one in OF_CYCLES}
+    of_cycles = {field.variable: field.title for field in OF_CYCLES}
     return {name: field.title for name, field in fields_of(history).items()} | rough | of_cycles

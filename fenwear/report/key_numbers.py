@@ -167,7 +167,10 @@ class Number(NamedTuple):
 def answers(summary: Mapping[str, Any]) -> list[Number]:
     """Return the main results of a run, with uncertainties: wear and its place, pressures, temperatures."""
     given = summary.get(UNCERTAINTY, {})
-    numbers, sources = flat(summary), {source: flat(own) for source, own in given.get("contributions", {}).items()}
+    numbers, sources = (
+        flat(summary),
+        {source: flat(contribution) for source, contribution in given.get("contributions", {}).items()},
+    )
     uncertain = flat({key: value for key, value in given.items() if key not in NO_NUMBERS})
     rows = []
     for path, value in numbers.items():
@@ -175,7 +178,9 @@ def answers(summary: Mapping[str, Any]) -> list[Number]:
         if path.startswith((UNCERTAINTY, "contacts.")) or not key.startswith(ANSWERS) or key not in ALL_LINES:
             continue
         within = uncertain.get(path, 0.0)
-        parts = sorted(((own.get(path, 0.0), source) for source, own in sources.items()), reverse=True)
+        parts = sorted(
+            ((contribution.get(path, 0.0), source) for source, contribution in sources.items()), reverse=True
+        )
         most = [f"{s.replace('_', ' ')} {100 * part / within:.0f} %" for part, s in parts if part > SMALL * within > 0]
         line, digits, text = ALL_LINES[key], 5, ""
         if within and value:

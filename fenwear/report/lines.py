@@ -83,7 +83,7 @@ OF_CYCLES = (
 def fields_of(history: xarray.Dataset) -> dict[str, Field]:
     """Return the fields that a history has at the nodes of a contact, by the variable."""
     warm = temperature_unit(history)
-    found = [
+    candidates = [
         Field("pressure", "punch", "contact pressure", "MPa", colours="YlGnBu"),
         Field(LATE, "punch", "mean pressure", "MPa", colours="YlGnBu"),
         *(Field(f"wear{end}", body, f"worn depth of the {body}", "µm", 1e3, "YlOrBr") for body, end in BODIES.items()),
@@ -92,21 +92,21 @@ def fields_of(history: xarray.Dataset) -> dict[str, Field]:
         *OF_CYCLES,
         *between_of(history).values(),
     ]
-    return {field.variable: field for field in found if field.variable in history}
+    return {field.variable: field for field in candidates if field.variable in history}
 
 
 def between_of(history: xarray.Dataset) -> dict[str, Field]:
     """Return the fields between the surfaces: debris, plastic depth, coatings, and states that laws remember."""
-    found = {}
+    fields = {}
     for name, values in history.data_vars.items():
         variable = str(name)
         body = "strip" if any(str(over).endswith("_strip") for over in values.dims) else "punch"
         if variable in LIES_BETWEEN:
-            found[variable] = Field(variable, body, LIES_BETWEEN[variable], "µm", 1e3)
+            fields[variable] = Field(variable, body, LIES_BETWEEN[variable], "µm", 1e3)
         elif variable.startswith(STATE):
             title = variable.removeprefix(STATE).replace("_", " ")
-            found[variable] = Field(variable, body, title, str(values.attrs["units"]))
-    return found
+            fields[variable] = Field(variable, body, title, str(values.attrs["units"]))
+    return fields
 
 
 def with_late_pressures(history: xarray.Dataset) -> xarray.Dataset:
@@ -115,12 +115,12 @@ def with_late_pressures(history: xarray.Dataset) -> xarray.Dataset:
     From the end of a cycle before that tenth on, however far it lies back. At an instant the nodes at an edge that
     moves are at any fraction of their coming; what they have borne since is what they have lost.
     """
-    found = history.isel(half_cycle=cycle_ends(history))
-    ends = np.concatenate([[0], found.half_cycle.values])
-    borne = np.concatenate([np.zeros((1, *found.pressure.shape[1:])), found.pressure_sum.values])
+    cycles = history.isel(half_cycle=cycle_ends(history))
+    ends = np.concatenate([[0], cycles.half_cycle.values])
+    borne = np.concatenate([np.zeros((1, *cycles.pressure.shape[1:])), cycles.pressure_sum.values])
     before = np.searchsorted(ends, (1 - LAST) * ends[1:], side="right") - 1
     late = (borne[1:] - borne[before]) / (ends[1:] - ends[before])[:, None]
-    return found.assign({LATE: (found.pressure.dims, late)})
+    return cycles.assign({LATE: (cycles.pressure.dims, late)})
 
 
 def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> list[int]:
@@ -165,7 +165,7 @@ def tracks_of(history: xarray.Dataset, *, along: bool = True) -> list[Track]:
         return [Track("", label, lambda values, body: (along_contact(history, body)[0], values))]
     surfaces = {body: surface_of(history, body) for body in BODIES if body == "punch" or "x_strip" in history}
     grain = 1e-4 * float(np.ptp(surfaces["punch"].sliding, axis=0).max())
-    found = []
+    tracks = []
     for place in cut_places(history):
         at, other = (float(place.at[1]), "across") if along else (float(place.at[0]), "along")
         at = round(at / grain) * grain
@@ -174,8 +174,8 @@ def tracks_of(history: xarray.Dataset, *, along: bool = True) -> list[Track]:
         def line(values: Array, body: str, place: Any = place) -> tuple[Array, Array]:
             return surfaces[body].cut(values, place.at, along=along, nodes=place.nodes[body])
 
-        found.append(Track(place.name, label, line))
-    return found
+        tracks.append(Track(place.name, label, line))
+    return tracks
 
 
 def lines_figure(
@@ -193,7 +193,7 @@ def lines_figure(
     legend has the largest.
     """
     tracks, solid = tracks_of(history, along=along), model_of(history) == "solid"
-    rows = [(one, d) for one in fields for d in _ways(history, one, solid=solid)]
+    rows = [(field, d) for field in fields for d in _ways(history, field, solid=solid)]
     columns = len(tracks) if len(tracks) <= BESIDE and look.width >= NARROW else 1
     order = [(row, track) for row in rows for track in tracks]
     if columns == 1:
@@ -229,16 +229,19 @@ def _draw(
     look: Style,
 ) -> None:
     """Draw a field along a track at the half-cycles of a direction that are nearest to the chosen ones."""
-    own = history if direction == 0 else history.isel(half_cycle=history.direction.values == direction)
+    direction_history = history if direction == 0 else history.isel(half_cycle=history.direction.values == direction)
     top = pressure_top(history, half_cycles) if field.variable == "pressure" else np.inf
-    for colour, n in shades(nearest_half_cycles(own, half_cycles)):
-        values = field.factor * own[field.variable].sel(half_cycle=n).values
+    for colour, n in shades(nearest_half_cycles(direction_history, half_cycles)):
+        values = field.factor * direction_history[field.variable].sel(half_cycle=n).values
         beyond = f" (to {values.max():.3g} MPa)" if values.max() > top else ""
         style: dict[str, Any] = {"color": colour, "linestyle": "--" if direction < 0 else "-"}
         ax.plot(*track.line(values, field.body), label=look.name(history, n) + beyond, gid=str(n), **style)
     if field.variable in (known := levels(history)):
         level_line(ax, *known[field.variable])
-    if not field.variable.startswith(("temperature", "surface")) and float(own[field.variable].min()) >= 0:
+    if (
+        not field.variable.startswith(("temperature", "surface"))
+        and float(direction_history[field.variable].min()) >= 0
+    ):
         from_zero(ax)
     ax.set_ylim(top=min(top, ax.get_ylim()[1]))
     ax.margins(x=0.01)
@@ -258,7 +261,7 @@ def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
 def that_wear(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
     """Return the surfaces that something is worn off; all where nothing is."""
     surfaces = surfaces_of(history)
-    return {body: one for body, one in surfaces.items() if float(one[1].max()) > 0} or surfaces
+    return {body: surface for body, surface in surfaces.items() if float(surface[1].max()) > 0} or surfaces
 
 
 def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:

@@ -80,8 +80,8 @@ def _reached(history: xarray.Dataset, body: str) -> Mask:
     """Return which nodes of a body's surface touch or wear in a run (n,); all where none does."""
     end = BODIES[body]
     names = [name for name in (f"wear{end}", "pressure" if body == "punch" else "") if name in history]
-    found: Mask = np.any([(history[name].values > 0).any(axis=0) for name in names], axis=0)
-    return found if found.any() else np.ones_like(found)
+    reached: Mask = np.any([(history[name].values > 0).any(axis=0) for name in names], axis=0)
+    return reached if reached.any() else np.ones_like(reached)
 
 
 def _size(field: Field, values: Array) -> str:
@@ -145,7 +145,7 @@ def with_surfaces(history: xarray.Dataset, half_cycles: Sequence[int]) -> xarray
     Less what has worn, and where numbers of roughness are of them less their form, too (the S-F surface of ISO 25178):
     a scar may be many times as deep as its roughness.
     """
-    found = {}
+    surfaces = {}
     for body, end in BODIES.items():
         if f"topography{end}" not in history:
             continue
@@ -155,8 +155,8 @@ def with_surfaces(history: xarray.Dataset, half_cycles: Sequence[int]) -> xarray
             depth = worn.values[row]
             heights[row] = history[f"topography{end}"].values - depth
             heights[row, evaluated(places, depth > 0)] = levelled(places, heights[row], depth > 0)
-        found[f"surface{end}"] = worn.copy(data=heights)
-    return history.assign(found)
+        surfaces[f"surface{end}"] = worn.copy(data=heights)
+    return history.assign(surfaces)
 
 
 def _places(history: xarray.Dataset, body: str, end: str) -> NDArray[np.int64]:
@@ -206,26 +206,26 @@ def tracks_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
 def _spread(places: Array, count: int) -> NDArray[np.int64]:
     """Return which of places (n, 2) lie far apart: from that in the middle on each farthest from all before."""
     first = int(np.linalg.norm(places - places.mean(axis=0), axis=1).round(9).argmin())
-    found, apart = [first], np.full(len(places), np.inf)
-    while len(found) < min(count, len(places)):
-        apart = np.minimum(apart, np.linalg.norm(places - places[found[-1]], axis=1))
-        found.append(int(apart.round(9).argmax()))
-    return np.array(found)
+    chosen, apart = [first], np.full(len(places), np.inf)
+    while len(chosen) < min(count, len(places)):
+        apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
+        chosen.append(int(apart.round(9).argmax()))
+    return np.array(chosen)
 
 
-def flash_map(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
+def flash_map(temperatures: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the rise of both surfaces at the instant at which one of them is hottest, and the edge of the contact."""
-    first, second = found.pressure.dims[1:]
-    warmth = np.maximum(found.flash_punch.values, found.flash_strip.values)
+    first, second = temperatures.pressure.dims[1:]
+    warmth = np.maximum(temperatures.flash_punch.values, temperatures.flash_strip.values)
     at = int(warmth.max(axis=(1, 2)).argmax())  # the instant at which a surface is hottest
-    x, y = found[first].values, found[second].values
+    x, y = temperatures[first].values, temperatures[second].values
     figure, axes = panels_of_maps(1, 2, np.array([np.ptp(x), np.ptp(y)]), look)
-    rises = [found[f"flash_{body}"].values[at].T for body in BODIES]
+    rises = [temperatures[f"flash_{body}"].values[at].T for body in BODIES]
     low, high = min(rise.min() for rise in rises), max(rise.max() for rise in rises)
     drawn: Any = None
     for ax, body, rise in zip(axes.ravel(), BODIES, rises, strict=True):
         drawn = ax.pcolormesh(x, y, rise, cmap="YlOrRd", vmin=min(low, 0.0), vmax=high or 1.0, shading="nearest")
-        touching = found.pressure.values[at].T > 0
+        touching = temperatures.pressure.values[at].T > 0
         if touching.any() and not touching.all():
             ax.contour(x, y, touching, levels=[0.5], colors="black", linewidths=0.8)
         name_panel(ax, f"{body}\n≤ {rise.max():.3g} K")
@@ -235,16 +235,16 @@ def flash_map(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
     return figure
 
 
-def flash_course(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
+def flash_course(temperatures: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the largest rise of both surfaces, and the mean of the contact, over the cycle."""
     figure, axes = panels(1, 3.0, look=look)
-    touching = found.pressure.values > 0
+    touching = temperatures.pressure.values > 0
     count = np.maximum(touching.sum(axis=(1, 2)), 1)
     for body in BODIES:
-        rise = found[f"flash_{body}"].values
+        rise = temperatures[f"flash_{body}"].values
         mean = (rise * touching).sum(axis=(1, 2)) / count
         for values, line, words in ((rise.max(axis=(1, 2)), "-", "largest"), (mean, "--", "mean")):
-            axes[0].plot(found.time.values, values, line, color=BODY_COLOURS[body], label=f"{body}: {words}")
+            axes[0].plot(temperatures.time.values, values, line, color=BODY_COLOURS[body], label=f"{body}: {words}")
     axes[0].set_xlabel("time from the cycle's begin (s)")
     axes[0].set_ylabel("rise over the bulk (K)")
     from_zero(axes[0])
@@ -252,9 +252,9 @@ def flash_course(found: xarray.Dataset, look: Style = STANDARD) -> Figure:
     return figure
 
 
-def flash_figures(found: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
+def flash_figures(temperatures: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
     """Return the figures of flash temperatures, by name."""
-    drawn = {"flash": flash_map(found, look)}
-    if len(found.time) > 1:
-        drawn["flash_course"] = flash_course(found, look)
+    drawn = {"flash": flash_map(temperatures, look)}
+    if len(temperatures.time) > 1:
+        drawn["flash_course"] = flash_course(temperatures, look)
     return drawn

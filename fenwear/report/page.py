@@ -120,8 +120,8 @@ def numbers_of(summary: Mapping[str, Any]) -> dict[str, float]:
 def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, list[Number]]:
     """Return all numbers of a summary in tables, by their captions; of a run without one those of its history."""
     if not summary:
-        found = [known(name) for name in AT_LAST if name in history]
-        last = [Number.of(one.key, float(history[one.name][-1]), one.key) for one in found]
+        quantities = [known(name) for name in AT_LAST if name in history]
+        last = [Number.of(quantity.key, float(history[quantity.name][-1]), quantity.key) for quantity in quantities]
         return {"At the last recorded half-cycle": last}
     numbers, places = numbers_of(summary), summary.get("x_mm", [])
     starts = {"sliding": "Quantities that a tribometer measures", **{body: body.capitalize() for body in BODIES}}
@@ -132,7 +132,7 @@ def _tables(summary: Mapping[str, Any], history: xarray.Dataset) -> dict[str, li
     tables: dict[str, list[Number]] = {text: [] for text in (*starts.values(), "Along the contact", "The run")}
     for path, value in numbers.items():
         bare, _, place = path.rstrip("]").partition("[")
-        start = next((one for one in starts if path.startswith(f"{one}.")), "")
+        start = next((prefix for prefix in starts if path.startswith(f"{prefix}.")), "")
         if place:
             at = f" at x = {places[int(place)]:.4g} mm" if places else ""
             row = Number.of(path, value, bare)
@@ -168,10 +168,10 @@ def _figures(directory: Path, written: float, history: xarray.Dataset, look: Sty
             captions[name] = f"{words} in the deformed bodies, half-cycle {int(name.rpartition('_')[2]):,}."
     rest = [name for name in images if not name.startswith(tuple(BODY_FIELDS)) and name not in TEXTS]
     captions |= {name: caption(name, history, look) for name in (*TEXTS, *rest) if name in images}
-    found = {}
+    figures = {}
     for name, text in captions.items():
-        found[name] = picture(images[name].read_bytes(), images[name].suffix[1:], text, text)
-    return found
+        figures[name] = picture(images[name].read_bytes(), images[name].suffix[1:], text, text)
+    return figures
 
 
 @dataclass(frozen=True)

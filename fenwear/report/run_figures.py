@@ -166,7 +166,7 @@ def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) ->
     course = COURSES[name]
     look = Style(look.width, course.axis or look.axis)
     twice = "contact_area" if "contact_width" in history else ""  # the width, times the thickness
-    shown = [p for p in course.panels if any(one.ends(history) and one.variable != twice for one in p.lines)]
+    shown = [p for p in course.panels if any(line.ends(history) and line.variable != twice for line in p.lines)]
     figure, axes = panels(len(shown), 2.6, look=look)
     x, known = look.course(history), levels(history)
     for ax, panel in zip(axes, shown, strict=True):
@@ -191,7 +191,7 @@ def course_figure(history: xarray.Dataset, name: str, look: Style = STANDARD) ->
 def course_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
     """Return all figures over the run that a history has data for, by their names."""
     names = [str(name) for name in history.data_vars]
-    shown = [name for name, course in COURSES.items() if any(one.startswith(course.of) for one in names)]
+    shown = [name for name, course in COURSES.items() if any(variable.startswith(course.of) for variable in names)]
     figures = {name: course_figure(history, name, look) for name in shown}
     if bores_of(history):
         figures["place"] = place_figure(history, look)
@@ -202,15 +202,15 @@ def course_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str,
 
 def levels(history: xarray.Dataset) -> dict[str, tuple[float, str]]:
     """Return levels that lines of variables are held against, with their words, by the variable."""
-    found = {"energy_ratio": (GROSS, "gross sliding above,\npartial slip below")}
+    by_variable = {"energy_ratio": (GROSS, "gross sliding above,\npartial slip below")}
     if is_conforming(history):
         mean, width = mean_pressure(history), nominal_width(history)
-        found |= dict.fromkeys(("largest_pressure", "pressure"), (mean, f"mean {mean:.4g} MPa"))
-        found |= {
+        by_variable |= dict.fromkeys(("largest_pressure", "pressure"), (mean, f"mean {mean:.4g} MPa"))
+        by_variable |= {
             "contact_width": (width, f"nominal {width:.4g} mm"),
             "contact_area": (width, f"nominal {width:.4g} mm²"),
         }
-    return found
+    return by_variable
 
 
 def _of_bodies(ax: Axes, history: xarray.Dataset, line: Line, factor: float, x: Array) -> None:

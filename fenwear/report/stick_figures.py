@@ -106,20 +106,20 @@ def loop_of(history: xarray.Dataset, place: int) -> tuple[Array, Array, str, str
 
 def loops(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Return the fretting loops: tangential force over displacement, and over what is more than full stick's."""
-    figure, (whole, beyond) = panels(2, 3.0, share_x=False, look=look)
+    figure, (loop, beyond) = panels(2, 3.0, share_x=False, look=look)
     way, force, moved, pulled = loop_of(history, 0)
     ways, forces = np.diff(way[:-1]), np.diff(force[:-1])
     stiffness = float((forces / np.where(ways == 0, np.inf, ways)).max(initial=0.0)) or np.inf
     for colour, place in shades(chosen(history)):
         x, y, _, _ = loop_of(history, place)
-        whole.plot(x, y, color=colour, label=look.at(history, place))
+        loop.plot(x, y, color=colour, label=look.at(history, place))
         beyond.plot(x - y / stiffness, y, color=colour)
-    whole.set_xlabel(moved)
+    loop.set_xlabel(moved)
     of, _, unit = moved.partition(" of the strip ")
     beyond.set_xlabel(f"{of} less that of full stick\nat the same force {unit}")
-    for ax in (whole, beyond):
+    for ax in (loop, beyond):
         ax.set_ylabel(pulled)
-    legend_beside(whole, look.of_one)
+    legend_beside(loop, look.of_one)
     return figure
 
 
@@ -178,8 +178,8 @@ def with_sums(history: xarray.Dataset, cycles: xarray.Dataset) -> xarray.Dataset
     sums = (slid.sum("step").values, -work.sum("step").values, cycles.surface_stress.max("step").values)
     strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
     ends = history.sel(half_cycle=strokes * cycles.cycle.values)
-    known = {one.variable: (history.pressure.dims, values) for one, values in zip(OF_CYCLES, sums, strict=True)}
-    return ends.assign({name: one for name, one in known.items() if np.isfinite(one[1]).all()})
+    known = {field.variable: (history.pressure.dims, values) for field, values in zip(OF_CYCLES, sums, strict=True)}
+    return ends.assign({name: variable for name, variable in known.items() if np.isfinite(variable[1]).all()})
 
 
 def zone_maps(history: xarray.Dataset, look: Style = STANDARD) -> Figure:

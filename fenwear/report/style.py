@@ -217,7 +217,7 @@ def from_zero(ax: Axes) -> None:
 
     Also above what other panels with the same axis have.
     """
-    lines = [line for one in ax.get_shared_y_axes().get_siblings(ax) for line in one.get_lines()]
+    lines = [line for sibling in ax.get_shared_y_axes().get_siblings(ax) for line in sibling.get_lines()]
     tops = [np.nanmax(y) for line in lines if len(y := np.asarray(line.get_ydata())) and np.isfinite(y).any()]
     ax.set_ylim(0, 1.08 * max(tops, default=0.0) or None)
 
@@ -317,7 +317,7 @@ def save(figure: Figure, path: Path, dpi: int) -> None:
 
 def further(figure: Figure, png: Path, formats: Sequence[str]) -> list[Path]:
     """Write a figure beside its PNG in further formats; return the files."""
-    found = [png.with_suffix(f".{ending}") for ending in dict.fromkeys(formats) if ending != "png"]
-    for path in found:
+    paths = [png.with_suffix(f".{ending}") for ending in dict.fromkeys(formats) if ending != "png"]
+    for path in paths:
         save(figure, path, dpi=300)
-    return found
+    return paths

@@ -85,12 +85,14 @@ def _temperatures(system: Tribosystem, state: RunState) -> dict[str, fem.Functio
     """Return the temperatures of a state as functions on the meshes, by their names in a checkpoint; collective."""
     warm = {} if state.temperature is None else {TEMPERATURE: state.temperature.functions()}
     remembered = () if state.memory is None else state.memory.warm
-    warm |= {f"{REMEMBERED}_{number}": one.functions() for number, one in enumerate(remembered)}
+    warm |= {f"{REMEMBERED}_{number}": temperatures.functions() for number, temperatures in enumerate(remembered)}
     if system.bodies.warmed is not None:
         punch, strip = (body.function(t) for body, t in zip(system.bodies.heat, system.bodies.warmed, strict=True))
         warm[WARMED] = punch, strip
     return {
-        f"{name}_{body}": one for name, pair in warm.items() for body, one in zip(("punch", "strip"), pair, strict=True)
+        f"{name}_{body}": function
+        for name, pair in warm.items()
+        for body, function in zip(("punch", "strip"), pair, strict=True)
     }
 
 
@@ -108,7 +110,7 @@ def _arrays_of(system: Tribosystem, state: RunState, extremes: Mapping[str, floa
 
 def _write(path: Path, arrays: Mapping[str, Any]) -> None:
     with replacing(path) as part:
-        check_room(path.parent, sum(np.asarray(one).nbytes + BYTES for one in arrays.values()))
+        check_room(path.parent, sum(np.asarray(array).nbytes + BYTES for array in arrays.values()))
         with part.open("wb") as file:
             np.savez(file, **arrays)
             file.flush()
@@ -180,8 +182,8 @@ def last_contact(directory: Path) -> Checkpoint:
 
 def damaged(directory: Path) -> CaseError:
     """Return the error of a checkpoint that cannot be read."""
-    what = f"the checkpoint in {directory} is damaged, or of an earlier version. Start again without --resume"
-    return CaseError(InputError("--resume", what))
+    message = f"the checkpoint in {directory} is damaged, or of an earlier version. Start again without --resume"
+    return CaseError(InputError("--resume", message))
 
 
 def reached(directory: Path) -> int | None:
@@ -245,11 +247,11 @@ def _check_sizes(directory: Path, kept: Checkpoint, system: Tribosystem) -> None
     expected = system.unworn()
     worn = kept.state.worn
     followed = kept.followed or worn
-    for own, like in ((worn, expected), (followed, expected), (kept.state.totals, none_yet(system))):
-        pairs = [(getattr(own, field.name), getattr(like, field.name)) for field in fields(like)]
+    for stored, like in ((worn, expected), (followed, expected), (kept.state.totals, none_yet(system))):
+        pairs = [(getattr(stored, field.name), getattr(like, field.name)) for field in fields(like)]
         if any(values.shape != wanted.shape for values, wanted in pairs):
             raise damaged(directory)
-    if not all(np.isfinite(depth).all() for one in (worn, followed) for depth in (one.punch, one.strip)):
+    if not all(np.isfinite(depth).all() for depths in (worn, followed) for depth in (depths.punch, depths.strip)):
         raise damaged(directory)
 
 
@@ -289,7 +291,7 @@ def unpack(kind: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
     present = path in arrays or any(name.startswith(start) for name in arrays)
     if not present and (kind is Any or type(None) in kinds):
         return None
-    inner = next((one for one in kinds if is_dataclass(one)), None)
+    inner = next((member for member in kinds if is_dataclass(member)), None)
     if inner is not None:
         return unpack(inner, path, arrays)
     values = arrays[path]
@@ -302,8 +304,8 @@ def nodal_table(function: fem.Function) -> Array:
     On rank 0; that of no node on others.
     """
     space = function.function_space
-    own = space.dofmap.index_map.size_local
-    rows = np.column_stack([_places(space), function.x.array[:own]])
+    owned = space.dofmap.index_map.size_local
+    rows = np.column_stack([_places(space), function.x.array[:owned]])
     return np.concatenate(space.mesh.comm.gather(rows) or [rows[:0]])
 
 
@@ -333,5 +335,5 @@ def _places(space: fem.FunctionSpace) -> Array:
     for function, values in zip(sums, (*middles.T, np.ones(cells)), strict=True):
         np.add.at(function.x.array, nodes, values[:, None])
         function.x.scatter_reverse(la.InsertMode.add)
-    own = np.column_stack([function.x.array[: index_map.size_local] for function in sums])
-    return np.hstack([space.tabulate_dof_coordinates()[: len(own)], own[:, :3] / own[:, 3:]])
+    owned = np.column_stack([function.x.array[: index_map.size_local] for function in sums])
+    return np.hstack([space.tabulate_dof_coordinates()[: len(owned)], owned[:, :3] / owned[:, 3:]])

@@ -126,7 +126,7 @@ def _traction(
 
 def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody, Array] | None) -> Fields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
-    found: Fields = {}
+    fields: Fields = {}
     change: fem.Function | None = None
     thermal: Array = np.zeros(1)
     if warm is not None:
@@ -135,17 +135,17 @@ def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody
         coupling = elastic.thermal_coupling(heat.space)
         thermal = times(coupling, change.x.array[: heat.owned])
         coupling.destroy()
-        found["temperature"] = theta = heat.function(temperature)
-        found["heat_flux"] = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (elastic.dim,))
-    found["displacement"] = displacement = _displacement(elastic, load, rigid, thermal)
+        fields["temperature"] = theta = heat.function(temperature)
+        fields["heat_flux"] = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (elastic.dim,))
+    fields["displacement"] = displacement = _displacement(elastic, load, rigid, thermal)
     out_of_plane = None
     if elastic.dim == 2 and load[:, 1].any():
         out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, elastic.on_trace(load)[:, 1])
-        found["displacement_out_of_plane"] = out_of_plane
+        fields["displacement_out_of_plane"] = out_of_plane
     components = _stress(elastic, displacement, out_of_plane, change)
-    found["stress"] = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
-    found["von_mises"] = _interpolated(_von_mises(*components), elastic, "von_mises", ())
-    return found
+    fields["stress"] = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
+    fields["von_mises"] = _interpolated(_von_mises(*components), elastic, "von_mises", ())
+    return fields
 
 
 def _displacement(elastic: ElasticBody, load: Array, rigid: Array, thermal: Array) -> fem.Function:
@@ -301,11 +301,11 @@ def _contact_surfaces(system: Tribosystem, worn: WornDepths, pressure: Array) ->
         ("punch", pair.punch, rest.punch, worn.punch, pressure),
         ("strip", pair.strip, rest.strip, worn.strip, force / pair.strip.weights),
     )
-    for name, nodes, depth, whole, p in surfaces:
+    for name, nodes, depth, total_depth, p in surfaces:
         at = f"{name}_contact"
         data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES[nodes.dim])}
         data[f"{at}_wear"] = (at, depth, {"units": "mm", "long_name": "worn depth that the mesh does not follow"})
-        data[f"{at}_depth"] = (at, whole, {"units": "mm", "long_name": "worn depth"})
+        data[f"{at}_depth"] = (at, total_depth, {"units": "mm", "long_name": "worn depth"})
         data[f"{at}_pressure"] = (at, p, {"units": "MPa", "long_name": "contact pressure"})
     return data
 
@@ -358,10 +358,10 @@ def _groups(elastic: ElasticBody) -> dict[str, Any]:
     if elastic.dim != 2:
         return {}
     body, mesh, data = elastic.body, elastic.body.mesh, {}
-    own = mesh.topology.index_map(1).size_local
+    owned = mesh.topology.index_map(1).size_local
     for group, tag in sorted(body.curves.items()):
         facets = body.facet_tags.find(tag)
-        ends = facet_nodes(mesh, facets[facets < own])[:, :2]
+        ends = facet_nodes(mesh, facets[facets < owned])[:, :2]
         lines = np.concatenate(mesh.comm.allgather(mesh.geometry.x[ends][:, :, :2]))
         name = f"{body.name}_group_{group}"
         data[name] = ((f"{name}_line", "end", "axis"), lines, {"units": "mm"})

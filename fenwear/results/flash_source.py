@@ -130,7 +130,7 @@ class Window:
         beside = np.ceil(MARGIN * (high - low + 1)).astype(int)
         low, high = np.maximum(low - beside, 0), np.minimum(high + beside, np.array(grid.counts) - 1)
         number = np.arange(int(np.prod(grid.counts))).reshape(grid.counts)
-        first, second = (float(one) for one in grid.spacing)
+        first, second = (float(step) for step in grid.spacing)
         return cls(number[low[0] : high[0] + 1, low[1] : high[1] + 1], (first, second))
 
     @property
@@ -232,7 +232,7 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     placed = place_case(case)
     kept = on_root(placed.comm, lambda: checkpoint.last_contact(directory))
     last = kept.state
-    stage = next((one for one in stages_of(case) if one.end >= last.half_cycle), None)
+    stage = next((stage for stage in stages_of(case) if stage.end >= last.half_cycle), None)
     if stage is not None:
         case = case.model_copy(update={"motion": stage.case.motion, "program": None})
     if stage is not None or kept.followed is not None:
@@ -252,10 +252,10 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     pressure, heat = reached[:, window.nodes], heat[:, window.nodes]
     if motion.one_way:
         velocity = motion.directions[0] * motion.mean_speed * along
-        fast, whole = float(np.linalg.norm(velocity)), heat[:1] * motion.mean_speed
+        fast, flux = float(np.linalg.norm(velocity)), heat[:1] * motion.mean_speed
         still = np.zeros((1, 2))
         return Heating(
-            placed, last.half_cycle, window, still[:, 0], pressure[:1], whole, velocity, still, np.inf, (), fast
+            placed, last.half_cycle, window, still[:, 0], pressure[:1], flux, velocity, still, np.inf, (), fast
         )
     course = Course.of(motion)
     steps, pasts, way = _steps(course, window, pressure, along, len(motion.phases), motion.half_cycles)
@@ -307,8 +307,8 @@ def _check_memory(comm: MPI.Comm, cells: float) -> None:
     Raises:
         CaseError: they do not.
     """
-    what = f"a cycle's temperatures in {cells:,.0f} cells"
-    check_memory(comm, PER_CELL * cells, "grid.nodes", what, "Use fewer nodes, or a shorter stroke.")
+    subject = f"a cycle's temperatures in {cells:,.0f} cells"
+    check_memory(comm, PER_CELL * cells, "grid.nodes", subject, "Use fewer nodes, or a shorter stroke.")
 
 
 def _of_time_steps(case: Case, directory: Path) -> Heating:
@@ -320,15 +320,15 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
     system, state, _ = checkpoint.load(directory, assemble(case))
     until = state.half_cycle + system.motion.half_cycles
     blocks = list(march(system, until, implicit=True, start=state))
-    steps_of = [one for block in blocks for one in block.steps if isinstance(one, Steps)]
-    records = TimeStepRecords.joined([one.records for one in steps_of])
+    steps_of = [stroke for block in blocks for stroke in block.steps if isinstance(stroke, Steps)]
+    records = TimeStepRecords.joined([stroke.records for stroke in steps_of])
     along = _along(system, records.pressure)
     edges = np.append(0.0, records.duration.cumsum())
     period, count = float(edges[-1]), len(records)
     even = np.ptp(records.duration) < 1e-9 * records.duration.max()
     steps = count if even else int(np.clip(2 * count, FEWEST, MOST))
     times = period * (np.arange(steps) + 0.5) / steps
-    own = np.minimum(np.searchsorted(edges[1:], times), count - 1)
+    step = np.minimum(np.searchsorted(edges[1:], times), count - 1)
     window = Window.around(grid_of(system), records.pressure)
     done = records.dissipated * system.pair.weights / window.cell
     work = np.concatenate([np.zeros((1, done.shape[1])), done.cumsum(axis=0)])[:, window.nodes]
@@ -343,7 +343,7 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
         until,
         window,
         times,
-        records.pressure[own][:, window.nodes],
+        records.pressure[step][:, window.nodes],
         heat,
         np.zeros(2),
         offsets[:, None] * along,

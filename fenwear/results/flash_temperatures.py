@@ -64,16 +64,16 @@ def run_case_of(path: Path, settings: Sequence[str]) -> tuple[Case, Heat]:
         raise CaseError(InputError("model.kind", f"{message} grid"))
     if case.grid is None:
         raise CaseError(InputError("grid", "missing, but required: temperatures follow from pressures on a grid"))
-    of_heat = [one for one in settings if one.startswith("heat.")]
-    others = [one for one in settings if one not in of_heat]
-    for one in others:
-        key = one.partition("=")[0].strip()
+    of_heat = [setting for setting in settings if setting.startswith("heat.")]
+    others = [setting for setting in settings if setting not in of_heat]
+    for other in others:
+        key = other.partition("=")[0].strip()
         role, _, name = key.partition(".")
         if role != "materials" and not (role in case.bodies and name.partition(".")[0] in OTHERS):
             message = f"{key} is of the run itself; expected keys of heat, materials, or temperatures of a body"
             raise CaseError(InputError("--set", message))
     heat = heat_of(of_heat)
-    given = [one.partition("=")[0].strip().partition(".")[2] for one in of_heat]
+    given = [setting.partition("=")[0].strip().partition(".")[2] for setting in of_heat]
     problems = [
         InputError(f"heat.{key}", f"has no effect on flash temperatures; expected one of {', '.join(TAKEN)}")
         for key in given
@@ -118,29 +118,29 @@ def conductors(placed: ContactSetup, case: Case, heat: Heat, touching: Mask) -> 
     Raises:
         CaseError: a property is missing, or several materials touch.
     """
-    found: list[Conductor] = []
+    conducting: list[Conductor] = []
     for name, body, shares in zip(case.bodies, case.bodies.values(), placed.bodies.regions, strict=True):
         used = touching if name == "punch" else np.full(len(next(iter(shares.values()))), True)
         names = {body.regions[region] for region, share in shares.items() if (share[used] > 0).any()}
         materials = {key: case.materials[key].at(heat.initial, f"materials.{key}") for key in sorted(names)}
         problems = [
-            InputError(f"materials.{key}.{one}", "missing, but required: in the case or by --set")
+            InputError(f"materials.{key}.{needed}", "missing, but required: in the case or by --set")
             for key, material in materials.items()
-            for one in NEEDED
-            if getattr(material, one) is None
+            for needed in NEEDED
+            if getattr(material, needed) is None
         ]
         if problems:
             raise CaseError(problems)
-        own = {
-            key: (float(one.conductivity), float(one.density or 0.0) * float(one.heat_capacity))
-            for key, one in materials.items()
+        properties = {
+            key: (float(material.conductivity), float(material.density or 0.0) * float(material.heat_capacity))
+            for key, material in materials.items()
         }
-        if len(set(own.values())) > 1:
-            message = f"expected one material where the {name} touches, got {', '.join(own)}"
+        if len(set(properties.values())) > 1:
+            message = f"expected one material where the {name} touches, got {', '.join(properties)}"
             raise CaseError(InputError(f"{name}.regions", message))
-        key, (conductivity, capacity) = next(iter(own.items()))
-        found.append(Conductor(conductivity, conductivity / capacity, materials[key]))
-    return found
+        key, (conductivity, capacity) = next(iter(properties.items()))
+        conducting.append(Conductor(conductivity, conductivity / capacity, materials[key]))
+    return conducting
 
 
 HALF_SPACE = "half-space"
@@ -183,7 +183,7 @@ class FlashTemperatures:
     def powers(self) -> tuple[float, float]:
         """Mean heat into punch and strip, mW."""
         cell = self.heating.window.cell
-        first, second = (mean_power(one, cell) for one in self.heat)
+        first, second = (mean_power(heat, cell) for heat in self.heat)
         return first, second
 
 
@@ -207,16 +207,21 @@ def flash_temperatures(directory: Path | str, settings: Sequence[str] = ()) -> F
     friction = (1 - heat.debris) * heating.heat
     bulks, remarks = _bulks(case, heat, heating, both)
     sides = [
-        HeatedSide(_response(heating, one, moves=name == "strip"), one.conductivity, one.diffusivity, bulk or NO_BULK)
-        for name, one, bulk in zip(BODIES, both, bulks or (None, None), strict=True)
+        HeatedSide(
+            _response(heating, conductor, moves=name == "strip"),
+            conductor.conductivity,
+            conductor.diffusivity,
+            bulk or NO_BULK,
+        )
+        for name, conductor, bulk in zip(BODIES, both, bulks or (None, None), strict=True)
     ]
-    own = _shared(heat, heating, sides, friction)
-    parts = own, friction - own
+    into_punch = _shared(heat, heating, sides, friction)
+    parts = into_punch, friction - into_punch
     flash = sides[0].response.apply(parts[0]), sides[1].response.apply(parts[1])
     powers = mean_power(parts[0], heating.window.cell), mean_power(parts[1], heating.window.cell)
     levels = None
     if bulks is not None:
-        first, second = (one.base + one.per_power * power for one, power in zip(bulks, powers, strict=True))
+        first, second = (bulk.base + bulk.per_power * power for bulk, power in zip(bulks, powers, strict=True))
         levels = first, second
     numbers = _numbers(heating, both)
     feedback = _feedback(heating, both, powers)
@@ -225,13 +230,13 @@ def flash_temperatures(directory: Path | str, settings: Sequence[str] = ()) -> F
     return FlashTemperatures(heating, parts, flash, levels, way, *numbers, feedback, _across(heating), tuple(warnings))
 
 
-def _response(heating: Heating, one: Conductor, *, moves: bool) -> Response:
+def _response(heating: Heating, conductor: Conductor, *, moves: bool) -> Response:
     """Return the half-space that a body is."""
-    sides, shape, kappa = heating.window.sides, heating.window.shape, one.diffusivity
+    sides, shape, kappa = heating.window.sides, heating.window.shape, conductor.diffusivity
     if np.isinf(heating.period):
         velocity = heating.velocity if moves else np.zeros(2)
         x, y = (float(part) / (2 * kappa) for part in velocity)
-        return Instants(one.conductivity, cell_integrals(shape, sides, float(np.hypot(x, y)), (x, y))[None])
+        return Instants(conductor.conductivity, cell_integrals(shape, sides, float(np.hypot(x, y)), (x, y))[None])
     if heating.pasts:
         kernels = [
             history_kernel(
@@ -244,9 +249,9 @@ def _response(heating: Heating, one: Conductor, *, moves: bool) -> Response:
             )
             for past in heating.pasts
         ]
-        return Instants(one.conductivity, np.array(kernels))
+        return Instants(conductor.conductivity, np.array(kernels))
     shifts = heating.shifts if moves else np.zeros_like(heating.shifts)
-    return Periodic(one.conductivity, kappa, heating.period, sides, shape, shifts)
+    return Periodic(conductor.conductivity, kappa, heating.period, sides, shape, shifts)
 
 
 def _still(past: Past, before: Array) -> tuple[Array, Array]:
@@ -290,51 +295,51 @@ def _bulks(
     elastics: tuple[ElasticBody, ElasticBody] = placed.bodies.punch, placed.bodies.strip
     x, powers = grid.flat[window.nodes.ravel()], window.cell * heating.heat.reshape(len(heating.heat), -1)
     places = np.broadcast_to(x, (len(powers), *x.shape)), x - heating.shifts[:, None]
-    found: list[Bulk] = []
+    bulks: list[Bulk] = []
     remarks: list[str] = []
-    for name, body, elastic, one, at in zip(BODIES, bodies, elastics, both, places, strict=True):
+    for name, body, elastic, conductor, at in zip(BODIES, bodies, elastics, both, places, strict=True):
         spots = spots_of(at.reshape(-1, 2), powers.ravel())
         ends = np.array([extent_along(elastic, axis) for axis in grid.axes]).T
         beyond = bool((spots.places < ends[0]).any() or (spots.places > ends[1]).any())
         one_way = name == "strip" and np.isinf(heating.period)
         if elastic.operator == HALF_SPACE or beyond or one_way:
-            found.append(Bulk(0.0 if heat.inflow is None or not one_way else heat.inflow - heat.ambient))
+            bulks.append(Bulk(0.0 if heat.inflow is None or not one_way else heat.inflow - heat.ambient))
             if beyond:
                 remarks.append(f"the {name} is not meshed as far as it slides: it is taken as a half-space")
             continue
-        bulk = bulk_of(body, elastic, one.conductivity, spots)
+        bulk = bulk_of(body, elastic, conductor.conductivity, spots)
         if bulk is None:
             text = f"the {name} loses heat nowhere and has no steady temperature. Results are the flash above the"
             return None, [f"{text} bulk alone. Set heat.convection or {name}.temperatures"]
-        found.append(bulk)
-    return (found[0], found[1]), remarks
+        bulks.append(bulk)
+    return (bulks[0], bulks[1]), remarks
 
 
 def _numbers(heating: Heating, both: Sequence[Conductor]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the largest Peclet number of each body, and the time in which heat spreads over a half-cycle's."""
     half = float(heating.extent.max()) / 2
-    first, second = (heating.fastest * half / (2 * one.diffusivity) for one in both)
-    one, two = (2 * half**2 / one.diffusivity / heating.period for one in both)
-    return (first, second), (one, two)
+    first, second = (heating.fastest * half / (2 * conductor.diffusivity) for conductor in both)
+    quick, quick_strip = (2 * half**2 / conductor.diffusivity / heating.period for conductor in both)
+    return (first, second), (quick, quick_strip)
 
 
 def _across(heating: Heating) -> tuple[int, int]:
-    first, second = (round(one) for one in heating.extent / heating.window.sides)
+    first, second = (round(length) for length in heating.extent / heating.window.sides)
     return first, second
 
 
 def _feedback(heating: Heating, both: Sequence[Conductor], powers: tuple[float, float]) -> float | None:
     """Return G of the longest wave in the contact by the largest heat for a pressure; None without expansion."""
-    materials = [one.material for one in both]
-    if any(one.expansion is None for one in materials):
+    materials = [conductor.material for conductor in both]
+    if any(material.expansion is None for material in materials):
         return None
     touching = heating.touching
     per_pressure = float((heating.heat[touching] / heating.pressure[touching]).max(initial=0.0))  # mu v
-    ease = sum((1 - one.poisson**2) / float(one.young) for one in materials)
+    ease = sum((1 - material.poisson**2) / float(material.young) for material in materials)
     shares = np.abs(powers) / max(sum(powers), 1e-300)
     bulge = sum(
-        float(one.material.expansion) * (1 + one.material.poisson) * share / one.conductivity
-        for one, share in zip(both, shares, strict=True)
+        float(conductor.material.expansion) * (1 + conductor.material.poisson) * share / conductor.conductivity
+        for conductor, share in zip(both, shares, strict=True)
     )
     return per_pressure / ease * bulge * float(heating.extent.max()) / (4 * np.pi)
 
@@ -343,23 +348,23 @@ def _warnings(
     heating: Heating, numbers: tuple[tuple[float, float], tuple[float, float]], feedback: float | None
 ) -> list[str]:
     """Return the warnings about the temperatures."""
-    found = []
+    warnings = []
     if min(_across(heating)) < FEW:
-        found.append(
+        warnings.append(
             f"the contact is {min(_across(heating))} nodes wide, and temperatures are rough below {FEW}. Use a finer "
             "contact grid"
         )
     if heating.pasts and max(numbers[1]) > QUICK:
-        found.append(
+        warnings.append(
             "each instant of the long stroke is computed independently, as if its share of heat were constant. Heat "
             f"spreads over the contact in {max(numbers[1]):.2g} half-cycles, where 1 is expected at most"
         )
     if feedback is not None and feedback > FELT:
-        found.append(
+        warnings.append(
             f"thermoelastic feedback is left out here: thermal expansion would raise the pressure by {feedback:.2g} "
             f"times itself. From about {FELT:g} on, the contact is smaller and hotter, with higher pressures"
         )
-    return found
+    return warnings
 
 
 WAYS = {
@@ -369,25 +374,25 @@ WAYS = {
 }
 
 
-def numbers(found: FlashTemperatures) -> dict[str, Any]:
+def numbers(temperatures: FlashTemperatures) -> dict[str, Any]:
     """Return the numbers of `--json`."""
-    heating, powers = found.heating, found.powers
+    heating, powers = temperatures.heating, temperatures.powers
     both = {
         name: {
-            **_largest(found, flash),
-            "mean_flash_K": float(_means(found, flash).max()),
-            "mean_flash_over_cycle_K": float(_means(found, flash).mean()),
-            "by_finite_body_K": None if found.bulk is None else found.bulk[number],
-            "largest_rise_K": None if found.bulk is None else float(flash.max()) + found.bulk[number],
+            **_largest(temperatures, flash),
+            "mean_flash_K": float(_means(temperatures, flash).max()),
+            "mean_flash_over_cycle_K": float(_means(temperatures, flash).mean()),
+            "by_finite_body_K": None if temperatures.bulk is None else temperatures.bulk[number],
+            "largest_rise_K": None if temperatures.bulk is None else float(flash.max()) + temperatures.bulk[number],
             "power_mW": powers[number],
-            "largest_peclet": found.peclet[number],
-            "spreading_over_half_cycle": found.quick[number],
+            "largest_peclet": temperatures.peclet[number],
+            "spreading_over_half_cycle": temperatures.quick[number],
         }
-        for number, (name, flash) in enumerate(zip(BODIES, found.flash, strict=True))
+        for number, (name, flash) in enumerate(zip(BODIES, temperatures.flash, strict=True))
     }
     return {
         "half_cycle": heating.half_cycle,
-        "way": found.way,
+        "way": temperatures.way,
         "instants": len(heating.times),
         **both,
         "friction_power_mW": sum(powers),
@@ -395,30 +400,30 @@ def numbers(found: FlashTemperatures) -> dict[str, Any]:
         "stroke_mm": heating.way,
         "largest_speed_mm_per_s": heating.fastest,
         "contact_mm": heating.extent.tolist(),
-        "nodes_across": list(found.across),
-        "thermal_feedback": found.feedback,
-        "warnings": [heating.placed.names.with_names(one) for one in found.warnings],
+        "nodes_across": list(temperatures.across),
+        "thermal_feedback": temperatures.feedback,
+        "warnings": [heating.placed.names.with_names(warning) for warning in temperatures.warnings],
     }
 
 
-def _largest(found: FlashTemperatures, flash: Array) -> dict[str, Any]:
+def _largest(temperatures: FlashTemperatures, flash: Array) -> dict[str, Any]:
     """Return the largest rise of a surface, and where and when it is."""
     instant, first, second = np.unravel_index(int(flash.argmax()), flash.shape)
-    grid, window = found.heating.grid, found.heating.window
+    grid, window = temperatures.heating.grid, temperatures.heating.window
     place = grid.flat[window.nodes[first, second]]
     at = {f"at_{'xyz'[axis]}_mm": round(float(c), 9) + 0.0 for axis, c in zip(grid.axes, place, strict=True)}
-    return {"largest_flash_K": float(flash.max()), **at, "at_time_s": float(found.heating.times[instant])}
+    return {"largest_flash_K": float(flash.max()), **at, "at_time_s": float(temperatures.heating.times[instant])}
 
 
-def _means(found: FlashTemperatures, flash: Array) -> Array:
+def _means(temperatures: FlashTemperatures, flash: Array) -> Array:
     """Return the means over the contact at each instant (t,), K."""
-    touching = found.heating.touching
+    touching = temperatures.heating.touching
     return np.asarray((flash * touching).sum(axis=(1, 2)) / np.maximum(touching.sum(axis=(1, 2)), 1))
 
 
-def text(found: FlashTemperatures, name: str) -> str:
+def text(temperatures: FlashTemperatures, name: str) -> str:
     """Return the flash temperatures as a table for readers."""
-    of = numbers(found)
+    of = numbers(temperatures)
     along = {key: [of[body][key] for body in BODIES] for key in of["punch"]}
 
     def row(label: str, key: str, form: str = ".4g") -> str:
@@ -429,7 +434,7 @@ def text(found: FlashTemperatures, name: str) -> str:
     share = of["share_into_punch"]
     lines = [
         f"flash temperatures of {name}, of the cycle that half-cycle {of['half_cycle']:,} ends",
-        f"  {WAYS[found.way].format(steps=of['instants'])}",
+        f"  {WAYS[temperatures.way].format(steps=of['instants'])}",
         f"{'':48}{'punch':>14}{'strip':>14}",
         row("largest flash (K)", "largest_flash_K"),
         *(row(f"at {key[3]} (mm)", key) for key in axes),
@@ -441,19 +446,19 @@ def text(found: FlashTemperatures, name: str) -> str:
         row("largest v a / 2 kappa", "largest_peclet", ".3g"),
         f"share of the heat into the punch {'-' if share is None else f'{100 * share:.4g} %'}",
     ]
-    if found.feedback is not None:
-        lines.append(f"thermoelastic feedback, over the pressure {found.feedback:.2g}")
-    return "\n".join([*lines, *(f"warning: {one}" for one in found.warnings)])
+    if temperatures.feedback is not None:
+        lines.append(f"thermoelastic feedback, over the pressure {temperatures.feedback:.2g}")
+    return "\n".join([*lines, *(f"warning: {warning}" for warning in temperatures.warnings)])
 
 
-def dataset(found: FlashTemperatures) -> xarray.Dataset:
+def dataset(temperatures: FlashTemperatures) -> xarray.Dataset:
     """Return maps at the instants of the cycle."""
-    heating = found.heating
+    heating = temperatures.heating
     first, second = ("xyz"[axis] for axis in heating.grid.axes)
     places = heating.grid.flat[heating.window.nodes]
     over = ("instant", first, second)
     maps = {"pressure": (heating.pressure, "MPa", "contact pressure")}
-    for body, heat, flash in zip(BODIES, found.heat, found.flash, strict=True):
+    for body, heat, flash in zip(BODIES, temperatures.heat, temperatures.flash, strict=True):
         maps[f"heat_{body}"] = heat, "mW/mm2", f"heat of friction into the {body}"
         maps[f"flash_{body}"] = flash, "K", f"rise of the surface of the {body} over its bulk"
     variables: dict[str, Any] = {
@@ -462,7 +467,7 @@ def dataset(found: FlashTemperatures) -> xarray.Dataset:
     variables["time"] = ("instant", heating.times, {"units": "s", "long_name": "time from the cycle's begin"})
     lines = {first: places[:, 0, 0], second: places[0, :, 1]}
     coordinates = {axis: (axis, x, {"units": "mm", "long_name": f"{axis} of the nodes"}) for axis, x in lines.items()}
-    attributes = {"half_cycle": heating.half_cycle, "way": found.way, "Conventions": "CF-1.11"}
-    if found.bulk is not None:
-        attributes |= {f"by_finite_{body}_K": rise for body, rise in zip(BODIES, found.bulk, strict=True)}
+    attributes = {"half_cycle": heating.half_cycle, "way": temperatures.way, "Conventions": "CF-1.11"}
+    if temperatures.bulk is not None:
+        attributes |= {f"by_finite_{body}_K": rise for body, rise in zip(BODIES, temperatures.bulk, strict=True)}
     return xarray.Dataset(variables, coordinates, attributes)

@@ -102,17 +102,17 @@ def motions(placed: ContactSetup) -> list[str]:
 
 def quantities(placed: ContactSetup) -> list[Quantity]:
     """Return the quantities of the bodies' place: their free motions, and that of a shaft in its bores."""
-    found: list[Quantity] = []
+    place_quantities: list[Quantity] = []
     for number, (name, mode) in enumerate(zip(motions(placed), placed.rigid.mode_names, strict=True)):
         body = "strip" if name.endswith("_strip") else "punch"
         axis = name.split("_")[1]
         unit, text = ("mm", f"moved along {axis}") if is_translation(mode) else ("rad", f"turned about {axis}")
         part = "" if len(mode.split("_")) < 3 else f" ({'_'.join(mode.split('_')[2:])})"
         words = f"how far the {body}{part} has {text}, from where it was meshed"
-        found.append(Quantity(name, RECORD, unit, words, partial(_motion, number=number)))
+        place_quantities.append(Quantity(name, RECORD, unit, words, partial(_motion, number=number)))
     for name, bore in bores_of(placed).items():
-        found += of_bore(name, partial(_eccentricity, bore=bore, named=bool(name)))
-    return found
+        place_quantities += of_bore(name, partial(_eccentricity, bore=bore, named=bool(name)))
+    return place_quantities
 
 
 def _motion(block: Block, number: int) -> Array:
@@ -175,8 +175,8 @@ def _circle(surface: ContactSurface, nodes: Mask, followed: Array | float) -> Ci
     """
     x = (surface.unworn + followed * surface.outward)[nodes][:, [0, -1]]
     system = np.column_stack([2 * x, np.ones(len(x))])
-    found, *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
-    middle = found[:2]
+    coefficients, *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
+    middle = coefficients[:2]
     ways = np.linalg.norm(x - middle, axis=1)
     radius = float(ways.mean())
     true = np.ptp(ways) < TRUE * radius and radius < ARC * float(np.ptp(x, axis=0).max())
@@ -190,7 +190,7 @@ def _apart(block: Block, nodes: Mask) -> Array:
     """
     system, pair = block.system, block.system.pair
     depths = zip(block.wear, block.wear_strip, block.between, strict=True)
-    undeformed = np.array([system.gap(0, WornDepths(*map(np.asarray, one))) for one in depths])
+    undeformed = np.array([system.gap(0, WornDepths(*map(np.asarray, worn))) for worn in depths])
     fields = pair.normal[nodes][:, [0, -1]]
     if pair.punch.dim == 3:
         y = pair.punch.x[nodes, 1]

@@ -64,16 +64,16 @@ def _dimensions(name: str, data: Any) -> tuple[str, ...]:
 
 
 def _attributes(owner: Any) -> dict[str, Any]:
-    found = {name: value for name, value in owner.attrs.items() if name not in INNER}
-    return {n: v[0] if isinstance(v, np.ndarray) and v.shape == (1,) else v for n, v in found.items()}
+    attributes = {name: value for name, value in owner.attrs.items() if name not in INNER}
+    return {n: v[0] if isinstance(v, np.ndarray) and v.shape == (1,) else v for n, v in attributes.items()}
 
 
 def write(path: Path, dataset: xarray.Dataset) -> None:
     """Write variables of numbers as a new file, in place of an older one."""
     with Netcdf(path, {str(name): size for name, size in dataset.sizes.items()}) as file:
         file.attributes.update(dataset.attrs)
-        for name, one in dataset.variables.items():
-            file.add(str(name), [str(d) for d in one.dims], one.attrs, one.values)
+        for name, variable in dataset.variables.items():
+            file.add(str(name), [str(d) for d in variable.dims], variable.attrs, variable.values)
 
 
 class Netcdf:
@@ -278,8 +278,8 @@ def step_of(data: xarray.Dataset) -> Step:
     for name, parts in FIELDS.items():
         if any(f"{body}_{parts[0]}" in data for body in BODIES):
             unit = data[f"punch_{parts[0]}"].attrs.get("units", "")
-            found = np.concatenate([_field(data, body, parts) for body in BODIES])
-            values[name.format(unit=unit)] = found[:, 0] if len(parts) == 1 else found
+            columns = np.concatenate([_field(data, body, parts) for body in BODIES])
+            values[name.format(unit=unit)] = columns[:, 0] if len(parts) == 1 else columns
     for name, part in OF_CONTACT.items():
         values[name] = np.concatenate([_of_contact(data, b, part, p) for b, p in zip(BODIES, points, strict=True)])
     values["body"] = np.repeat([1, 2], [len(p) for p in points])
@@ -316,10 +316,10 @@ def _of_contact(data: xarray.Dataset, body: str, part: str, points: Array) -> Ar
     """Return a value of the contact surface on the nodes of a body, zero away from it (n,)."""
     at = f"{body}_contact"
     axes = [axis for axis in "xyz" if f"{at}_{axis}" in data]
-    own = points[:, ["xyz".index(axis) for axis in axes]]
+    places = points[:, ["xyz".index(axis) for axis in axes]]
     nodes = np.column_stack([data[f"{at}_{axis}"].values for axis in axes])
-    distance, nearest = KDTree(own).query(nodes)
-    near = distance < NEAR * float(np.ptp(own, axis=0).max())
+    distance, nearest = KDTree(places).query(nodes)
+    near = distance < NEAR * float(np.ptp(places, axis=0).max())
     values = np.zeros(len(points))
     values[nearest[near]] = data[f"{at}_{part}"].values[near]
     return values

@@ -49,13 +49,13 @@ INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 
 def variables_of(system: Tribosystem) -> dict[str, Quantity]:
     """Return the quantities that a history has, by their names."""
-    return {name: one for name, one in quantities_of(system).items() if one.dims}
+    return {name: quantity for name, quantity in quantities_of(system).items() if quantity.dims}
 
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
-    with_names, found = system.names.meant, {**_columns(system), **_of_program(system.case)}
-    return {name: one._replace(attributes=with_names(one.attributes)) for name, one in found.items()}
+    with_names, columns = system.names.meant, {**_columns(system), **_of_program(system.case)}
+    return {name: column._replace(attributes=with_names(column.attributes)) for name, column in columns.items()}
 
 
 def _of_program(case: Case) -> dict[str, Column]:
@@ -113,13 +113,13 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
 
 def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:
     """Return the contact grid that the history in a folder stands on, where grids grow; None where there is none."""
-    own = system.pair.punch.grid
+    grid = system.pair.punch.grid
     try:
         with h5py.File(directory / HISTORY, "r") as file:
             numbers = file.attrs.get(GRID)
     except OSError:
         return None
-    return None if numbers is None or own is None else own.with_numbers(numbers)
+    return None if numbers is None or grid is None else grid.with_numbers(numbers)
 
 
 def _on_grid(
@@ -132,23 +132,23 @@ def _on_grid(
     of_punch, of_strip = node_maps(before, after)
     surfaces = {"": (of_punch, before.pair.weights, after.pair.weights)}
     surfaces["_strip"] = (of_strip, before.pair.strip.weights, after.pair.strip.weights)
-    found = {}
+    new_rows = {}
     for name, values in rows.items():
         last = variables[name].dims[-1]
         end = {"x": "", "node": "", "x_strip": "_strip", "node_strip": "_strip"}.get(last)
         if end is None:
-            found[name] = values
+            new_rows[name] = values
             continue
         nodes, old, new = surfaces[end]
         if name in ("wear", "wear_strip"):
-            found[name] = kept_volume(values, nodes, old, new)
+            new_rows[name] = kept_volume(values, nodes, old, new)
             continue
         if name in ("weight", "weight_strip"):
-            found[name] = np.broadcast_to(new, (*values.shape[:-1], len(new)))
+            new_rows[name] = np.broadcast_to(new, (*values.shape[:-1], len(new)))
             continue
         start: Array = np.full(len(nodes), np.nan if name in UNKNOWN else 0.0)
-        found[name] = on_nodes(values, nodes, start) if len(values) else np.zeros((*values.shape[:-1], len(nodes)))
-    return found
+        new_rows[name] = on_nodes(values, nodes, start) if len(values) else np.zeros((*values.shape[:-1], len(nodes)))
+    return new_rows
 
 
 def _chunk(inner: tuple[int, ...]) -> int:
@@ -183,7 +183,7 @@ def clear_directory(path: Path) -> None:
     """
     try:
         others = (
-            [one.name for one in path.iterdir() if one.name not in OF_RESULTS and one.suffix != ".part"]
+            [entry.name for entry in path.iterdir() if entry.name not in OF_RESULTS and entry.suffix != ".part"]
             if path.is_dir()
             else []
         )
@@ -264,9 +264,9 @@ class HistoryWriter:
 
     def _over_steps(self, rows: Rows) -> Rows:
         """Return rows whose half-cycles have as many time steps as the file has; it gets more where they have more."""
-        own = [rows[name].shape[1] for name, one in self._variables.items() if time_steps.STEP in one.dims]
-        if own and max(own) > len(self._columns[time_steps.STEP].values):
-            column = self._columns[time_steps.STEP]._replace(values=np.arange(1, max(own) + 1))
+        counts = [rows[name].shape[1] for name, quantity in self._variables.items() if time_steps.STEP in quantity.dims]
+        if counts and max(counts) > len(self._columns[time_steps.STEP].values):
+            column = self._columns[time_steps.STEP]._replace(values=np.arange(1, max(counts) + 1))
             self._begin_anew({**self._columns, time_steps.STEP: column}, self._padded)
         return self._padded(rows)
 
@@ -290,12 +290,12 @@ class HistoryWriter:
                 file.attributes.update(_attributes(system))
                 for name, column in self._columns.items():
                     file.add(name, column.dimensions, column.attributes, column.values)
-                for name, one in self._variables.items():
-                    inner = tuple(sizes[d] for d in one.dims[1:])
-                    unit = self._degrees.unit if one.unit == KELVIN.unit else one.unit
-                    words = {"units": unit, "long_name": one.long_name, **on_mesh(one.dims, about)}
+                for name, quantity in self._variables.items():
+                    inner = tuple(sizes[d] for d in quantity.dims[1:])
+                    unit = self._degrees.unit if quantity.unit == KELVIN.unit else quantity.unit
+                    words = {"units": unit, "long_name": quantity.long_name, **on_mesh(quantity.dims, about)}
                     kind = int if name in INTEGERS else float
-                    file.add(name, one.dims, words, kind=kind, chunks=(_chunk(inner), *inner))
+                    file.add(name, quantity.dims, words, kind=kind, chunks=(_chunk(inner), *inner))
             if rows:
                 self._put(part, rows, 0)
 
@@ -309,7 +309,7 @@ class HistoryWriter:
                 if time_steps.STEP in self._columns:  # more than the case's where a step of its program had more
                     column = self._columns[time_steps.STEP]._replace(values=file[time_steps.STEP][:])
                     self._columns = {**self._columns, time_steps.STEP: column}
-                missing = [name for name, one in self._variables.items() if file[name].ndim != len(one.dims)]
+                missing = [name for name, quantity in self._variables.items() if file[name].ndim != len(quantity.dims)]
             if missing:
                 raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
@@ -326,8 +326,8 @@ class HistoryWriter:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
         rows = computed(block, variables_of(block.system).values())
-        for name, one in self._variables.items():
-            if one.unit == KELVIN.unit:
+        for name, quantity in self._variables.items():
+            if quantity.unit == KELVIN.unit:
                 rows[name] = self._degrees.of(rows[name])
         rows = self._over_steps(rows)
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
@@ -385,8 +385,8 @@ class HistoryWriter:
     def _bytes(self, rows: int) -> int:
         """Return the most bytes that so many rows add: whole chunks, and for each variable some nodes of an index."""
         sizes, total = self._sizes(), 0
-        for one in self._variables.values():
-            inner = tuple(sizes[d] for d in one.dims[1:])
+        for quantity in self._variables.values():
+            inner = tuple(sizes[d] for d in quantity.dims[1:])
             chunk = _chunk(inner)
             chunks = (rows > 0) + -(-rows // chunk)
             total += chunks * chunk * 8 * math.prod(inner) + (chunks // 16 + 1) * INDEX

@@ -66,7 +66,7 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     return cells[(cells >= 0).all(axis=1)]
 
 
-def at_places(surface: ContactSurface, values: Array, places: Array, own: Mask | None = None) -> Array:
+def at_places(surface: ContactSurface, values: Array, places: Array, nodes: Mask | None = None) -> Array:
     """Return nodal values at places on a surface (k,), linear on each of its facets; NaN beside it.
 
     Args:
@@ -77,7 +77,7 @@ def at_places(surface: ContactSurface, values: Array, places: Array, own: Mask |
         own: Nodes whose facets count (n,).
     """
     cells = surface_cells(surface)
-    cells = cells if own is None else cells[own[cells].all(axis=1)]
+    cells = cells if nodes is None else cells[nodes[cells].all(axis=1)]
     if surface.dim == 2:
         begin, end = surface.abscissa[cells].T
         chord = np.linalg.norm(surface.x[cells[:, 1]] - surface.x[cells[:, 0]], axis=1)
@@ -102,15 +102,15 @@ def at_places(surface: ContactSurface, values: Array, places: Array, own: Mask |
 def rim(surface: ContactSurface) -> Mask:
     """Return which pressure nodes lie on the rim of a contact surface (n,): on a side of one linear facet alone."""
     cells = surface_cells(surface)
-    found: Mask = np.zeros(len(surface.nodes), dtype=bool)
+    on_rim: Mask = np.zeros(len(surface.nodes), dtype=bool)
     if cells.shape[1] == 2:
         nodes, count = np.unique(cells, return_counts=True)
-        found[nodes[count == 1]] = True
-        return found
+        on_rim[nodes[count == 1]] = True
+        return on_rim
     sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)  # corners come around
     pairs, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
-    found[pairs[count == 1].ravel()] = True
-    return found
+    on_rim[pairs[count == 1].ravel()] = True
+    return on_rim
 
 
 def surface_columns(placed: ContactSetup) -> dict[str, Column]:
@@ -123,18 +123,18 @@ def surface_columns(placed: ContactSetup) -> dict[str, Column]:
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:
     """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
     ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_changes else {})
-    found = {}
+    columns = {}
     for end, surface in ends.items():
         over = (f"{'x' if plane else 'node'}{end}",)
         if surface.contact is not None:
             flags = {"flag_values": np.arange(len(surface.names)), "flag_meanings": " ".join(surface.names)}
             text = {"units": "1", "long_name": f"contact that each node of the {surface.body} belongs to"}
-            found[f"contact{end}"] = Column(over, surface.contact, {**text, **flags})
+            columns[f"contact{end}"] = Column(over, surface.contact, {**text, **flags})
         part = surface.part
         if plane and part.max() > 0:
             text = {"units": "1", "long_name": f"part of the {surface.body}'s surface that each node belongs to"}
-            found[f"part{end}"] = Column(over, part, text)
-    return found
+            columns[f"part{end}"] = Column(over, part, text)
+    return columns
 
 
 def coordinate_names(end: str, dim: int) -> tuple[str, ...]:
@@ -220,11 +220,11 @@ class ScarGeometry:
         if not self.names:
             return {}
         level = share * depth.max(axis=1, initial=0.0)
-        found: Array = np.zeros((len(depth), len(self.names)))
+        reaches: Array = np.zeros((len(depth), len(self.names)))
         for k in range(self.part.max(initial=-1) + 1):
-            own = np.where(self.part == k, depth, 0.0)
-            found = np.maximum(found, extents(own, self.coordinates, self.edges, share, level))
-        return dict(zip(self.names, found.T, strict=True))
+            part_depth = np.where(self.part == k, depth, 0.0)
+            reaches = np.maximum(reaches, extents(part_depth, self.coordinates, self.edges, share, level))
+        return dict(zip(self.names, reaches.T, strict=True))
 
 
 def extents(
@@ -249,15 +249,15 @@ def extents(
     reached = np.where(outwards, fraction, 1.0 - fraction)  # from the node inside
     reached = np.minimum(reached, _until_unworn(depth, coordinates, edges, level, crossed, reached))
     fraction = np.where(outwards, reached, 1.0 - reached)
-    found = []
+    reaches = []
     for s in coordinates.T:
         at_edges = s[first] + fraction * (s[second] - s[first])
         values = np.concatenate([np.where(inside, s, np.nan), np.where(crossed, at_edges, np.nan)], axis=1)
         worn = inside.any(axis=1)
         reach = np.zeros(len(depth))
         reach[worn] = np.nanmax(values[worn], axis=1) - np.nanmin(values[worn], axis=1)
-        found.append(reach)
-    return np.stack(found, axis=1)
+        reaches.append(reach)
+    return np.stack(reaches, axis=1)
 
 
 def _until_unworn(
@@ -269,13 +269,13 @@ def _until_unworn(
     those of its neighbours that are worn. Towards nodes that are worn less than the level it turns evenly into where
     the edge `reached` the level: no depth of rounding decides.
     """
-    found: Array = np.full(crossed.shape, np.inf)
+    fractions: Array = np.full(crossed.shape, np.inf)
     first, second = edges.T
     outwards = depth[:, first] > level
     near, far = np.where(outwards, first, second), np.where(outwards, second, first)
     row, edge = np.nonzero(crossed)
     if not len(row):  # nothing worn less beside it, as where surfaces conform
-        return found
+        return fractions
     near, far, reached = near[row, edge], far[row, edge], reached[row, edge]
     beside = _neighbours(edges, len(coordinates))[near]  # (e, most), the node itself where there are fewer
     ways, rises = (
@@ -291,18 +291,18 @@ def _until_unworn(
     runs_out = falls > 0
     until = (depth[row, near] - level[row, 0]) / np.where(runs_out, falls, 1.0)
     until += (reached - until) * depth[row, far] / level[row, 0]
-    found[row[runs_out], edge[runs_out]] = until[runs_out]
-    return found
+    fractions[row[runs_out], edge[runs_out]] = until[runs_out]
+    return fractions
 
 
 def _neighbours(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Return the neighbours of each node (n, most), filled up with the node itself."""
-    one, other = np.concatenate([edges, edges[:, ::-1]]).T
-    order = np.argsort(one, kind="stable")
-    one, other = one[order], other[order]
-    place = np.arange(len(one)) - np.searchsorted(one, one)
+    node, other = np.concatenate([edges, edges[:, ::-1]]).T
+    order = np.argsort(node, kind="stable")
+    node, other = node[order], other[order]
+    place = np.arange(len(node)) - np.searchsorted(node, node)
     neighbours = np.tile(np.arange(count)[:, None], (1, int(place.max(initial=-1)) + 1))
-    neighbours[one, place] = other
+    neighbours[node, place] = other
     return neighbours
 
 
@@ -387,20 +387,21 @@ class ContactNet:
         piece = self.piece(pressure)
         if not piece.any():
             return None
-        whole = piece[self.cells].all(axis=1)
-        cells = self.cells[whole if whole.any() else piece[self.cells].any(axis=1)]
+        covered = piece[self.cells].all(axis=1)
+        cells = self.cells[covered if covered.any() else piece[self.cells].any(axis=1)]
         spacing = np.ptp(self.coordinates[cells], axis=1).mean(axis=0)
         inside = self.coordinates[piece]
         slack = spacing / 2
         part = self.surface.part
-        own = self.coordinates[part == part[piece.argmax()]]  # another contact's ends are not this one's
-        free = (inside.min(axis=0) > own.min(axis=0) + slack).astype(np.int64)
-        free += inside.max(axis=0) < own.max(axis=0) - slack
+        # another contact's ends are not this one's
+        contact_coordinates = self.coordinates[part == part[piece.argmax()]]
+        free = (inside.min(axis=0) > contact_coordinates.min(axis=0) + slack).astype(np.int64)
+        free += inside.max(axis=0) < contact_coordinates.max(axis=0) - slack
         return Zone(1 + np.ptp(inside, axis=0) / spacing, spacing, free)
 
     def numbers(self, pressure: Array) -> dict[str, Any]:
         """Return where the largest of pressures (n,) is and what stands beside it, and the nodes across the contact."""
-        node, found = int(pressure.argmax()), self.zone(pressure)
+        node, zone = int(pressure.argmax()), self.zone(pressure)
         near = self.beside(node)
         weights = self.surface.weights[near]
         place = without_noise(self.surface.x[node], self.surface.extent())
@@ -409,8 +410,8 @@ class ContactNet:
             "pressure_beside_largest_MPa": float(weights @ pressure[near] / weights.sum()),
             **(
                 {}
-                if found is None
-                else {name: round(float(n), 1) for name, n in zip(self.names, found.nodes, strict=True)}
+                if zone is None
+                else {name: round(float(n), 1) for name, n in zip(self.names, zone.nodes, strict=True)}
             ),
         }
 

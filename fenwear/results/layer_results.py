@@ -98,7 +98,7 @@ STATE, STATES = "state_", "states"  # how variables of states begin; where summa
 def _of_states(placed: ContactSetup) -> list[Quantity]:
     """Return the states that laws remember, at the contact nodes and on the strip's material."""
     layers, memory = placed.layers, placed.layers.memory
-    found = []
+    state_quantities = []
     for states, first, kept, dims, end, body in (
         (memory.contact, len(layers.rows) - len(memory.contact), "between", ALONG, "", ""),
         (memory.strip, len(layers.carried_rows), "carried", ON_STRIP, "_strip", " of the strip"),
@@ -106,8 +106,8 @@ def _of_states(placed: ContactSetup) -> list[Quantity]:
         for number, (name, state) in enumerate(states.items(), first):
             text = f"{name}{body}, a state that a law remembers, at the end"
             compute = partial(_state, kept=kept, number=number)
-            found.append(Quantity(f"{STATE}{name}{end}", dims, state.unit, text, compute))
-    return found
+            state_quantities.append(Quantity(f"{STATE}{name}{end}", dims, state.unit, text, compute))
+    return state_quantities
 
 
 def _state(block: Block, kept: str, number: int) -> Array:
@@ -119,8 +119,11 @@ def states(last: Block) -> dict[str, dict[str, Any]]:
     pair = last.system.pair
     weights: dict[tuple[str, ...], Array] = {ALONG: pair.weights, ON_STRIP: pair.strip.weights}
     return {
-        one.name.removeprefix(STATE): {"unit": one.unit, **_extent(weights[one.dims], one.compute(last)[-1])}
-        for one in _of_states(last.system)
+        quantity.name.removeprefix(STATE): {
+            "unit": quantity.unit,
+            **_extent(weights[quantity.dims], quantity.compute(last)[-1]),
+        }
+        for quantity in _of_states(last.system)
     }
 
 
@@ -176,22 +179,25 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
         before: Where they begin.
         known: Its earlier numbers.
     """
-    system, found = block.system, dict[str, float]()
+    system, events = block.system, dict[str, float]()
     for row, (body, thickness) in enumerate(zip(BODIES, system.coatings, strict=True)):
         if not thickness.any():
             continue
-        begun, own = ((before.worn.punch, block.wear), (before.worn.strip, block.wear_strip))[row]
+        begun, depths = ((before.worn.punch, block.wear), (before.worn.strip, block.wear_strip))[row]
         cycles = np.concatenate([[before.half_cycle], block.half_cycle])
-        ended, at = _ends(_coated(system, body, thickness), np.vstack([begun, own]), cycles)
+        ended, at = _ends(_coated(system, body, thickness), np.vstack([begun, depths]), cycles)
         if not ended.any():
             continue
         first, key = int(np.where(ended, at, np.inf).argmin()), f"{body}_coating_first_through"
         surface = system.pair.punch if row == 0 else system.pair.strip
         if f"{key}_half_cycle" not in known:
             names = (f"{key}_at_{axis}_mm" for axis in _axes(surface.dim))
-            found |= {f"{key}_half_cycle": float(at[first]), **dict(zip(names, surface.x[first].tolist(), strict=True))}
-        found[f"{body}_coating_last_through_half_cycle"] = float(np.where(ended, at, -np.inf).max())
-    return found
+            events |= {
+                f"{key}_half_cycle": float(at[first]),
+                **dict(zip(names, surface.x[first].tolist(), strict=True)),
+            }
+        events[f"{body}_coating_last_through_half_cycle"] = float(np.where(ended, at, -np.inf).max())
+    return events
 
 
 def _axes(dim: int) -> tuple[str, ...]:
@@ -205,7 +211,9 @@ def _coated(system: ContactSetup, body: str, thickness: Array) -> CoatedBody:
     if above is None:
         return CoatedBody(thickness, np.ones_like(thickness))
     conditions = system.conditions(0)
-    base, coating = (coefficient(one, system.friction, conditions, f"wear.{body}").mean() for one in (law, above))
+    base, coating = (
+        coefficient(wear_law, system.friction, conditions, f"wear.{body}").mean() for wear_law in (law, above)
+    )
     return CoatedBody(thickness, np.full_like(thickness, base / coating))
 
 
@@ -250,6 +258,11 @@ def quantities(system: Tribosystem) -> list[Quantity]:
         *(OF_DEBRIS if layers.debris.present else ()),
         *([DEBRIS_ON_STRIP] if layers.strip_carries else ()),
         *_of_states(system),
-        *(one for body, own in zip(BODIES, system.coatings, strict=True) if own.any() for one in of_coated(body)),
-        *(one for member in system.creep.members for one in of_creeping(member.name)),
+        *(
+            quantity
+            for body, thickness in zip(BODIES, system.coatings, strict=True)
+            if thickness.any()
+            for quantity in of_coated(body)
+        ),
+        *(quantity for member in system.creep.members for quantity in of_creeping(member.name)),
     ]

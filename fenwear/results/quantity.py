@@ -92,23 +92,26 @@ class InTable:
 
 def numbers(records: Any, of: str, known: Iterable[Quantity]) -> dict[str, float]:
     """Return the numbers of the last half-cycle or cycle for a table of summary.json, by its keys."""
-    own = [one for one in known if one.of == of]
-    values = computed(records, own)
-    return {one.key: float(np.asarray(values[one.name])[-1] if one.dims else values[one.name]) for one in own}
+    chosen = [quantity for quantity in known if quantity.of == of]
+    values = computed(records, chosen)
+    return {
+        quantity.key: float(np.asarray(values[quantity.name])[-1] if quantity.dims else values[quantity.name])
+        for quantity in chosen
+    }
 
 
 def computed(records: Any, quantities: Iterable[Quantity]) -> dict[str, Any]:
     """Return the values of quantities by their names; each table is computed once."""
     tables: dict[int, Mapping[str, Any]] = {}
     values = {}
-    for one in quantities:
-        how = one.compute
+    for quantity in quantities:
+        how = quantity.compute
         if isinstance(how, InTable):
             if id(how.table) not in tables:
                 tables[id(how.table)] = how.table(records)
-            values[one.name] = tables[id(how.table)][how.name]
+            values[quantity.name] = tables[id(how.table)][how.name]
         else:
-            values[one.name] = how(records)
+            values[quantity.name] = how(records)
     return values
 
 
@@ -152,8 +155,8 @@ def degrees_in(unit: str) -> TemperatureScale:
 
 def in_kelvin(history: xarray.Dataset) -> xarray.Dataset:
     """Return a history with all temperatures in kelvin."""
-    found = history.copy()
+    converted = history.copy()
     for name, values in history.data_vars.items():
         if values.attrs.get("units") == CELSIUS.unit:
-            found[name] = (values + ICE).assign_attrs({**values.attrs, "units": KELVIN.unit})
-    return found
+            converted[name] = (values + ICE).assign_attrs({**values.attrs, "units": KELVIN.unit})
+    return converted

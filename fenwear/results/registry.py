@@ -38,9 +38,9 @@ def _weights(records: Any, body: str) -> Array:
     return np.broadcast_to(weights, (len(records), len(weights)))
 
 
-def _of_records(name: str, dims: tuple[str, ...], unit: str, long_name: str, **more: Any) -> Quantity:
+def _of_records(name: str, dims: tuple[str, ...], unit: str, long_name: str, **arguments: Any) -> Quantity:
     """Return a quantity that records of half-cycles have under its name."""
-    return Quantity(name, dims, unit, long_name, attrgetter(name), **more)
+    return Quantity(name, dims, unit, long_name, attrgetter(name), **arguments)
 
 
 IN_RUN = (
@@ -96,8 +96,8 @@ def _term(records: Any, number: int) -> Array:
     return np.asarray(records.heat.terms[:, number])
 
 
-def _of_heat(name: str, dims: tuple[str, ...], unit: str, text: str, attribute: str = "", **more: Any) -> Quantity:
-    return Quantity(name, dims, unit, text, attrgetter(f"heat.{attribute or name}"), **more)
+def _of_heat(name: str, dims: tuple[str, ...], unit: str, text: str, attribute: str = "", **arguments: Any) -> Quantity:
+    return Quantity(name, dims, unit, text, attrgetter(f"heat.{attribute or name}"), **arguments)
 
 
 OF_HEAT = (
@@ -127,15 +127,15 @@ ON_SURFACES = {
 NODES = {"x": "node", "x_strip": "node_strip"}
 
 
-def on_surface(one: Quantity) -> Quantity:
+def on_surface(quantity: Quantity) -> Quantity:
     """Return a quantity of plane models as that of solids and rings."""
-    unit, text = ON_SURFACES.get(one.name, (one.unit, one.long_name))
-    return replace(one, dims=tuple(NODES.get(d, d) for d in one.dims), unit=unit, long_name=text)
+    unit, text = ON_SURFACES.get(quantity.name, (quantity.unit, quantity.long_name))
+    return replace(quantity, dims=tuple(NODES.get(d, d) for d in quantity.dims), unit=unit, long_name=text)
 
 
-def on_surfaces(found: Iterable[Quantity]) -> list[Quantity]:
+def on_surfaces(quantities: Iterable[Quantity]) -> list[Quantity]:
     """Return the quantities of plane models that solids and rings have, as theirs."""
-    return [on_surface(one) for one in found if one.name != "contact_width"]
+    return [on_surface(quantity) for quantity in quantities if quantity.name != "contact_width"]
 
 
 def _in_cycle(records: Block | SteadyCycle) -> float:
@@ -143,8 +143,10 @@ def _in_cycle(records: Block | SteadyCycle) -> float:
     if isinstance(records, SteadyCycle):
         return float(records.phase_pressure.max())
     strokes, contacts = records.system.motion.half_cycles, all_phases(records.end.contacts).pressure
-    steps_taken = [one.pressure for one in records.steps[-strokes:]]
-    return float(np.max([one.max() for one in steps_taken or [contacts if len(contacts) else records.pressure]]))
+    steps_taken = [stroke.pressure for stroke in records.steps[-strokes:]]
+    return float(
+        np.max([pressures.max() for pressures in steps_taken or [contacts if len(contacts) else records.pressure]])
+    )
 
 
 IN_CYCLE = Quantity("largest_pressure_in_cycle", (), "MPa", "largest contact pressure at any time of the cycle",
@@ -158,20 +160,27 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
     quantities = [
         *IN_RUN,
         *(() if case.wear.strip is None else OF_STRIP),
-        *(one for one in OF_PROGRAM if case.program is not None and (heat or one.name != "ambient")),
+        *(quantity for quantity in OF_PROGRAM if case.program is not None and (heat or quantity.name != "ambient")),
         *(OF_HEAT if heat else ()),
         *(OF_TRACK if track else ()),
         *sheet.quantities(system),
-        *(one for room in (layer_results, forces_and_place, roughness, time_steps) for one in room.quantities(system)),
+        *(
+            quantity
+            for room in (layer_results, forces_and_place, roughness, time_steps)
+            for quantity in room.quantities(system)
+        ),
         IN_CYCLE,
     ]
     if case.model.kind != "plane":
         quantities = on_surfaces(quantities)
     if case.turns:
         quantities = [
-            replace(one, unit="rad s-1", long_name=ANGULAR) if one.name == "speed" else one for one in quantities
+            replace(quantity, unit="rad s-1", long_name=ANGULAR) if quantity.name == "speed" else quantity
+            for quantity in quantities
         ]
-    return {one.name: replace(one, long_name=case.names.with_names(one.long_name)) for one in quantities}
+    return {
+        quantity.name: replace(quantity, long_name=case.names.with_names(quantity.long_name)) for quantity in quantities
+    }
 
 
 @cache
@@ -189,7 +198,7 @@ def _prototypes() -> dict[str, Quantity]:
         *layer_results.OF_FLOW,
     ]
     listed += [IN_CYCLE, *time_steps.OF_CYCLE]
-    return {one.name: one for one in listed}
+    return {quantity.name: quantity for quantity in listed}
 
 
 UNKNOWN = Quantity("", ("unknown",), "1", "", attrgetter(""))
@@ -210,7 +219,7 @@ def known(name: str) -> Quantity:
 
 def names_known() -> list[str]:
     """Return the names of all quantities that are one number of a half-cycle or cycle, without those of the strip."""
-    single = [one.name for one in _prototypes().values() if one.dims in (RECORD, ())]
+    single = [quantity.name for quantity in _prototypes().values() if quantity.dims in (RECORD, ())]
     listed = [name for name in single if not name.endswith("_strip")]
     return [*listed, *(f"{motion}_{axis}" for motion in TURNS for axis in "xyz")]
 

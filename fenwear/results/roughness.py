@@ -31,7 +31,7 @@ ENDS = {"punch": "", "strip": "_strip"}
 def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
     """Return the surfaces with a topography, by their bodies."""
     both = {"punch": system.pair.punch, "strip": system.pair.strip}
-    return {body: one for body, one in both.items() if one.grid is not None and one.heights.any()}
+    return {body: surface for body, surface in both.items() if surface.grid is not None and surface.heights.any()}
 
 
 def columns(system: Tribosystem) -> dict[str, Column]:
@@ -50,7 +50,7 @@ def columns(system: Tribosystem) -> dict[str, Column]:
 
 def quantities(system: Tribosystem) -> list[Quantity]:
     """Return the quantities of rough surfaces."""
-    return [one for body in _rough(system) for one in of_body(body)]
+    return [quantity for body in _rough(system) for quantity in of_body(body)]
 
 
 def of_body(body: str) -> list[Quantity]:

@@ -198,8 +198,8 @@ SCARS: Mapping[str, Callable[[Any], Mapping[str, Array]]] = {body: partial(_scar
 
 def quantities(placed: ContactSetup) -> list[Quantity]:
     """Return the quantities of the sheet: of the bodies that wear, masses where a density is known."""
-    found = [*SLIDING, *(TURNING if turns(placed) else ())]
-    return [*found, *(one for body in BODIES for one in of_body(placed, body))]
+    sliding_quantities = [*SLIDING, *(TURNING if turns(placed) else ())]
+    return [*sliding_quantities, *(quantity for body in BODIES for quantity in of_body(placed, body))]
 
 
 def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
@@ -211,7 +211,7 @@ def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
     weighed = placed.bodies.densities[number] is not None
     return [
         *(of_a_plane_body(body) if _is_plane(placed) else ()),
-        *(one for one in of_a_body(body) if weighed or "mass" not in one.name),
+        *(quantity for quantity in of_a_body(body) if weighed or "mass" not in quantity.name),
         *of_the_scar(body, places(placed, surface, geometry), geometry.names),
     ]
 
@@ -361,15 +361,15 @@ OF_CONTACT = {
 
 def body_numbers(records: Block, body: str, known: Iterable[Quantity]) -> dict[str, float]:
     """Return the wear and other numbers of a body at the end of a run; none of a body that does not wear."""
-    own = numbers(records, body, known)
-    return own | _diameters(own)
+    values = numbers(records, body, known)
+    return values | _diameters(values)
 
 
-def _diameters(own: Mapping[str, float]) -> dict[str, float]:
+def _diameters(values: Mapping[str, float]) -> dict[str, float]:
     """Return the diameters of a scar that is as long as it is wide, within a tenth: the means of both, mm."""
     keys = [f"scar_{{}}{end}_mm" for end in SHARES]
-    both = {key.format(ROUND): [own.get(key.format(name), 0.0) for name in ("length", "width")] for key in keys}
-    return {key: sum(one) / 2 for key, one in both.items() if 0 < max(one) <= NEARLY * min(one)}
+    both = {key.format(ROUND): [values.get(key.format(name), 0.0) for name in ("length", "width")] for key in keys}
+    return {key: sum(extents) / 2 for key, extents in both.items() if 0 < max(extents) <= NEARLY * min(extents)}
 
 
 def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | None]]]:
@@ -384,10 +384,10 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
     uncertain = summary.get(UNCERTAINTY, {})
     of_bodies = [uncertain.get(body, {}) for body in BODIES if body in summary]
     for key, line in LINES.items():
-        found = next(([one] for one in (summary.get("sliding", {}), heat, summary) if key in one), bodies)
-        if any(key in one for one in found):
-            rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
-            rows += _within(key, line, of_bodies if found is bodies else [uncertain])
+        tables = next(([table] for table in (summary.get("sliding", {}), heat, summary) if key in table), bodies)
+        if any(key in table for table in tables):
+            rows.append((line.label, line.unit, [shown(table.get(key), line) for table in tables]))
+            rows += _within(key, line, of_bodies if tables is bodies else [uncertain])
     for name, state in summary.get("states", {}).items():
         unit = "" if state["unit"] == "1" else state["unit"]
         labels = (f"{name.replace('_', ' ')}, mean", "... smallest", "... largest")
@@ -399,9 +399,9 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
 
 def _within(key: str, line: Line, uncertain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, list[float | None]]]:
     """Return the line below one of the sheet that says how uncertain its numbers are; none where that is not known."""
-    if not any(key in one for one in uncertain):
+    if not any(key in table for table in uncertain):
         return []
-    return [(WITHIN, line.unit, [_two_digits(shown(one.get(key), line)) for one in uncertain])]
+    return [(WITHIN, line.unit, [_two_digits(shown(table.get(key), line)) for table in uncertain])]
 
 
 def _two_digits(value: float | None) -> float | None:
@@ -417,7 +417,7 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     """Return the sheet of a summary as lines for people: of the sliding, of the bodies, and of the contact each way."""
     names = Names(**summary.get("names", {}))
     bodies = [names.by_roles[body] for body in BODIES if body in summary]
-    ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "largest_pressure_MPa" in one]
+    ways = [name for name, table in summary.items() if isinstance(table, Mapping) and "largest_pressure_MPa" in table]
     uncertain = [summary.get(UNCERTAINTY, {}).get(way, {}) for way in ways]
     rows, contact = sheet_rows(summary), list[Any]()
     for key, line in OF_CONTACT.items():

@@ -167,14 +167,14 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
 
     for name, of in STEPS.items():
         if of in history:
-            found = one_after_the_other(history[of].values[rows])
-            put(name, ("cycle", STEP, *map(str, history[of].dims[2:])), found, of)
+            joined = one_after_the_other(history[of].values[rows])
+            put(name, ("cycle", STEP, *map(str, history[of].dims[2:])), joined, of)
     data["stick"] = (data["stick"][0], np.nan_to_num(data["stick"][1]).astype(np.int8), data["stick"][2])
-    for name, one in history.data_vars.items():
-        if one.dims[:1] == RECORD and STEP not in one.dims and name != "weight" and str(name) not in data:
-            values = reduced(one.values[rows], known(str(name)).cycle)
-            put(str(name), ("cycle", *map(str, one.dims[1:])), values, str(name))
-    fixed = {name: one for name, one in history.variables.items() if "half_cycle" not in one.dims and name != STEP}
+    for name, variable in history.data_vars.items():
+        if variable.dims[:1] == RECORD and STEP not in variable.dims and name != "weight" and str(name) not in data:
+            values = reduced(variable.values[rows], known(str(name)).cycle)
+            put(str(name), ("cycle", *map(str, variable.dims[1:])), values, str(name))
+    fixed = {name: held for name, held in history.variables.items() if "half_cycle" not in held.dims and name != STEP}
     weight = history.weight.isel(half_cycle=-1, drop=True)
     half = np.where(there, np.repeat(np.arange(1, strokes + 1), history.sizes[STEP]), 0).reshape(*rows.shape, -1)
     fractions = one_after_the_other(history.step_fraction.values[rows])
@@ -182,7 +182,7 @@ def by_cycles(history: xarray.Dataset) -> xarray.Dataset:
         "cycle": ("cycle", numbers[last] // strokes, {"units": "1", "long_name": "cycles done"}),
         "fraction": (("cycle", STEP), fractions, history.step_fraction.attrs),
         "half_cycle_of_step": (("cycle", STEP), one_after_the_other(half), {"units": "1", "long_name": "half-cycle"}),
-        **{str(name): (one.dims, one.values, one.attrs) for name, one in fixed.items()},
+        **{str(name): (column.dims, column.values, column.attrs) for name, column in fixed.items()},
         "weight": (weight.dims, weight.values, weight.attrs),
     }
     return xarray.Dataset(data, coordinates, history.attrs)
@@ -205,18 +205,18 @@ def to_dataset(blocks: Block | Iterable[Block]) -> xarray.Dataset:
     """
     import xarray
 
-    found = [blocks] if isinstance(blocks, Block) else list(blocks)
-    if not found:
+    block_list = [blocks] if isinstance(blocks, Block) else list(blocks)
+    if not block_list:
         raise CaseError(InputError("blocks", "expected at least one: no half-cycle was computed"))
-    system = found[0].system
+    system = block_list[0].system
     variables, degrees = variables_of(system), degrees_of(system.case)
-    parts = [computed(block, variables_of(block.system).values()) for block in found]
+    parts = [computed(block, variables_of(block.system).values()) for block in block_list]
     data = {name: (c.dimensions, c.values, dict(c.attributes)) for name, c in columns_of(system).items()}
-    for name, one in variables.items():
-        values, unit = np.concatenate([part[name] for part in parts]), one.unit
+    for name, quantity in variables.items():
+        values, unit = np.concatenate([part[name] for part in parts]), quantity.unit
         if unit == KELVIN.unit:
             values, unit = degrees.of(values), degrees.unit
-        data[name] = (one.dims, values, {"units": unit, "long_name": one.long_name})
+        data[name] = (quantity.dims, values, {"units": unit, "long_name": quantity.long_name})
     attributes = {"title": system.case.title or "fenwear run", "conforming": int(conforming(system.pair))}
     if system.case.model.kind != "plane":
         attributes["model"] = system.case.model.kind

@@ -96,16 +96,16 @@ def within(records: R, contact: str, rate: WornDepths) -> R:
         rate: Depths worn in a cycle, by which the volumes that half-cycles add are shared.
     """
     pair, heat = records.system.pair, records.heat
-    own = pair.punch.nodes_of(contact)
+    of_contact = pair.punch.nodes_of(contact)
     if heat is not None:
         sides = (heat.temperature_punch, heat.temperature_strip)
-        warm = [np.where(own, side, -np.inf) for side in sides]
+        warm = [np.where(of_contact, side, -np.inf) for side in sides]
         heat = replace(heat, temperature_punch=warm[0], temperature_strip=warm[1])
     adds, changed = records.adds.sums.copy(), dict[str, Any]()
     if isinstance(records, Block):
         sums = records.totals.sums.copy()
         depths = {"wear": records.wear, "wear_strip": records.wear_strip}
-        changed["totals"] = replace(records.totals, sums=sums, energy=np.where(own, records.totals.energy, 0.0))
+        changed["totals"] = replace(records.totals, sums=sums, energy=np.where(of_contact, records.totals.energy, 0.0))
     for body, surface in (("punch", pair.punch), ("strip", pair.strip)):
         if contact in surface.names:
             nodes, volume = surface.nodes_of(contact), SUMS.index(f"volume_{body}")
@@ -114,14 +114,14 @@ def within(records: R, contact: str, rate: WornDepths) -> R:
                 key = f"wear{sheet.BODIES[body]}"
                 sums[:, volume] *= _share(surface.weights, depths[key], nodes)
                 changed[key] = np.where(nodes, depths[key], 0.0)
-    pressure = np.where(own, records.pressure, 0.0)
+    pressure = np.where(of_contact, records.pressure, 0.0)
     return replace(records, pressure=pressure, heat=heat, adds=replace(records.adds, sums=adds), **changed)
 
 
 def _share(weights: Array, depth: Array, nodes: Mask) -> Array:
     """Return the share of the integral of depths (..., n) that is of some nodes (...)."""
-    whole = np.asarray(depth @ weights)
-    return np.asarray(np.where(nodes, depth, 0.0) @ weights / np.where(whole > 0, whole, 1.0))
+    total = np.asarray(depth @ weights)
+    return np.asarray(np.where(nodes, depth, 0.0) @ weights / np.where(total > 0, total, 1.0))
 
 
 def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
@@ -129,46 +129,51 @@ def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
 
     Forces, means, largest pressures and areas are of the last cycle.
     """
-    pair, found, known = last.system.pair, dict[str, dict[str, Any]](), quantities_of(last.system)
+    pair, sheets, known = last.system.pair, dict[str, dict[str, Any]](), quantities_of(last.system)
     rate = WornDepths(last.wear[-1], last.wear_strip[-1])
     for name in dict.fromkeys((*pair.punch.names, *pair.strip.names)):
-        own = found.setdefault(name, {})
+        table = sheets.setdefault(name, {})
         part = last if name not in pair.punch.names else within(last, name, rate)
         if name in pair.punch.names:
-            own |= _carried(part, name)
+            table |= _carried(part, name)
         for body in sheet.BODIES:
             if name in getattr(pair, body).names and (worn := sheet.body_numbers(part, body, known.values())):
-                own[body] = {key: value for key, value in worn.items() if key in OF_BODIES}
-    return found
+                table[body] = {key: value for key, value in worn.items() if key in OF_BODIES}
+    return sheets
 
 
 def _carried(part: Block, name: str) -> dict[str, Any]:
     """Return the load, friction and temperatures of a named contact."""
     system, degrees = part.system, degrees_of(part.system.case)
-    own = system.pair.punch.nodes_of(name)
+    nodes = system.pair.punch.nodes_of(name)
     area = system.bodies.punch.thickness * system.pair.weights
     energy, largest = part.totals.energy[-1], part.pressure[-system.motion.half_cycles :].max(axis=0)
     where = without_noise(system.pair.punch.x[largest.argmax()], system.pair.punch.extent())
     known = quantities_of(system)
-    found = {
-        **_force(part, own),
-        **{known[one].key: float(known[one].of_cycle(part)) for one in ("pressure_integral", "largest_pressure")},
+    values = {
+        **_force(part, nodes),
+        **{
+            known[quantity].key: float(known[quantity].of_cycle(part))
+            for quantity in ("pressure_integral", "largest_pressure")
+        },
         **{f"largest_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), where, strict=False)},
-        **{known[one].key: float(known[one].of_cycle(part)) for one in ("mean_pressure", "contact_area")},
+        **{
+            known[quantity].key: float(known[quantity].of_cycle(part)) for quantity in ("mean_pressure", "contact_area")
+        },
         "friction_work_mJ": float(area @ energy),
         "largest_energy_mJ_per_mm2": float(energy.max()),
         **{key: float(known[of].of_cycle(part)) for key, at in PLACES.items() if (of := f"{at}_{name}") in known},
     }
     if "largest_temperature" in known:
         warmest = float(known["largest_temperature"].of_cycle(part))
-        found[f"largest_temperature_{degrees.unit}"] = warmest - degrees.zero
-    return found
+        values[f"largest_temperature_{degrees.unit}"] = warmest - degrees.zero
+    return values
 
 
-def _force(last: Block, own: Mask) -> dict[str, float]:
+def _force(last: Block, nodes: Mask) -> dict[str, float]:
     """Return the force on the punch of contact nodes (n,) of one contact, mean of the last cycle; of rings along z."""
     system, cycle = last.system, slice(-last.system.motion.half_cycles, None)
-    force = node_forces(last)[cycle][:, own].sum(axis=1).mean(axis=0)
+    force = node_forces(last)[cycle][:, nodes].sum(axis=1).mean(axis=0)
     force = without_noise(force, float(np.linalg.norm(force)))
     along = axes(system.pair.punch.dim)
     if system.bodies.punch.law.kind == "axisymmetric":
@@ -180,14 +185,14 @@ def contact_text(summary: Mapping[str, Any]) -> str:
     """Return the sheets of a summary's named contacts as lines for people, a column each; "" where it has none."""
     contacts = summary.get(CONTACTS, {})
     columns = [
-        one | {f"{body}.{key}": value for body in sheet.BODIES for key, value in one.get(body, {}).items()}
-        for one in contacts.values()
+        contact | {f"{body}.{key}": value for body in sheet.BODIES for key, value in contact.get(body, {}).items()}
+        for contact in contacts.values()
     ]
     names = Names(**summary.get("names", {}))
     rows = [
-        (names.with_names(line.heading), [sheet.shown(one.get(key), line) for one in columns])
+        (names.with_names(line.heading), [sheet.shown(column.get(key), line) for column in columns])
         for key, line in LINES.items()
-        if any(key in one for one in columns)
+        if any(key in column for column in columns)
     ]
     return sheet.columns_text(list(contacts), rows)
 
@@ -228,12 +233,12 @@ def sheet_of(last: Block) -> dict[str, Any]:
     known = list(quantities_of(last.system).values())
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
     sliding |= numbers(last, "sliding", known)
-    bodies = {body: own for body in sheet.BODIES if (own := sheet.body_numbers(last, body, known))}
+    bodies = {body: values for body in sheet.BODIES if (values := sheet.body_numbers(last, body, known))}
     cycle = time_steps.table_cycle(last)
     if cycle is not None:
         sliding |= time_steps.sliding_numbers(last, cycle)
-        bodies = {body: own | time_steps.body_numbers(last, cycle, body) for body, own in bodies.items()}
-    states = {layer_results.STATES: found} if (found := layer_results.states(last)) else {}
+        bodies = {body: numbers | time_steps.body_numbers(last, cycle, body) for body, numbers in bodies.items()}
+    states = {layer_results.STATES: remembered} if (remembered := layer_results.states(last)) else {}
     return {"sliding": sliding, **bodies, **states, **numbers(last, "end", known)}
 
 
@@ -252,7 +257,7 @@ def _places(system: Tribosystem) -> NDArray[np.float64]:
 def _at(system: Tribosystem, values: NDArray[np.float64]) -> list[float | None]:
     """Return nodal values at the three places; None in a gap between parts of the contact."""
     nodal_values = at_places(system.pair.punch, values, _places(system))
-    return [None if np.isnan(one) else float(one) for one in nodal_values]
+    return [None if np.isnan(value) else float(value) for value in nodal_values]
 
 
 def nominal_pressure(placed: ContactSetup, load: float) -> dict[str, float]:
@@ -276,16 +281,16 @@ def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     known, nominal = quantities_of(system), nominal_pressure(system, float(last.load[-1]))
     sizes = [name for name in ("contact_width", "contact_area") if name in known]
     wanted = [known[name] for name in ("half_cycle", "direction", "largest_pressure", "mean_pressure", *sizes)]
-    rows = {one.key: np.asarray(one.compute(last))[cycle] for one in wanted}
+    rows = {quantity.key: np.asarray(quantity.compute(last))[cycle] for quantity in wanted}
     plane = system.case.model.kind == "plane"
-    found: dict[str, Any] = {f"{name}_MPa": value for name, value in nominal.items()}
+    contacts: dict[str, Any] = {f"{name}_MPa": value for name, value in nominal.items()}
     if plane:
-        found |= {"x_mm": _places(system).tolist(), "wear_mm": _at(system, last.wear[-1])}
+        contacts |= {"x_mm": _places(system).tolist(), "wear_mm": _at(system, last.wear[-1])}
     for k, pressure in enumerate(map(np.asarray, last.pressure[cycle])):
         at = {"pressure_MPa": _at(system, pressure)} if plane else {}
         numbers = {key: row[k].item() for key, row in rows.items() if key != "direction"}
-        found[system.direction_words[int(rows["direction"][k])]] = {**numbers, **at, **net.numbers(pressure)}
-    return found
+        contacts[system.direction_words[int(rows["direction"][k])]] = {**numbers, **at, **net.numbers(pressure)}
+    return contacts
 
 
 def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str, Any]:

@@ -51,9 +51,9 @@ def _rows(block: Block) -> dict[str, NDArray[Any]]:
     return {name: np.array([padded(np.asarray(row[name], dtype=float), size) for row in rows]) for name in rows[0]}
 
 
-def _in_steps(name: str, dims: tuple[str, ...], unit: str, text: str, **more: Any) -> Quantity:
+def _in_steps(name: str, dims: tuple[str, ...], unit: str, text: str, **arguments: Any) -> Quantity:
     """Return a quantity of the time steps of half-cycles."""
-    return Quantity(name, dims, unit, text, InTable(_rows, name), **more)
+    return Quantity(name, dims, unit, text, InTable(_rows, name), **arguments)
 
 
 IN_STEPS = (
@@ -100,18 +100,20 @@ def _step_quantities(system: Tribosystem) -> list[Quantity]:
     """Return the quantities of time steps of a system whose law resolves them; none of others."""
     if not system.sticks:
         return []
-    found, turns = [*IN_STEPS, *(OF_HEAT if system.exchange.conducts else ())], any(system.sliding.field.turn)
+    step_quantities, turns = [*IN_STEPS, *(OF_HEAT if system.exchange.conducts else ())], any(system.sliding.field.turn)
     if system.pair.punch.dim == 3:
-        found = [*(one for one in found if one.name not in IN_SOLIDS), *of_solids()]
+        step_quantities = [*(quantity for quantity in step_quantities if quantity.name not in IN_SOLIDS), *of_solids()]
     if turns:
-        found = [replace(one, unit=IN_TURNING.get(one.name, one.unit)) for one in found]
+        step_quantities = [
+            replace(quantity, unit=IN_TURNING.get(quantity.name, quantity.unit)) for quantity in step_quantities
+        ]
     other = "largest_force" if turns else "largest_torque"
-    return [*found, *(one for one in OF_CYCLE if one.name != other)]
+    return [*step_quantities, *(quantity for quantity in OF_CYCLE if quantity.name != other)]
 
 
 def of_solids() -> list[Quantity]:
     """Return the quantities that a solid has in place of the plane's, and as well."""
-    known = {one.name: one for one in IN_STEPS}
+    known = {quantity.name: quantity for quantity in IN_STEPS}
     return [
         *(
             _in_steps(new, known[name].dims, unit, text, of=known[name].of)
@@ -174,7 +176,7 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
     traction, slip = (np.einsum("nam,knm->akn", turn, v) for v in (records.traction, records.slip))
     stuck, within = stuck_size(pair, steps)
     share = float(pair.weights @ (steps.stuck & records.touched)) / max(float(pair.weights @ records.touched), 1e-300)
-    found: dict[str, Any] = {
+    row: dict[str, Any] = {
         "step_fraction": [program[steps.first + k].fraction for k in range(len(records))],
         "displacement": records.displacement,
         "tangential_force": thick * records.force,
@@ -195,11 +197,11 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
         "jump_error": steps.jump_error,
     }
     if len(traction) > 1:
-        found |= {"traction_across": traction[1], "slip_across": slip[1]}
+        row |= {"traction_across": traction[1], "slip_across": slip[1]}
     if records.heat.size:
         for k, body in enumerate(("punch", "strip")):
-            found[f"step_temperature_{body}"] = records.temperature[:, k]
-    return found
+            row[f"step_temperature_{body}"] = records.temperature[:, k]
+    return row
 
 
 REGIMES = ("stick", "partial slip", "gross sliding")
@@ -289,8 +291,8 @@ def extremes(block: Block) -> dict[str, float]:
     weights = block.system.law_state.problem.weights
     steps = steps_of(block)
     return {
-        "largest_energy_balance_error": max(one.records.balance_error(weights) for one in steps),
-        "largest_jump_error": max(one.jump_error for one in steps),
+        "largest_energy_balance_error": max(stroke.records.balance_error(weights) for stroke in steps),
+        "largest_jump_error": max(stroke.jump_error for stroke in steps),
     }
 
 
@@ -298,7 +300,7 @@ def hottest(block: Block, heat: BlockHeat) -> Array:
     """Return the largest temperature of each half-cycle of a block (k,), K: of its time steps, or at its end."""
     if not block.system.sticks:
         return heat.largest_temperature
-    return np.array([one.records.temperature.max() for one in steps_of(block)])
+    return np.array([stroke.records.temperature.max() for stroke in steps_of(block)])
 
 
 MILLION = 1e6
@@ -333,8 +335,8 @@ def table_cycle(last: Block) -> TableCycle | None:
         return None
     end, shear = last.end, system.ways.shear(pressure)
     states = [
-        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
-        for k, own in enumerate(pressure)
+        system.conditions(k, np.asarray(phase_pressure), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
+        for k, phase_pressure in enumerate(pressure)
     ]
     tensors = system.ways.tensor(pressure), system.ways.tensor_of_strip(pressure)
     worn = system.wear.phases(states).begun(end.worn).worn(pressure)
@@ -346,10 +348,10 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
     records, problem, pair = steps.records, last.system.law_state.problem, last.system.pair
     slip = np.where(records.pressure[:, :, None] > 0, records.slip, 0.0)
     ways, values, on_strip = np.linalg.norm(slip, axis=2), [], np.zeros((len(pair.strip.weights), 9))
-    for k, own in enumerate(slip):
+    for k, phase_slip in enumerate(slip):
         place = problem.program.steps[(steps.first + k) % len(problem.program.steps)].offset
         position = problem.interface.position(place)
-        vectors = in_space(np.einsum("nmc,nm->nc", position.frame[:, 1:], own))
+        vectors = in_space(np.einsum("nmc,nm->nc", position.frame[:, 1:], phase_slip))
         scale = np.divide(records.pressure[k], ways[k], out=np.zeros_like(ways[k]), where=ways[k] > 0)
         values.append(scale[:, None, None] * vectors[:, :, None] * vectors[:, None, :])
         back = in_space(position.pair.placement.back(vectors if pair.punch.dim == 3 else vectors[:, [0, 2]]))
@@ -361,12 +363,12 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
 
 def _directions(block: Block, axis: int) -> Array:
     """Return a component of the direction of most work of friction (k, n)."""
-    return np.array([one.direction[:, axis] for one in block.sliding])
+    return np.array([sliding.direction[:, axis] for sliding in block.sliding])
 
 
 OF_TABLE = (
     Quantity("cross_shear", ("half_cycle", "x"), "1", "cross-shear ratio of a cycle on the punch: share of the work "
-             "across its direction", lambda b: np.array([one.ratio for one in b.sliding])),
+             "across its direction", lambda b: np.array([sliding.ratio for sliding in b.sliding])),
     *(
         Quantity(f"principal_{axis}", ("half_cycle", "x"), "1",
                  f"direction with most of the work of friction in a cycle, along {axis}", partial(_directions, axis=k))

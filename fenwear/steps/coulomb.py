@@ -267,7 +267,7 @@ def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
     if not sliding.motion.steps:
         return make_motion(case.motion.model_copy(update={"positions": 1}))
     rate = pair.weights @ sliding.field.rate(pair.opposite, pair.normal) / pair.weights.sum()
-    return sliding.measured_on(pair).motion.as_one(sliding.field.over(float(rate)))
+    return sliding.measured_on(pair).motion.as_single_phase(sliding.field.over(float(rate)))
 
 
 def _told_apart(case: Case, bodies: Bodies) -> float:

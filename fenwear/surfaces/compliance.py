@@ -91,9 +91,9 @@ class Interface:
         """Return the relative displacements (n, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
         if self.in_memory:
             return product(self.dense(), forces)
-        found = self.opened(*self.displaced(forces))
-        found[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
-        return found
+        relative = self.opened(*self.displaced(forces))
+        relative[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
+        return relative
 
     @cached_property
     def _closing(self) -> Array:
@@ -154,9 +154,9 @@ class Interface:
                 read = self.pair.transfer @ below.reshape(len(below), -1)
                 below = np.asarray(read).reshape(-1, *below.shape[1:])
             both = zip((self.axes, self._axes_on_strip), (self.punch.diagonal(), below), strict=True)
-            found = np.asarray(sum(_along(axes, own) for axes, own in both))
-            found[:, 0] += self._closing
-            return found
+            blocks = np.asarray(sum(_along(axes, response) for axes, response in both))
+            blocks[:, 0] += self._closing
+            return blocks
         each = (np.array([node]) for node in range(len(self.pair.weights)))
         return np.concatenate([self.asked(node, node)[:, :, 0] for node in each])
 
@@ -170,37 +170,37 @@ class Interface:
 
     def asked(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the entries of rows and columns (k, a, m, d), computed from the bodies and not kept."""
-        own = np.arange(len(self.pair.weights))[rows]
-        on_punch = _along(self.axes[own], self.punch.entries(rows, columns))
-        on_strip = self._on_strip(own, rows, columns)
+        numbers = np.arange(len(self.pair.weights))[rows]
+        on_punch = _along(self.axes[numbers], self.punch.entries(rows, columns))
+        on_strip = self._on_strip(numbers, rows, columns)
         if self.pair.placement.turn != ZERO:
             d = on_strip.shape[-1]
             on_strip = self.pair.placement.vectors(on_strip.reshape(-1, d)).reshape(on_strip.shape)
-        found = on_punch + on_strip
+        entries = on_punch + on_strip
         if np.any(self.layer):
-            to, by = np.equal.outer(own, np.arange(len(self.pair.weights))[columns]).nonzero()
-            found[to, 0, by] += self._closing[own[to]]
-        return found
+            to, by = np.equal.outer(numbers, np.arange(len(self.pair.weights))[columns]).nonzero()
+            entries[to, 0, by] += self._closing[numbers[to]]
+        return entries
 
-    def _on_strip(self, own: NDArray[np.int64], rows: Nodes, columns: Nodes) -> Array:
+    def _on_strip(self, numbers: NDArray[np.int64], rows: Nodes, columns: Nodes) -> Array:
         """Return the strip's displacements at the contact nodes by forces in its own frame."""
-        axes, strip = self._axes_on_strip[own], self.strip
+        axes, strip = self._axes_on_strip[numbers], self.strip
         if not self.strip_moves:
             return _along(axes, strip.entries(rows, columns))
-        whole = csr_array(self.pair.transfer)
-        seen, read = _used(csr_array(whole[own]), rows)
-        pushed, push = _used(csr_array(whole[columns]), columns)
+        transfer = csr_array(self.pair.transfer)
+        seen, read = _used(csr_array(transfer[numbers]), rows)
+        pushed, push = _used(csr_array(transfer[columns]), columns)
         block = strip.entries(seen, pushed)
-        found: Array = np.zeros((len(own), axes.shape[1], push.shape[0], axes.shape[2]))
+        displacements: Array = np.zeros((len(numbers), axes.shape[1], push.shape[0], axes.shape[2]))
         for axis in range(axes.shape[2]):
             for across in range(block.shape[1]):  # along e_n, or each axis, from a force along `axis`
                 part = (push @ (read @ block[:, across, :, axis]).T).T
                 if block.shape[1] == 1:
-                    found[:, 0, :, axis] = part
+                    displacements[:, 0, :, axis] = part
                     continue
                 for k in range(axes.shape[1]):
-                    found[:, k, :, axis] += axes[:, k, across, None] * part
-        return found
+                    displacements[:, k, :, axis] += axes[:, k, across, None] * part
+        return displacements
 
     @cached_property
     def load_gap(self) -> Array:
@@ -286,12 +286,12 @@ class Compliance:
     @cached_property
     def on_grid(self) -> GridCompliance | None:
         """The compliance as a convolution; None where the surfaces are on no common grid, or pass each other."""
-        own = self.interface
+        interface = self.interface
         few = self.components > 1 and self._n < GRIDDED
-        if few or own.strip_moves or own.in_memory or own.pair.placement.turn != ZERO:
+        if few or interface.strip_moves or interface.in_memory or interface.pair.placement.turn != ZERO:
             return None
-        axes, bodies = own.axes[:, : self.components], [own.punch, own.strip]
-        return on_one_grid(bodies, axes, self._traction, own.pair.weights, self._local, self._known)
+        axes, bodies = interface.axes[:, : self.components], [interface.punch, interface.strip]
+        return on_one_grid(bodies, axes, self._traction, interface.pair.weights, self._local, self._known)
 
     def _block(self, rows: Nodes, nodes: Nodes) -> Array:
         """Return the block of compliances between components of nodes (components, nodes, components, rows)."""
@@ -322,8 +322,8 @@ class Compliance:
         i, j = (np.arange(self._n * self.components)[some] for some in (rows, columns))
         if self._keeps:
             return self._columns[j, i[:, None]]
-        (to, at), (of, by) = (np.divmod(one, self._n) for one in (i, j))
-        (seen, i), (pushed, j) = (np.unique(one, return_inverse=True) for one in (at, by))
+        (to, at), (of, by) = (np.divmod(numbers, self._n) for numbers in (i, j))
+        (seen, i), (pushed, j) = (np.unique(places, return_inverse=True) for places in (at, by))
         return self._block(seen, pushed)[of, j, to[:, None], i[:, None]]
 
     def diagonal(self) -> Array:
@@ -336,8 +336,8 @@ class Compliance:
             return self.on_grid.diagonal()
         if self._keeps:
             return self._columns.diagonal().copy()
-        own = self.interface.diagonal()[:, : self.components]
-        return np.einsum("iac,ica->ai", own, self._force).ravel()
+        diagonal = self.interface.diagonal()[:, : self.components]
+        return np.einsum("iac,ica->ai", diagonal, self._force).ravel()
 
     def matrix(self) -> Array:
         """Return the compliance as one matrix."""

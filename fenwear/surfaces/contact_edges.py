@@ -52,18 +52,18 @@ class Edges:
         if key not in self._known:
             if len(self._known) == KEPT:
                 self._known.clear()
-            self._known[key] = self._found(touching)
+            self._known[key] = self._distances(touching)
         return self._known[key]
 
-    def _found(self, touching: Mask) -> Array:
-        found = np.where(touching, np.minimum(self._to_rim, self._most), 0.0)
+    def _distances(self, touching: Mask) -> Array:
+        distances = np.where(touching, np.minimum(self._to_rim, self._most), 0.0)
         if touching.all() or not touching.any():
-            return found
+            return distances
         inside, outside = self._x[touching], self._x[~touching]
         beside, _ = cKDTree(inside).query(outside)
         far, nearest = cKDTree(outside).query(inside)
-        found[touching] = np.minimum(found[touching], far - beside[nearest] / 2)
-        return found
+        distances[touching] = np.minimum(distances[touching], far - beside[nearest] / 2)
+        return distances
 
 
 def rim_points(surface: ContactSurface, planes: Sequence[tuple[int, float]] = ()) -> Array:
@@ -80,13 +80,15 @@ def rim_points(surface: ContactSurface, planes: Sequence[tuple[int, float]] = ()
     if surface.dim == 2:
         ends, count = np.unique(surface.facets[:, :2], return_counts=True)
         rim = ends[count == 1]
-        return surface.trace[rim[~np.any([one[rim] for one in mirrored], axis=0)] if mirrored else rim]
+        return surface.trace[
+            rim[~np.any([mirrored_nodes[rim] for mirrored_nodes in mirrored], axis=0)] if mirrored else rim
+        ]
     corners = surface.facets[:, : 3 if surface.cell == "triangle" else 4]
     order = [0, 1, 2] if surface.cell == "triangle" else [0, 1, 3, 2]  # around it: the element numbers them by rows
     around = corners[:, order]
     edges = np.sort(np.stack([around, np.roll(around, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     edges = edges[count == 1]
-    for one in mirrored:
-        edges = edges[~one[edges].all(axis=1)]
+    for on_plane in mirrored:
+        edges = edges[~on_plane[edges].all(axis=1)]
     return surface.trace[np.unique(edges)]

@@ -67,7 +67,7 @@ class RigidEquilibrium:
     @property
     def carried(self) -> float:
         """The load that the contact carries, N or N/mm; of bodies that turn about hinges moments over arms."""
-        forces = [float(np.linalg.norm(self.resultant[own])) for own in self.translations]
+        forces = [float(np.linalg.norm(self.resultant[axes])) for axes in self.translations]
         return sum(forces or [abs(float(self.resultant[k])) / self._arm(k) for k in range(len(self.resultant))])
 
     def _arm(self, mode: int) -> float:
@@ -92,12 +92,12 @@ class RigidEquilibrium:
 
         Of each part against the resultant of the loads on it along its translations.
         """
-        found: Array = np.zeros(self.motion.shape[:2])
-        for own in self.translations:
-            force = self.resultant[own]
-            share = -force / np.linalg.norm(force) if force.any() else np.eye(len(own))[0]
-            found += self.motion[:, :, own] @ share
-        return found if self.translations else None
+        directions: Array = np.zeros(self.motion.shape[:2])
+        for axes in self.translations:
+            force = self.resultant[axes]
+            share = -force / np.linalg.norm(force) if force.any() else np.eye(len(axes))[0]
+            directions += self.motion[:, :, axes] @ share
+        return directions if self.translations else None
 
 
 def _seen(patterns: csr_array, motion: Array) -> Array:

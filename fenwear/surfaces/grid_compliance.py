@@ -73,11 +73,11 @@ class GridCompliance:
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
         """Return the columns of some nodes (k, nodes), or some rows of them, of the first component."""
-        found = self.of.entries(rows, nodes)[:, 0, :, 0] * self.weights[nodes]
+        columns = self.of.entries(rows, nodes)[:, 0, :, 0] * self.weights[nodes]
         every = np.arange(len(self.weights))
         i, j = np.equal.outer(every[rows], every[nodes]).nonzero()
-        found[i, j] += self.local[every[rows][i]]
-        return found
+        columns[i, j] += self.local[every[rows][i]]
+        return columns
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the numbers of some rows and columns, of the first component."""
@@ -85,9 +85,9 @@ class GridCompliance:
 
     def diagonal(self) -> Array:
         """Return the diagonal (a n,)."""
-        found = np.einsum("naa->an", self.of.diagonal()) * self.weights
-        found[0] += self.local
-        return np.asarray(found.ravel())
+        diagonal = np.einsum("naa->an", self.of.diagonal()) * self.weights
+        diagonal[0] += self.local
+        return np.asarray(diagonal.ravel())
 
     def matrix(self) -> Array:
         """Return the compliance of the first component as one matrix (n, n)."""
@@ -118,16 +118,16 @@ class Box:
 
         No narrower than products on it cost as much.
         """
-        whole = np.array(shape, dtype=np.int64)
+        sizes = np.array(shape, dtype=np.int64)
         first, wide = places[touched].min(axis=0), np.ptp(places[touched], axis=0) + 1
-        counts = np.minimum([_padded(int(count)) for count in wide], whole)
-        low = np.clip(first - (counts - wide) // 2, 0, whole - counts)
+        counts = np.minimum([_padded(int(count)) for count in wide], sizes)
+        low = np.clip(first - (counts - wide) // 2, 0, sizes - counts)
         nodes = np.flatnonzero(((places >= low) & (places < low + counts)).all(axis=1))
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
-        numbers = np.ravel_multi_index(tuple(places.T), tuple(whole))
-        full = len(places) == np.prod(whole) and np.array_equal(numbers, np.arange(len(places)))
-        corner, sides = (tuple(int(one) for one in each) for each in (low, counts))
-        return cls(corner, sides, nodes, at, tuple(int(one) for one in shape) if full else ())
+        numbers = np.ravel_multi_index(tuple(places.T), tuple(sizes))
+        full = len(places) == np.prod(sizes) and np.array_equal(numbers, np.arange(len(places)))
+        corner, sides = (tuple(int(coordinate) for coordinate in each) for each in (low, counts))
+        return cls(corner, sides, nodes, at, tuple(int(side) for side in shape) if full else ())
 
     @property
     def size(self) -> int:
@@ -147,9 +147,9 @@ class Box:
         if self.within:
             cut = (slice(low, low + count) for low, count in zip(self.low, self.counts, strict=True))
             return values.reshape(-1, *self.within)[:, *cut].copy()
-        found = np.zeros((len(values), self.size), dtype=values.dtype)
-        found[:, self.at] = values[:, self.nodes]
-        return found.reshape(-1, *self.counts)
+        in_box = np.zeros((len(values), self.size), dtype=values.dtype)
+        in_box[:, self.at] = values[:, self.nodes]
+        return in_box.reshape(-1, *self.counts)
 
     def values(self, boxed: Array) -> Array:
         """Return the values of a box (m, ...) at its nodes (m, k)."""
@@ -176,7 +176,7 @@ class Boxes(Generic[T]):
         self._last: list[tuple[Box, T]] = []
 
     @cached_property
-    def whole(self) -> T:
+    def of_all(self) -> T:
         """That of all nodes."""
         return self._make(Box.around(self.places, self._shape))
 
@@ -200,23 +200,32 @@ class OnBox:
     """
 
     def __init__(self, of: Sequence[GridCompliance], box: Box) -> None:
-        parts = [one.of.on_box(box.low, box.counts, box.nodes) for one in of]
+        parts = [compliance.of.on_box(box.low, box.counts, box.nodes) for compliance in of]
         self.box, self.size, self.of = box, parts[0].size, parts
         self.largest = float(of[0].weights.max())
-        self._weights, self.local = box.spread(of[0].weights[None])[0], box.spread(np.array([one.local for one in of]))
-        tables = {id(one.of.table): part for one, part in zip(of, parts, strict=True)}
+        self._weights, self.local = (
+            box.spread(of[0].weights[None])[0],
+            box.spread(np.array([compliance.local for compliance in of])),
+        )
+        tables = {id(compliance.of.table): part for compliance, part in zip(of, parts, strict=True)}
         self._kernels = [
-            (np.array([k for k, one in enumerate(of) if id(one.of.table) == key]), kernel(part.table, part.size))
+            (
+                np.array([k for k, compliance in enumerate(of) if id(compliance.of.table) == key]),
+                kernel(part.table, part.size),
+            )
             for key, part in tables.items()
         ]
-        self._smooth = [_Smooth([one.smooth[k] for one in parts]) for k in range(min(len(one.smooth) for one in parts))]
+        self._smooth = [
+            _Smooth([compliance.smooth[k] for compliance in parts])
+            for k in range(min(len(compliance.smooth) for compliance in parts))
+        ]
 
     def apply(self, x: Array) -> Array:
         """Return the displacements (m, a, ...) of tractions (m, b, ...) of each compliance, in the box."""
         force = x * self._weights
         displacements = np.empty((len(x), len(self.of[0].table), *self.box.counts))
-        for own, waves in self._kernels:
-            displacements[own] = convolved([(waves, force[own])], displacements.shape[1], self.size)
+        for numbers, waves in self._kernels:
+            displacements[numbers] = convolved([(waves, force[numbers])], displacements.shape[1], self.size)
         for smooth in self._smooth:
             smooth.add(force, displacements)
         displacements[:, 0] += self.local * x[:, 0]
@@ -228,7 +237,9 @@ class _Smooth:
 
     def __init__(self, parts: Sequence[Smooth]) -> None:
         m = len(parts)
-        factors = [np.array(own) for own in zip(*(weights.factors for weights, _ in parts), strict=True)]
+        factors = [
+            np.array(factor_parts) for factor_parts in zip(*(weights.factors for weights, _ in parts), strict=True)
+        ]
         self._first, self._second = (*factors, np.ones((m, 1, 1)))[:2]  # of each axis (m, 1, k, c)
         self._first, self._second = self._first[:, None], self._second[:, None]
         between = np.array([response for _, response in parts]).transpose(0, 2, 1, 4, 3)
@@ -275,12 +286,12 @@ class FrameBox(OnBox):
     @cached_property
     def _inverses(self) -> list[Kernel]:
         """The waves of the inverse, and of those with the additional compliance of each of `STIFF`."""
-        found = []
+        inverses = []
         for stiff in (0.0, *STIFF):
             symbol, tangents = self._endless[1].copy(), range(1, self.d)
             symbol[..., tangents, tangents] += stiff * self._own
-            found.append(by_components(np.moveaxis(np.linalg.inv(symbol), (-2, -1), (0, 1))))
-        return found
+            inverses.append(by_components(np.moveaxis(np.linalg.inv(symbol), (-2, -1), (0, 1))))
+        return inverses
 
     def solve(self, fields: Array, stiff: Array) -> Array:
         """Return the tractions (d, ...) of displacements on an endless grid.
@@ -311,21 +322,22 @@ def on_one_grid(
     operators = [body.convolution for body in bodies if isinstance(body, GridOperator)]
     if len(operators) < len(bodies) or not len(weights) or not (_even(axes) and _even(traction)):
         return None
-    if any(not np.array_equal(operators[0].places, one.places) for one in operators[1:]):
+    if any(not np.array_equal(operators[0].places, operator.places) for operator in operators[1:]):
         return None
     along, force = axes[0], traction[0]
-    bare = len(along) == 1 and all(len(one.table) == 1 for one in operators)  # e_n is all that they are asked for along
+    # e_n is all that they are asked for along
+    bare = len(along) == 1 and all(len(operator.table) == 1 for operator in operators)
     seen = np.ones((1, 1)) if bare else along
-    if any(len(one.table) != seen.shape[1] for one in operators):
+    if any(len(operator.table) != seen.shape[1] for operator in operators):
         return None
     key = force.tobytes()
     if key not in known:
-        whole = np.sum([one.table for one in operators], axis=0)
-        known[key] = np.ascontiguousarray(np.tensordot(seen, np.tensordot(force.T, whole, (1, 1)), (1, 1)))
+        summed = np.sum([operator.table for operator in operators], axis=0)
+        known[key] = np.ascontiguousarray(np.tensordot(seen, np.tensordot(force.T, summed, (1, 1)), (1, 1)))
     smooth = [
         (points, np.einsum("ac,kcle,eb->kalb", seen, response, force, optimize=True))
-        for one in operators
-        for points, response in one.smooth
+        for operator in operators
+        for points, response in operator.smooth
     ]
     return GridCompliance(Convolution(operators[0].places, known[key], smooth), weights, local)
 

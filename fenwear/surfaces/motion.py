@@ -162,11 +162,11 @@ class Motion:
     @property
     def durations(self) -> list[float]:
         """Of the phases, s; those that differ by rounding alone are the same to the last digit."""
-        found: list[float] = []
+        durations: list[float] = []
         for phase in self.phases:
-            alike = (one for one in found if abs(one - phase.duration) < 1e-9 * phase.duration)
-            found.append(next(alike, phase.duration))
-        return found
+            alike = (duration for duration in durations if abs(duration - phase.duration) < 1e-9 * phase.duration)
+            durations.append(next(alike, phase.duration))
+        return durations
 
     @property
     def reach(self) -> float:
@@ -180,10 +180,10 @@ class Motion:
         Either of both ways, the one along the first axis on which it goes.
         """
         fields = [phase.field for phase in self.phases if phase.field is not None]
-        if any(any(one.turn) for one in fields):
-            farthest = max(fields, key=lambda one: float(np.linalg.norm(one.turn)))
+        if any(any(field.turn) for field in fields):
+            farthest = max(fields, key=lambda field: float(np.linalg.norm(field.turn)))
             return SlidingField(turn=_unit(farthest.turn), centre=farthest.centre)
-        shift = max((one.shift for one in fields), key=lambda shift: float(np.linalg.norm(shift)))
+        shift = max((field.shift for field in fields), key=lambda shift: float(np.linalg.norm(shift)))
         return SlidingField(shift=_unit(shift)) if any(shift) else ALONG_X  # where nothing moves: any
 
     @property
@@ -217,16 +217,16 @@ class Motion:
         inner = [a + share * (b - a) for a, b in itertools.pairwise(self._ends) for share in shares]
         return [float(time) for time in (*inner, self._ends[-1])]
 
-    def as_one(self, field: SlidingField) -> Motion:
+    def as_single_phase(self, field: SlidingField) -> Motion:
         """Return a measured table as one phase, in which all of it is slid: of laws that follow its steps themselves.
 
         Args:
             field: Of the phase, for a millimetre of it.
         """
-        whole = Phase(1, 0.0, self.period, sum(phase.distance for phase in self.phases), 0.5, field)
-        speed = (whole.speed,)
+        phase_of_all = Phase(1, 0.0, self.period, sum(phase.distance for phase in self.phases), 0.5, field)
+        speed = (phase_of_all.speed,)
         ends = (0.0, self.period)
-        return Motion((whole,), 1, 1, (_PiecewiseLinear(ends, speed, speed),), (0.0,), ends)
+        return Motion((phase_of_all,), 1, 1, (_PiecewiseLinear(ends, speed, speed),), (0.0,), ends)
 
     @property
     def steps(self) -> bool:
@@ -306,7 +306,7 @@ class Motion:
             steps: Of each phase.
         """
         if self.steps:
-            return [[one.undirected for one in phase.way.parts(steps)] if phase.way else [] for phase in self.phases]
+            return [[way.undirected for way in phase.way.parts(steps)] if phase.way else [] for phase in self.phases]
         return [
             [Slide(field, *sorted((float(a), float(b)))) for a, b in itertools.pairwise(row)]
             for row in self.offsets(steps)

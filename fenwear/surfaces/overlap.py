@@ -165,10 +165,10 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     ring1, ring2 = corners1[:, RING[first.cell]], corners2[:, RING[second.cell]]
     facet1, facet2, simplices = _intersect(ring1, ring2)
     flat = corners1.shape[2]
-    own, other = (surface.degree * (2 if surface.cell == "quadrilateral" else 1) for surface in (first, second))
+    degree, other = (surface.degree * (2 if surface.cell == "quadrilateral" else 1) for surface in (first, second))
     shape = basix.CellType.interval if flat == 1 else basix.CellType.triangle
-    more = BENT if first.bent or second.bent else 0
-    points, gauss = basix.make_quadrature(shape, own + max(own, other) + more)
+    extra = BENT if first.bent or second.bent else 0
+    points, gauss = basix.make_quadrature(shape, degree + max(degree, other) + extra)
     edges = simplices[:, 1:] - simplices[:, :1]
     s = (simplices[:, :1] + points @ edges).reshape(-1, flat)
     weights = (np.abs(np.linalg.det(edges))[:, None] * gauss).ravel()
@@ -242,19 +242,19 @@ def reading_at(surface: ChartedSurface, points: Array) -> csr_array | None:
     ring, grain = surface.corners[:, RING[surface.cell]], SLACK * surface.extent
     around = points[:, None] + grain * np.array([-1.0, 1.0])[:, None]
     point, facet = _boxes_that_meet(around, ring)
-    found = _pull_back(surface.cell, surface.corners, facet, points[point])
-    beyond = np.maximum(found - 1, -found).max(axis=1)
+    local = _pull_back(surface.cell, surface.corners, facet, points[point])
+    beyond = np.maximum(local - 1, -local).max(axis=1)
     if surface.cell == "triangle":
-        beyond = np.maximum(beyond, found.sum(axis=1) - 1)
+        beyond = np.maximum(beyond, local.sum(axis=1) - 1)
     order = np.lexsort((facet, beyond.round(9), point))
     first = order[np.unique(point[order], return_index=True)[1]]
     if len(first) < len(points) or beyond[first].max(initial=0.0) > ONTO:
         return None
-    own = facet[first]
-    values = surface.shape_functions(_pull_back_curved(surface, own, points))
+    facets = facet[first]
+    values = surface.shape_functions(_pull_back_curved(surface, facets, points))
     rows = np.broadcast_to(np.arange(len(points))[:, None], values.shape)
     shape = (len(points), len(surface.s))
-    return csr_array((values.ravel(), (rows.ravel(), surface.facets[own].ravel())), shape=shape)
+    return csr_array((values.ravel(), (rows.ravel(), surface.facets[facets].ravel())), shape=shape)
 
 
 def tabulate(cell: str, degree: int, points: Array) -> Array:
@@ -361,14 +361,16 @@ def _intersect(first: Array, second: Array) -> tuple[Indices, Indices, Array]:
         The polygons that meet in each simplex, of the first set and of the second (t,), and its vertices (t, d, d - 1).
     """
     size1, size2 = _sizes(first), _sizes(second)
-    one = np.where(size1[:, None, None] < 0, first[:, ::-1], first)  # ascending, anticlockwise
-    two = np.where(size2[:, None, None] < 0, second[:, ::-1], second)
-    i, j = _boxes_that_meet(one, two)
+    polygons1 = np.where(size1[:, None, None] < 0, first[:, ::-1], first)  # ascending, anticlockwise
+    polygons2 = np.where(size2[:, None, None] < 0, second[:, ::-1], second)
+    i, j = _boxes_that_meet(polygons1, polygons2)
     if first.shape[2] == 1:
-        simplices = np.stack([np.maximum(one[i, 0], two[j, 0]), np.minimum(one[i, 1], two[j, 1])], axis=1)
+        simplices = np.stack(
+            [np.maximum(polygons1[i, 0], polygons2[j, 0]), np.minimum(polygons1[i, 1], polygons2[j, 1])], axis=1
+        )
         kept = simplices[:, 1, 0] - simplices[:, 0, 0] > NOTHING * np.minimum(abs(size1[i]), abs(size2[j]))
         return i[kept], j[kept], simplices[kept]
-    pair, polygons = _clip(one[i], two[j])
+    pair, polygons = _clip(polygons1[i], polygons2[j])
     i, j = i[pair], j[pair]
     fan = np.arange(1, polygons.shape[1] - 1)
     simplices = polygons[:, np.stack([np.zeros_like(fan), fan, fan + 1], axis=1)]
@@ -382,7 +384,7 @@ def _boxes_that_meet(first: Array, second: Array) -> tuple[Indices, Indices]:
     reach = ((high1 - low1).max(initial=0.0) + (high2 - low2).max(axis=1)) / 2
     near = cKDTree((low1 + high1) / 2).query_ball_point((low2 + high2) / 2, reach, p=np.inf, return_sorted=True)
     i = np.concatenate([np.zeros(0, dtype=np.int64), *near]).astype(np.int64)
-    j = np.repeat(np.arange(len(near)), [len(one) for one in near])
+    j = np.repeat(np.arange(len(near)), [len(row) for row in near])
     meet = ((low1[i] < high2[j]) & (low2[j] < high1[i])).all(axis=1)
     return i[meet], j[meet]
 

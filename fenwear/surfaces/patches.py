@@ -56,8 +56,8 @@ class Side:
 
     def charted(self, s: Array, part: NDArray[np.bool_]) -> ChartedSurface:
         """Return some of the facets, whose trace nodes a chart has at s (N, d - 1), mm."""
-        own = self.surface
-        return ChartedSurface(s, own.facets[part], own.cell, own.degree, own.nodes)
+        surface = self.surface
+        return ChartedSurface(s, surface.facets[part], surface.cell, surface.degree, surface.nodes)
 
 
 # The patches of a contact, the punch's surface first in each; None where the chart does not fit the surfaces.
@@ -66,21 +66,21 @@ Chart = Callable[[Side, Side], list[Patch] | None]
 
 def patches(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> list[Patch]:
     """Return the patches of a contact with the strip in its place, by the first of `CHARTS` that fits."""
-    own = Side(punch, punch.trace, facet_normals(punch))
+    punch_side = Side(punch, punch.trace, facet_normals(punch))
     other = Side(strip, placement.points(strip.trace), placement.vectors(facet_normals(strip)))
-    found = (chart(own, other) for chart in CHARTS)
-    return next(parts for parts in found if parts is not None)
+    of_charts = (chart(punch_side, other) for chart in CHARTS)
+    return next(parts for parts in of_charts if parts is not None)
 
 
-def _along_axes(own: Side, other: Side) -> list[Patch]:
+def _along_axes(punch_side: Side, other: Side) -> list[Patch]:
     """Return the parts of a contact that look along each axis to each side, as graphs over the plane across it."""
     parts = []
-    for axis, side, part in _sides(own.normal):
+    for axis, side, part in _sides(punch_side.normal):
         seen = other.normal[:, axis] * side <= -SEEN
         if not seen.any() or (part.all() and (other.normal[:, axis] * side < 0).all()):
             seen[:] = True
-        first, second = (np.delete(one.trace, axis, axis=1) for one in (own, other))
-        parts.append(Patch.of(own.charted(first, part), other.charted(second, seen)))
+        first, second = (np.delete(side.trace, axis, axis=1) for side in (punch_side, other))
+        parts.append(Patch.of(punch_side.charted(first, part), other.charted(second, seen)))
     return parts
 
 
@@ -177,19 +177,19 @@ def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
     return _Middle(round_ @ middle, round_.T, axes[:, ~turns].T, float(np.median(radius)))
 
 
-def _from_middle(own: Side, other: Side) -> list[Patch] | None:
+def _from_middle(punch_side: Side, other: Side) -> list[Patch] | None:
     """Return the parts of round surfaces as seen from their middle; None of a graph, or where there is no middle.
 
     Raises:
         CaseError: a part of the first has nothing of the second opposite.
     """
-    middle = None if _is_graph(own.normal) else _middle(own.surface, own.normal)
+    middle = None if _is_graph(punch_side.normal) else _middle(punch_side.surface, punch_side.normal)
     if middle is None:
         return None
-    ways, opposite = (middle.ways(side.middles) for side in (own, other))
+    ways, opposite = (middle.ways(side.middles) for side in (punch_side, other))
     outwards, facing = (
         np.sign(np.einsum("fc,fc->f", way, side.normal @ middle.across.T))
-        for way, side in ((ways, own), (opposite, other))
+        for way, side in ((ways, punch_side), (opposite, other))
     )
     parts = []
     for axis, side, part in _sides(ways):
@@ -198,10 +198,13 @@ def _from_middle(own: Side, other: Side) -> list[Patch] | None:
             if not seen.any():
                 raise CaseError(InputError("geometry", NOWHERE))
             views = []
-            for one, facets in ((own, part & (outwards == out)), (other, seen)):
-                s, used = np.zeros((len(one.trace), one.surface.dim - 1)), np.unique(one.surface.facets[facets])
-                s[used] = middle.chart(one.trace[used], axis)
-                views.append(one.charted(s, facets))
+            for body_side, facets in ((punch_side, part & (outwards == out)), (other, seen)):
+                s, used = (
+                    np.zeros((len(body_side.trace), body_side.surface.dim - 1)),
+                    np.unique(body_side.surface.facets[facets]),
+                )
+                s[used] = middle.chart(body_side.trace[used], axis)
+                views.append(body_side.charted(s, facets))
             parts.append(Patch.of(*views))
     return parts
 

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.round_surfaces import Round
+from fenwear.bodies.shapes import Round
 from fenwear.common.arrays import Array
 from fenwear.surfaces.common_normal import unit
 from fenwear.surfaces.overlap import Patch
@@ -56,9 +56,9 @@ def round_shape(
         placement: Of the strip.
         transfer, material: As of `pair.ContactPair`: what takes the strip's trace and its pressure nodes to the punch.
     """
-    own, other = punch.made or punch, strip.made or strip
+    surface, other = punch.made or punch, strip.made or strip
     none: Array = np.zeros_like(punch.x)
-    of_strip = [_placed(one, placement) for one in strip.rounds[0]]
+    of_strip = [_placed(shape, placement) for shape in strip.rounds[0]]
     if not of_strip:
         return RoundShape(none, none)
     opposite = _opposite(parts, len(punch.weights), strip)
@@ -70,38 +70,40 @@ def round_shape(
     for part in parts:
         first, second, common = part.first, part.second, part.common
         nodes = first.facets[common.facet1]
-        x = np.einsum("qk,qkc->qc", first.shape_functions(common.points1), own.trace[nodes])
-        for k, one in enumerate(of_punch):
+        x = np.einsum("qk,qkc->qc", first.shape_functions(common.points1), surface.trace[nodes])
+        for k, shape in enumerate(of_punch):
             there = on_punch[nodes[:, 0]] == k
-            x[there] = one.onto(x[there])
+            x[there] = shape.onto(x[there])
         gap: Array = np.zeros(len(x))
         below = strip.rounds[1][second.facets[common.facet2][:, 0]]
-        for k, one in enumerate(of_strip):
+        for k, shape in enumerate(of_strip):
             there = below == k
-            gap[there] = one.sign * (np.linalg.norm(one.ways(x[there]), axis=1) - one.radius)
+            gap[there] = shape.sign * (np.linalg.norm(shape.ways(x[there]), axis=1) - shape.radius)
         gaps.append(gap)
-    means, normal = dual_means(parts, gaps), np.ones_like(own.x)
-    for k, one in enumerate(of_strip):
-        normal[opposite == k] = one.sign * unit(one.ways(own.x[opposite == k]))
+    means, normal = dual_means(parts, gaps), np.ones_like(surface.x)
+    for k, shape in enumerate(of_strip):
+        normal[opposite == k] = shape.sign * unit(shape.ways(surface.x[opposite == k]))
     of_facets = unit(material @ placement.vectors(other.outward))
-    apart = own.spread.T @ own.trace - transfer @ placement.points(other.trace)
+    apart = surface.spread.T @ surface.trace - transfer @ placement.points(other.trace)
     missing = means - np.einsum("ic,ic->i", normal, apart)
     return RoundShape(
         np.where(round_[:, None], normal - of_facets, none), np.where(round_[:, None], missing[:, None] * normal, none)
     )
 
 
-def _placed(one: Round, placement: Placement) -> Round:
-    """Return a circle where its body is."""
-    return Round(placement.points(one.middle[None])[0], placement.vectors(one.axis[None])[0], one.radius, one.sign)
+def _placed(shape: Round, placement: Placement) -> Round:
+    """Return a round surface where its body is."""
+    return Round(
+        placement.points(shape.middle[None])[0], placement.vectors(shape.axis[None])[0], shape.radius, shape.sign
+    )
 
 
 def _opposite(parts: Sequence[Patch], count: int, strip: ContactSurface) -> Array:
     """Return the number of the strip's round surface opposite each of the punch's nodes (n,), -1 for none."""
     most = len(strip.rounds[0])
-    found = np.full(count, most)
+    lowest = np.full(count, most)
     for part in parts:
         common, nodes = part.common, part.first.pressure_facets[part.common.facet1]
         below = np.broadcast_to(strip.rounds[1][part.second.facets[common.facet2][:, :1]], nodes.shape)
-        np.minimum.at(found, nodes[nodes >= 0], below[nodes >= 0])
-    return np.where(found == most, -1, found)
+        np.minimum.at(lowest, nodes[nodes >= 0], below[nodes >= 0])
+    return np.where(lowest == most, -1, lowest)

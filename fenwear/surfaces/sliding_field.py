@@ -169,13 +169,13 @@ def node_rates(field: SlidingField, pair: ContactPair, power: float = 1.0) -> Ar
     at_halves = speed[:, None] + spin[:, None, None] * np.cross(normal[:, None], halves)
     size = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
     near = np.linalg.norm(speed, axis=1) < NEAR * size * np.abs(spin)
-    found = np.zeros(len(triangles))
-    found[~near] = (np.linalg.norm(at_halves[~near], axis=2) ** -power).mean(axis=1)
+    mean_powers = np.zeros(len(triangles))
+    mean_powers[~near] = (np.linalg.norm(at_halves[~near], axis=2) ** -power).mean(axis=1)
     still = middle[near] + np.cross(normal[near], speed[near]) / spin[near, None]
     integrals = _integrals(triangles[near] - still[:, None], normal[near], power)
-    found[near] = integrals / (twice[near] / 2) * np.abs(spin[near]) ** -power
+    mean_powers[near] = integrals / (twice[near] / 2) * np.abs(spin[near]) ** -power
     count = len(rates)
-    means = np.bincount(node, twice * found, count) / np.bincount(node, twice, count)
+    means = np.bincount(node, twice * mean_powers, count) / np.bincount(node, twice, count)
     return np.asarray(means ** (-1 / power))
 
 
@@ -188,7 +188,7 @@ def _integrals(triangles: Array, normal: Array, power: float) -> Array:
     twice = np.einsum("md,med->me", normal, np.cross(triangles, after))  # areas with sign
     away = np.maximum(np.abs(twice) / length, 1e-12 * length)
     # Along the edge by s = d sinh(u): what is integrated is smooth, and constant for m = 1.
-    begin, end = (np.arcsinh(np.einsum("med,med->me", one, along) / away) for one in (triangles, after))
+    begin, end = (np.arcsinh(np.einsum("med,med->me", corners, along) / away) for corners in (triangles, after))
     u = (begin + end)[:, :, None] / 2 + (end - begin)[:, :, None] / 2 * POINTS
     on_edge = ((away[:, :, None] * np.cosh(u)) ** (1 - power) @ SHARES) * (end - begin) / 2
     return np.asarray((twice / (2 - power) * on_edge / length).sum(axis=1))

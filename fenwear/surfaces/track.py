@@ -89,7 +89,7 @@ class Border:
     def _of(cls, share: Array, strip: ContactSurface) -> Border:
         inward, swept, part = np.arange(len(share)), share > THIN, strip.part
         for k in range(part.max() + 1):
-            inside, beyond = (np.flatnonzero((part == k) & one) for one in (swept, ~swept))
+            inside, beyond = (np.flatnonzero((part == k) & mask) for mask in (swept, ~swept))
             if len(inside) and len(beyond):
                 inward[beyond] = inside[cKDTree(strip.x[inside]).query(strip.x[beyond])[1]]
         return cls(np.where(swept, share, 1.0), inward)
@@ -132,20 +132,20 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
         field: The motion of the strip for a unit of the stroke.
         track: Closure of the track: its length, mm, or 2 pi rad.
     """
-    length, found = track * field.rate(pair.strip.x, pair.strip.outward), csr_array(pair.wear_projection.shape)
+    length, projection = track * field.rate(pair.strip.x, pair.strip.outward), csr_array(pair.wear_projection.shape)
     spread = _along_one if pair.punch.dim == 2 else _along_rings
     for on_strip, on_punch in _facing(pair, field):
-        found = csr_array(found + spread(pair, field, length, on_strip, on_punch))
-    return replace(pair, wear_projection=found)
+        projection = csr_array(projection + spread(pair, field, length, on_strip, on_punch))
+    return replace(pair, wear_projection=projection)
 
 
 def _facing(pair: ContactPair, field: SlidingField) -> Iterator[tuple[Mask, Mask]]:
     """Return the nodes of the strip on each of its tracks, and the punch's nodes opposite."""
-    own = _tracks(pair.strip, field)
-    tracks = range(own.max() + 1)
-    opposite = np.array([pair.wear_projection[own == k].sum(axis=0) for k in tracks]).argmax(axis=0)
+    numbers = _tracks(pair.strip, field)
+    tracks = range(numbers.max() + 1)
+    opposite = np.array([pair.wear_projection[numbers == k].sum(axis=0) for k in tracks]).argmax(axis=0)
     for k in tracks:
-        yield own == k, opposite == k
+        yield numbers == k, opposite == k
 
 
 def _tracks(strip: ContactSurface, field: SlidingField) -> Indices:
@@ -266,9 +266,9 @@ class _Crossing:
         s[:, [0, 2]] += THIN * np.ptp(s) * np.array([-1, 1])  # none lies on one ring's edge as a whole
         return cls(s, area / np.bincount(node, area, nodes)[node], node, nodes)
 
-    def of_nodes(self, own: Mask) -> _Crossing:
+    def of_nodes(self, nodes: Mask) -> _Crossing:
         """Return the areas of some of the nodes (n,) alone, the others having none."""
-        chosen = own[self.node]
+        chosen = nodes[self.node]
         return _Crossing(self.s[chosen], self.size[chosen], self.node[chosen], self.nodes)
 
     @property

@@ -52,11 +52,11 @@ def dual_means(patches: Sequence[Patch], values: Sequence[Array]) -> Array:
     """
     count = len(patches[0].first.nodes)
     sums = np.zeros((2, count))
-    for patch, own in zip(patches, values, strict=True):
+    for patch, patch_values in zip(patches, values, strict=True):
         duals = _duals(patch)
         if duals is None:
             continue
-        at = own[duals.used].reshape(len(duals.number), -1)
+        at = patch_values[duals.used].reshape(len(duals.number), -1)
         integrals = np.einsum("tpk,tp->tk", duals.weighted, at), duals.weighted.sum(axis=1)
         nodes = patch.first.pressure_facets[duals.facet1]
         for total, part in zip(sums, integrals, strict=True):
@@ -92,12 +92,12 @@ def _duals(patch: Patch) -> _Duals | None:
     if len(facet1) == 0:
         return None
     points = (len(facet1), common.per_simplex)
-    own = first.pressure_functions(common.points1[used]).reshape(*points, -1)
-    weighted = own * common.weights[used].reshape(*points, 1)
+    basis = first.pressure_functions(common.points1[used]).reshape(*points, -1)
+    weighted = basis * common.weights[used].reshape(*points, 1)
     number = np.unique(facet1, return_inverse=True)[1]
     sums = csr_array((np.ones(len(number)), (number, np.arange(len(number)))))
-    functions = own.shape[2]
-    mass = (sums @ (weighted.swapaxes(1, 2) @ own).reshape(len(number), -1)).reshape(-1, functions, functions)
+    functions = basis.shape[2]
+    mass = (sums @ (weighted.swapaxes(1, 2) @ basis).reshape(len(number), -1)).reshape(-1, functions, functions)
     weights = sums @ weighted.sum(axis=1)
     dual = np.linalg.solve(mass, weights[:, :, None] * np.eye(functions))
     return _Duals(used, facet1, facet2, number, weighted, dual)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fenwear import ConvergenceError, Tribosystem, jump, march, steady
-from fenwear.algebra.submatrices import Blocks, Dense, Updating, joined, whole
+from fenwear.algebra.submatrices import Blocks, Dense, Updating, dense_matrix, joined
 from fenwear.common.arrays import Array
 from fenwear.contact.inequality import Inequality
 
@@ -237,7 +237,7 @@ def test_wear_that_opens_all_phases(m: int, restarts: int, monkeypatch: pytest.M
     blocks, pattern = Blocks(matrices, n), random.uniform(0.8, 1.2, (m, n))
     for length in (1e-4, 1e-2, 1.3e-2, 1.0, 0.7, 100.0):
         border = np.array([np.eye(n)] * m), np.array([np.diag(length * own) for own in pattern])
-        exact = whole(matrices, None, border, None)
+        exact = dense_matrix(matrices, None, border, None)
         operator, x = joined(blocks, local=length * pattern), random.uniform(-1, 1, m * (n + 2))
         np.testing.assert_allclose(operator.multiply(x), exact @ x, atol=1e-12 * max(1.0, length))
         free = random.uniform(size=(m, n + 2)) < 0.7

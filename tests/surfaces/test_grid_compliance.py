@@ -39,7 +39,7 @@ def on_grid() -> GridCompliance:
 def test_the_inverse_on_an_endless_grid_is_near_that_of_a_patch(on_grid: GridCompliance, level: int) -> None:
     """It brings modes of a patch to near themselves, but for few at the rim; with tangents that give way, too."""
     n, d = SIDE**2, 3
-    on = on_grid.boxes.whole
+    on = on_grid.boxes.of_all
     matrix = np.array([on_grid.apply(one) for one in np.eye(d * n)]).T
     np.testing.assert_allclose(matrix.diagonal(), on_grid.diagonal(), rtol=1e-12)
     if level:

@@ -24,7 +24,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fenwear.algebra.submatrices import whole
+from fenwear.algebra.submatrices import dense_matrix
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.common.arrays import Array
 from fenwear.common.parallel import lasting
@@ -257,7 +257,7 @@ class FullContact:
             border = wearing.border(pressure) if local is None else None
             if layer is not None:
                 blocks[:, np.arange(n), np.arange(n)] = layer
-        return whole(blocks, self._coupling, border, local)
+        return dense_matrix(blocks, self._coupling, border, local)
 
     def solve(
         self,

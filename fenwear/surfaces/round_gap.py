@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.shapes import Round
+from fenwear.bodies.round_surfaces import Round
 from fenwear.common.arrays import Array
 from fenwear.surfaces.common_normal import unit
 from fenwear.surfaces.overlap import Patch

@@ -76,11 +76,12 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     """Return the tables of a case, laid over those of the case it names as its base, and its folder."""
     path = Path(source)
     if path.suffix != ".toml" and not path.exists():
-        if source not in builtin_cases():
+        file = resources.files("fenwear") / "cases" / f"{source}.toml"
+        if not file.is_file():
             known = ", ".join(builtin_cases())
             hint = did_you_mean(source, builtin_cases())
             raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known}){hint}"))
-        text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
+        text, folder = file.read_text("utf-8"), None
     else:
         text, folder = _read_text(path), path.parent
     try:

@@ -7,7 +7,6 @@ output, or by a port of the loopback device.
 
 from __future__ import annotations
 
-import asyncio
 import json
 import sys
 from collections.abc import Awaitable, Callable, Sequence
@@ -133,6 +132,8 @@ async def _called(arguments: Sequence[str]) -> str:
     Raises:
         ValueError: it failed; says what it says, errors by key.
     """
+    import asyncio  # which no other command needs
+
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "fenwear", *arguments, stdin=asyncio.subprocess.DEVNULL,
         stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,

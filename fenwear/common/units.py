@@ -24,6 +24,7 @@ _NUMBER_AND_UNIT = re.compile(
 )
 _EXPONENT = re.compile(r"([A-Za-zµ])(-?\d)(?!\d)")  # of units as in history.nc: mm3, mm s-1
 POWERS = {"": 0, "µ": -6, "u": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}  # of ten, of the usual prefixes
+ALIKE = {"mm^3/(N*mm)": "1/MPa", "mm^3/(N*m)": "1/GPa", "mm^3/(N m)": "1/GPa"}  # specific wear rates
 _METRIC = re.compile(f"(1/)?({'|'.join(filter(None, POWERS))}|)(m|g|s|N|Pa|J|W|K)(\\^-1)?")
 _HARMLESS_UNIT = re.compile(r"[A-Za-zÅµ°\d\s*/().^-]{1,64}")
 _SIGNS = str.maketrans({"º": "°", "˚": "°", "−": "-", "–": "-", "·": "*", "⋅": "*", "∙": "*", "•": "*", "μ": "µ"})
@@ -203,6 +204,7 @@ def _power_of_ten(given: str, unit: str) -> int | None:
 
     Most case files need no more, and to load pint takes a fifth of a second.
     """
+    given, unit = ALIKE.get(given, given), ALIKE.get(unit, unit)
     if given == unit:
         return 0
     first, other = _METRIC.fullmatch(given), _METRIC.fullmatch(unit)

@@ -215,6 +215,7 @@ class CycleHeat:
         self.gap_rows = [exchange.gap_change(every, phase) for phase in range(len(exchange.plans))]
         self._gap_constants = [exchange.gap(none, phase) for phase in range(len(exchange.plans))]
         self._cycles: dict[bytes, Cycle] = {}
+        self._phases: dict[tuple[int, bytes], PhaseMap] = {}
 
     def initial(self) -> Array:
         """Return the initial state (dim,)."""
@@ -233,6 +234,7 @@ class CycleHeat:
             each = 8 * dim * ((2 * m + 1) * dim + steps * (dim + n))
             if len(self._cycles) > min(KEPT, MEMORY // each):
                 self._cycles.clear()
+                self._phases.clear()
             self._cycles[key] = Cycle([self._phase_map(phase, conductances[phase]) for phase in range(m)])
         return self._cycles[key]
 
@@ -247,7 +249,10 @@ class CycleHeat:
         return [state, *self.cycle(conductances).states(state, pressure)]
 
     def _phase_map(self, phase: int, conductance: Array) -> PhaseMap:
-        exchange = self.exchange
+        """Return the map of a phase, which cycles with other conductances in other phases share."""
+        key, exchange = (phase, conductance.tobytes()), self.exchange
+        if key in self._phases:
+            return self._phases[key]
         maps: dict[tuple[int, int], StepMap] = {}
         steps = []
         for plan in exchange.plans[phase]:
@@ -255,7 +260,8 @@ class CycleHeat:
             if kinds not in maps:
                 maps[kinds] = exchange.step_map(kinds, conductance)
             steps.append((maps[kinds], exchange.friction[phase] * plan.speed))
-        return PhaseMap(steps)
+        self._phases[key] = PhaseMap(steps)
+        return self._phases[key]
 
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""

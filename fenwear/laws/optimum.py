@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, ConvergenceError, InputError
@@ -95,7 +95,7 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
         if least.min() >= 0 and np.abs(a @ least - b).max() < 1e-9:
             return True
         # Not scipy 1.15's nnls: it stops before the solution of such a wide system.
-        return linprog(np.zeros(rows.shape[1]), A_eq=a, b_eq=b).status == 0
+        return scipy.optimize.linprog(np.zeros(rows.shape[1]), A_eq=a, b_eq=b).status == 0
 
     every, punch = list(range(len(target))), list(range(rigid.of_punch))
     if not every or (size > 0 and balanced(every)):
@@ -287,7 +287,7 @@ def _slope(law: WearRates, rate: Array, ramp: float) -> Array:
 
 def _balanced_below(rows: Array, resultant: Array, pressure: float) -> bool:
     """Return whether pressures of no more than this one balance the loads."""
-    found = linprog(np.zeros(rows.shape[1]), A_eq=rows, b_eq=-resultant, bounds=(0, pressure))
+    found = scipy.optimize.linprog(np.zeros(rows.shape[1]), A_eq=rows, b_eq=-resultant, bounds=(0, pressure))
     return bool(found.status == 0)
 
 

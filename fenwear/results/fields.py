@@ -28,7 +28,6 @@ from fenwear.common.parallel import on_root
 from fenwear.heat.conduction import HeatBody
 from fenwear.laws.wear import WornDepths
 from fenwear.results.disk import check_room, replacing, writing
-from fenwear.results.hdf5 import append, step_of, write
 from fenwear.results.quantity import degrees_of
 from fenwear.surfaces.placement import in_model, in_space
 from fenwear.system import Tribosystem
@@ -317,6 +316,8 @@ def _make_folder(folder: Path, size: int) -> None:
 
 
 def _write_nodal(dataset: xarray.Dataset, folder: Path, stem: str) -> None:
+    from fenwear.results.hdf5 import append, step_of, write  # HDF5, which a steady state does without
+
     with replacing(folder / f"{stem}.nc") as part:
         write(part, dataset)
     append(folder / SERIES, step_of(dataset))

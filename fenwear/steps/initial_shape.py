@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from fenwear.algebra.fixed_point import fixed_point
 from fenwear.bodies.contact_surface import ContactSurface, profiled
@@ -259,7 +259,9 @@ def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
     """
     modes, scale = system.rigid.rigid_normal / system.mode_lengths, float(np.abs(shape[where]).max()) or 1.0
     weights = system.pair.weights / system.pair.weights.sum()
-    found = linprog(-(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None))
+    found = scipy.optimize.linprog(
+        -(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None)
+    )
     if found.x is None:
         raise ConvergenceError("no shape to machine exists: material would have to be added somewhere in each")
     depth = shape - scale * (modes @ found.x)  # to the programme's tolerance, which a clipped depth would show

@@ -28,7 +28,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from fenwear.case.body_names import told_by_name
@@ -298,7 +298,7 @@ def _loads_oppose(system: Tribosystem) -> bool:
     loads = loads[sizes > 0] / sizes[sizes > 0, None]
     if not len(loads):
         return False
-    along = linprog(  # the largest t with F v >= t for all of them
+    along = scipy.optimize.linprog(  # the largest t with F v >= t for all of them
         np.append(np.zeros(loads.shape[1]), -1.0),
         np.hstack([-loads, np.ones((len(loads), 1))]), np.zeros(len(loads)),
         bounds=[*[(-1.0, 1.0)] * loads.shape[1], (None, 1.0)],
@@ -478,7 +478,10 @@ def _uniform_wear_exists(system: Tribosystem) -> bool:
     uniform = hstack([eye_array(n)] * m + [motion])
     equality = vstack([uniform, hstack([block_diag(balances), csr_array((m * r, r))])], format="csr")
     bounds = [(0, None)] * (m * n) + [(None, None)] * r
-    return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=np.concatenate(target), bounds=bounds).status != 2)
+    return bool(
+        scipy.optimize.linprog(np.zeros(m * n + r), A_eq=equality, b_eq=np.concatenate(target), bounds=bounds).status
+        != 2
+    )
 
 
 def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:

@@ -44,7 +44,7 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from fenwear.algebra.fixed_point import fixed_point
 from fenwear.bodies.contact_surface import ContactSurface

@@ -6,7 +6,7 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError

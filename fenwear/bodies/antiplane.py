@@ -52,8 +52,8 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     index_map = elastic.space.dofmap.index_map
     given, held = fem.Function(elastic.space), fem.Function(elastic.space)
     start, stop = index_map.local_range
-    own = (blocks >= start) & (blocks < stop)
-    given.x.array[2 * (blocks[own] - start)] = force[own]
+    local = (blocks >= start) & (blocks < stop)
+    given.x.array[2 * (blocks[local] - start)] = force[local]
     held.x.array[2 * (_held(elastic) // 2)] = 1.0
     held.x.scatter_forward()
 

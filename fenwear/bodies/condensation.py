@@ -53,8 +53,8 @@ class CondensedBody:
 
     def arrays(self) -> dict[str, Array]:
         """Return the solved arrays by their names."""
-        found = {"response": self.response, "by_load": self.by_load}
-        return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
+        arrays = {"response": self.response, "by_load": self.by_load}
+        return arrays if self.by_temperature is None else {**arrays, "by_temperature": self.by_temperature}
 
     def first(self, count: int) -> CondensedBody:
         """Return the body condensed onto its first patterns alone."""
@@ -88,8 +88,8 @@ class CondensedBody:
 
 def product(numbers: Array, forces: Array) -> Array:
     """Return numbers of an operator (rows, a, columns, d) times forces (columns, d, ...): (rows, a, ...)."""
-    found = np.tensordot(forces, numbers, ((0, 1), (2, 3)))
-    return np.moveaxis(np.asarray(found, dtype=np.float64), (-2, -1), (0, 1))
+    summed = np.tensordot(forces, numbers, ((0, 1), (2, 3)))
+    return np.moveaxis(np.asarray(summed, dtype=np.float64), (-2, -1), (0, 1))
 
 
 def condense(
@@ -128,17 +128,17 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
         ConvergenceError: a stiffness has no factor.
         ValueError: a thermal coupling with all axes.
     """
-    if any(one.thermal_coupling is not None and one.directions is None for one in requests):
+    if any(request.thermal_coupling is not None and request.directions is None for request in requests):
         raise ValueError("the response to temperature needs one direction for each pattern")
     comm = requests[0].elastic.body.mesh.comm
     if not keep:
         return _condensed(requests)
-    places = [disk_cache.known(comm, one.identity, fresh=fresh) for one in requests]
+    places = [disk_cache.known(comm, request.identity, fresh=fresh) for request in requests]
     both = list(zip(requests, places, strict=True))
-    computed = iter(_condensed([one for one, place in both if not place.arrays]))
+    computed = iter(_condensed([request for request, place in both if not place.arrays]))
     condensed = []
-    for one, place in both:
-        body = CondensedBody(one.patterns, one.along, **place.arrays) if place.arrays else next(computed)
+    for demand, place in both:
+        body = CondensedBody(demand.patterns, demand.along, **place.arrays) if place.arrays else next(computed)
         if not place.arrays:
             place.save(body.arrays())
         condensed.append(body)
@@ -154,34 +154,34 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     if not requests:
         return []
     if len(requests) > 1 and requests[0].elastic.body.mesh.comm.size == 1:
-        return [_condensed([one])[0] for one in requests]
+        return [_condensed([request])[0] for request in requests]
     _eliminate(requests)
-    found = respond_together(requests)
-    loads = _under_loads([one.elastic for one in requests])
+    responses = respond_together(requests)
+    loads = _under_loads([request.elastic for request in requests])
     condensed = []
-    for one, (response, warm), load in zip(requests, found, loads, strict=True):
-        q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
-        answers, by_temperature = _guided(one, response.reshape(q, d, -1, along.shape[2]), warm)
+    for demand, (response, warm), load in zip(requests, responses, loads, strict=True):
+        q, d, along = demand.patterns.shape[1], demand.elastic.dim, demand.along
+        answers, by_temperature = _guided(demand, response.reshape(q, d, -1, along.shape[2]), warm)
         answers = _symmetric(answers, along)
-        by_load = one.patterns.T @ load
-        condensed.append(CondensedBody(one.patterns, along, answers, by_load, by_temperature))
-        if by_temperature is not None and entries(one.elastic.size, d) > LARGE:
-            one.elastic.free_factor()
+        by_load = demand.patterns.T @ load
+        condensed.append(CondensedBody(demand.patterns, along, answers, by_load, by_temperature))
+        if by_temperature is not None and entries(demand.elastic.size, d) > LARGE:
+            demand.elastic.free_factor()
     return condensed
 
 
-def _guided(one: Request, response: Array, by_temperature: Array | None) -> tuple[Array, Array | None]:
+def _guided(request: Request, response: Array, by_temperature: Array | None) -> tuple[Array, Array | None]:
     """Return the response (q, d, k, a) and that to temperature of a body whose guides hold it; collective."""
-    answer = one.elastic.guide_answer
+    answer = request.elastic.guide_answer
     if not len(answer.turning):
         return response, by_temperature
-    rotations, moved = (one.seen(fields) for fields in (answer.rotations_there, answer.moved_there))
-    couple, work = (np.einsum("kdg,kda->gka", seen, one.along) for seen in (rotations, moved))
+    rotations, moved = (request.seen(fields) for fields in (answer.rotations_there, answer.moved_there))
+    couple, work = (np.einsum("kdg,kda->gka", seen, request.along) for seen in (rotations, moved))
     flat = [each.reshape(len(each), -1) for each in (couple, work)]
     response = response + answer.change(rotations, moved, flat[0], flat[1]).reshape(response.shape)
-    if by_temperature is not None and one.thermal_coupling is not None:
-        warmed = np.array([transposed_times(one.thermal_coupling, field) for field in answer.moved.T])
-        by_temperature = by_temperature - np.einsum("kdg,kda,gT->kaT", rotations, one.along, warmed)[:, 0]
+    if by_temperature is not None and request.thermal_coupling is not None:
+        warmed = np.array([transposed_times(request.thermal_coupling, field) for field in answer.moved.T])
+        by_temperature = by_temperature - np.einsum("kdg,kda,gT->kaT", rotations, request.along, warmed)[:, 0]
     return response, by_temperature
 
 
@@ -189,12 +189,12 @@ def _eliminate(requests: Sequence[Request]) -> None:
     """Factor each body on ranks of its own, or in substructures on all ranks, all at once; collective."""
     factors = []
     ranks = max(requests[0].elastic.body.mesh.comm.size // len(requests), 1)
-    for number, one in enumerate(reversed(requests)):  # the first ranks get the last one
-        elastic = one.elastic
-        surface = one.thermal_coupling is None and by_surface(elastic)  # temperatures act inside the body
+    for number, request in enumerate(reversed(requests)):  # the first ranks get the last one
+        elastic = request.elastic
+        surface = request.thermal_coupling is None and by_surface(elastic)  # temperatures act inside the body
         together = surface and elastic.body.mesh.comm.size > 1 and not elastic.setup.reproducible
         together = together and elastic.boundary.size**3 <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
-        copies = 1 if surface or together else _copies(one, ranks, len(requests))
+        copies = 1 if surface or together else _copies(request, ranks, len(requests))
         factors.append(elastic.begin_factor(number * ranks, copies, with_surface=surface, together=together))
     make_together([factor for factor in factors if not factor.is_made])
 
@@ -222,7 +222,9 @@ def _symmetric(response: Array, along: Array) -> Array:
 def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
     """Return the displacement of each body's trace nodes under its loads (N, d), mm, all solved at once; collective."""
     solutions = solve_together([body.factor for body in bodies], [body.load for body in bodies])
-    displacement = [body.trace.pick(one[:, None])[:, :, 0] for body, one in zip(bodies, solutions, strict=True)]
+    displacement = [
+        body.trace.pick(solution[:, None])[:, :, 0] for body, solution in zip(bodies, solutions, strict=True)
+    ]
     for number, body in enumerate(bodies):
         answer = body.guide_answer
         work = total(body.body.mesh.comm, answer.moved.T @ body.load)

@@ -35,10 +35,10 @@ def connected_parts(mesh: Mesh) -> NDArray[np.int64]:
     starts = [0, *accumulate(piece[0] for piece in pieces)]
     places = np.concatenate([np.searchsorted(shared, piece[1]) for piece in pieces])
     joined = np.concatenate([start + piece[2] for start, piece in zip(starts, pieces, strict=False)])
-    whole = _components(starts[-1] + len(shared), joined, starts[-1] + places)[: starts[-1]]
-    own = whole[starts[comm.rank] : starts[comm.rank + 1]][here[:cells]]
-    names = np.unique(whole)
-    return np.searchsorted(names, own) if len(names) == 1 else _in_order(mesh, own, names)
+    labels = _components(starts[-1] + len(shared), joined, starts[-1] + places)[: starts[-1]]
+    local_labels = labels[starts[comm.rank] : starts[comm.rank + 1]][here[:cells]]
+    names = np.unique(labels)
+    return np.searchsorted(names, local_labels) if len(names) == 1 else _in_order(mesh, local_labels, names)
 
 
 def _components(size: int, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -47,12 +47,12 @@ def _components(size: int, first: NDArray[np.int64], second: NDArray[np.int64]) 
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _in_order(mesh: Mesh, own: NDArray[np.int64], names: NDArray[np.int64]) -> NDArray[np.int64]:
-    boxes = part_boxes(mesh, np.searchsorted(names, own), len(names))
+def _in_order(mesh: Mesh, local_labels: NDArray[np.int64], names: NDArray[np.int64]) -> NDArray[np.int64]:
+    boxes = part_boxes(mesh, np.searchsorted(names, local_labels), len(names))
     order = np.lexsort(boxes[:, 0].T[::-1])
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))
-    return np.asarray(place[np.searchsorted(names, own)])
+    return np.asarray(place[np.searchsorted(names, local_labels)])
 
 
 def part_boxes(mesh: Mesh, part: NDArray[np.int64], count: int) -> Array:

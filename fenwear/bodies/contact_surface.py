@@ -275,8 +275,8 @@ class Trace:
         index_map = space.dofmap.index_map
         start, stop = index_map.local_range
         self._size, self._block_size = stop - start, space.dofmap.index_map_bs
-        self.own = np.flatnonzero((blocks >= start) & (blocks < stop))
-        self.local = blocks[self.own] - start
+        self.owned = np.flatnonzero((blocks >= start) & (blocks < stop))
+        self.local = blocks[self.owned] - start
 
     def pick(self, fields: Array) -> Array:
         """Return fields at the trace nodes (N, components, k), equal on every rank; collective.
@@ -286,21 +286,21 @@ class Trace:
         """
         components = self._block_size
         picked = np.zeros((len(self.blocks), components, fields.shape[1]))
-        picked[self.own] = fields.reshape(self._size, components, fields.shape[1])[self.local]
+        picked[self.owned] = fields.reshape(self._size, components, fields.shape[1])[self.local]
         self._comm.Allreduce(MPI.IN_PLACE, picked, op=MPI.SUM)  # each node has one owner: exact
         return picked
 
     def place(self, loads: Array) -> Array:
         """Return loads at the trace nodes (N, components, k) on the owned degrees of freedom (owned, k)."""
         placed = np.zeros((self._size, *loads.shape[1:]))
-        placed[self.local] = loads[self.own]
+        placed[self.local] = loads[self.owned]
         return placed.reshape(self._size * self._block_size, loads.shape[2])
 
     @cached_property
     def rows(self) -> csr_array:
         """The matrix that picks this rank's part of a scalar field at the trace nodes (N, owned)."""
         shape = (len(self.blocks), self._size)
-        return csr_array((np.ones(len(self.own)), (self.own, self.local)), shape=shape)
+        return csr_array((np.ones(len(self.owned)), (self.owned, self.local)), shape=shape)
 
 
 def contact_tag(body: BodyMesh) -> int:
@@ -325,9 +325,9 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     points = space.tabulate_dof_coordinates()[:, :dim]
     local, cells = facet_dofs(body, space)
     local = np.take_along_axis(local, _in_reference_order(local, points, cell, degree), axis=1)
-    own = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
+    numbers = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
     inner = points[space.dofmap.list[cells]].mean(axis=1)
-    gathered = mesh.comm.allgather((own, points[local], inner, _contact_numbers(body)))
+    gathered = mesh.comm.allgather((numbers, points[local], inner, _contact_numbers(body)))
     facets, coordinates, inner, contact = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
     blocks, first, inverse = np.unique(facets, return_index=True, return_inverse=True)
     trace = coordinates.reshape(-1, dim)[first]
@@ -368,7 +368,7 @@ def trace_of(surface: Trace, vector: fem.FunctionSpace, space: fem.FunctionSpace
     other = np.empty(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     other[vector.dofmap.list.ravel()] = space.dofmap.list.ravel()
     blocks = np.zeros(len(surface.blocks), dtype=np.int64)
-    blocks[surface.own] = space.dofmap.index_map.local_to_global(other[surface.local])
+    blocks[surface.owned] = space.dofmap.index_map.local_to_global(other[surface.local])
     space.mesh.comm.Allreduce(MPI.IN_PLACE, blocks, op=MPI.SUM)
     return Trace(surface.surface, space, blocks)
 
@@ -378,7 +378,7 @@ def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int
     topology, fdim = body.mesh.topology, body.mesh.topology.dim - 1
     topology.create_connectivity(fdim, fdim + 1)
     topology.create_connectivity(fdim + 1, fdim)
-    facets = _own_facets(body)
+    facets = _owned_facets(body)
     to_cell, to_facet = topology.connectivity(fdim, fdim + 1), topology.connectivity(fdim + 1, fdim)
     closures = space.element.basix_element.entity_closure_dofs[fdim]
     cells = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int32)
@@ -387,7 +387,7 @@ def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int
     return np.array(local_blocks, dtype=np.int32).reshape(-1, len(closures[0])), cells
 
 
-def _own_facets(body: BodyMesh) -> NDArray[np.int32]:
+def _owned_facets(body: BodyMesh) -> NDArray[np.int32]:
     """Return the contact facets that this rank owns (f,)."""
     facets = body.facet_tags.find(contact_tag(body))
     topology = body.mesh.topology
@@ -396,7 +396,7 @@ def _own_facets(body: BodyMesh) -> NDArray[np.int32]:
 
 def _contact_numbers(body: BodyMesh) -> NDArray[np.int64]:
     """Return the number of the named contact that each of this rank's own contact facets belongs to (f,)."""
-    facets = _own_facets(body)
+    facets = _owned_facets(body)
     number = np.zeros(len(facets), dtype=np.int64)
     for k, named in enumerate(body.contacts.values()):
         number[np.isin(facets, named)] = k
@@ -413,8 +413,8 @@ def _check_sizes(body: BodyMesh, carries: Mask) -> None:
 
 def _check_apart(body: BodyMesh, nodes: Sequence[NDArray[np.int64]]) -> None:
     """Raise where two named contacts, with these trace nodes, meet: a node has to belong to one of them."""
-    for (first, own), (second, other) in combinations(zip(body.contacts, nodes, strict=True), 2):
-        if len(both := np.intersect1d(own, other)):
+    for (first, first_nodes), (second, other) in combinations(zip(body.contacts, nodes, strict=True), 2):
+        if len(both := np.intersect1d(first_nodes, other)):
             text = f"shares {len(both)} nodes with {body.name}_contact_{second}; expected named contacts that lie apart"
             raise CaseError(InputError(f"{body.name}_contact_{first}", text))
 
@@ -463,25 +463,25 @@ def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: 
         return None
     graph = csr_array((np.ones(len(facets)), facets[:, :2].T), shape=(len(trace), len(trace)))
     _, curve = connected_components(graph, directed=False)
-    found, curves = np.zeros(len(trace)), []
+    arc, curves = np.zeros(len(trace)), []
     for k in np.unique(curve[facets[:, 0]]):
-        own = np.flatnonzero(curve[facets[:, 0]] == k)
-        along = _along(trace, facets[own], inner[own], looks_up)
+        of_curve = np.flatnonzero(curve[facets[:, 0]] == k)
+        along = _along(trace, facets[of_curve], inner[of_curve], looks_up)
         if along is None:
             return None
-        nodes = np.unique(facets[own])
-        found[nodes] = along[nodes]
+        nodes = np.unique(facets[of_curve])
+        arc[nodes] = along[nodes]
         curves.append(nodes)
     if len(curves) == 1:
-        return found
+        return arc
     curves.sort(key=lambda nodes: tuple(np.round(trace[nodes].mean(axis=0) / grain)))
-    lengths = [float(np.ptp(found[nodes])) for nodes in curves]
+    lengths = [float(np.ptp(arc[nodes])) for nodes in curves]
     gap = BETWEEN * sum(lengths) / len(lengths)
     begin = -(sum(lengths) + gap * (len(lengths) - 1)) / 2
     for nodes, length in zip(curves, lengths, strict=True):
-        found[nodes] += begin - found[nodes].min()
+        arc[nodes] += begin - arc[nodes].min()
         begin += length + gap
-    return found
+    return arc
 
 
 def _along(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool) -> Array | None:
@@ -491,7 +491,7 @@ def _along(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool
     for facet in range(len(facets)):
         for end in facets[facet, :2]:
             at.setdefault(int(end), []).append(facet)
-    single = [node for node, own in at.items() if len(own) == 1]
+    single = [node for node, beside in at.items() if len(beside) == 1]
     if max(map(len, at.values())) > 2 or len(single) > 2:
         return None
     rounded = np.round(trace / grain)
@@ -500,19 +500,19 @@ def _along(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool
     cut = lowest if hollow != looks_up else highest
     start = node = min(single, key=lambda end: tuple(rounded[end])) if single else cut
     local = np.argsort(_lagrange("interval", facets.shape[1] - 1).points[:, 0])
-    found, done, length, nodes = np.zeros(len(trace)), set[int](), 0.0, [start]
+    arc, done, length, nodes = np.zeros(len(trace)), set[int](), 0.0, [start]
     while ways := [facet for facet in at[node] if facet not in done]:
         facet = min(ways, key=lambda way: trace[facets[way, :2], 0].sum())  # from a cut on towards smaller x
         done.add(facet)
         chain = facets[facet][local] if facets[facet, 0] == node else facets[facet][local[::-1]]
         sizes = np.linalg.norm(np.diff(trace[chain], axis=0), axis=1)
-        found[chain[1:]] = length + np.cumsum(sizes)
+        arc[chain[1:]] = length + np.cumsum(sizes)
         nodes += chain[1:].tolist()
         length, node = length + float(sizes.sum()), int(chain[-1])
-    found[start] = 0.0
-    middle = min(nodes, key=lambda one: abs(found[one] - length / 2))
-    found[nodes] += trace[middle, 0] - found[middle]
-    return found
+    arc[start] = 0.0
+    middle = min(nodes, key=lambda node: abs(arc[node] - length / 2))
+    arc[nodes] += trace[middle, 0] - arc[middle]
+    return arc
 
 
 def _ascending(x: Array) -> NDArray[np.int64]:
@@ -530,13 +530,13 @@ def _integrals(
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)(contact_tag(body))
     v = ufl.TestFunction(space)
     start, stop = space.dofmap.index_map.local_range
-    own = np.flatnonzero((blocks >= start) & (blocks < stop))
-    found = np.zeros((2, len(blocks), dim))
+    local = np.flatnonzero((blocks >= start) & (blocks < stop))
+    integrals = np.zeros((2, len(blocks), dim))
     for k, traction in enumerate((ufl.as_vector((1.0,) * dim), ufl.FacetNormal(body.mesh))):
         vector = assembled_vector(measure * ufl.inner(traction, v) * ds)
-        found[k, own] = vector.reshape(-1, dim)[blocks[own] - start]
-    body.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
-    weights, normals = found[0, :, 0], found[1]
+        integrals[k, local] = vector.reshape(-1, dim)[blocks[local] - start]
+    body.mesh.comm.Allreduce(MPI.IN_PLACE, integrals, op=MPI.SUM)
+    weights, normals = integrals[0, :, 0], integrals[1]
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     return weights, normals / np.where(size > 0, size, 1.0)
 

@@ -154,21 +154,21 @@ def convolved(parts: Sequence[tuple[Kernel, Array]], count: int, size: Sequence[
         size: The period of the kernels.
     """
     fields = parts[0][1]
-    found = np.zeros((len(fields), count, *fields.shape[2:]))
+    displacements = np.zeros((len(fields), count, *fields.shape[2:]))
     for some in in_cache(len(fields), 8 * int(np.prod(size))):
         moved = dict[int, Waves]()
         for waves, forces in parts:
             for b in range(forces.shape[1]):
-                own = forces[some, b]
-                if not own.any():
+                load = forces[some, b]
+                if not load.any():
                     continue
-                image = forward(own, size)
+                image = forward(load, size)
                 for a in (a for a in range(count) if (a, b) in waves):
                     part = waves[a, b] * image
                     moved[a] = moved[a] + part if a in moved else part
         for a, image in moved.items():
-            found[some, a] = back(image, size, fields.shape[2:])
-    return found
+            displacements[some, a] = back(image, size, fields.shape[2:])
+    return displacements
 
 
 def in_cache(count: int, size: int) -> list[slice]:
@@ -202,10 +202,10 @@ def over_period(numbers: Array, size: Sequence[int]) -> Array:
         middle = numbers.shape[axis] // 2
         reach = min(middle, period // 2)
         lines = np.moveaxis(numbers, axis, 0)[middle - reach : middle + reach + 1]
-        found: Array = np.zeros((period, *lines.shape[1:]))
+        periodic: Array = np.zeros((period, *lines.shape[1:]))
         if 2 * reach == period:
-            found[reach] = (lines[0] + lines[-1]) / 2
+            periodic[reach] = (lines[0] + lines[-1]) / 2
             lines, reach = lines[1:-1], reach - 1
-        found[: reach + 1], found[period - reach :] = lines[reach:], lines[:reach]
-        numbers = np.moveaxis(found, 0, axis)
+        periodic[: reach + 1], periodic[period - reach :] = lines[reach:], lines[:reach]
+        numbers = np.moveaxis(periodic, 0, axis)
     return numbers

@@ -101,10 +101,10 @@ class Retardation:
         step = duration / (len(course) - 1) / self.times
         kept, grown = np.exp(-step), -np.expm1(-step)
         mean = np.divide(grown, step, out=np.ones_like(step), where=step > 0)
-        found = np.zeros(len(self.times))
+        y = np.zeros(len(self.times))
         for first, last in pairwise(course):
-            found = kept * found + last - first * kept - (last - first) * mean
-        return found
+            y = kept * y + last - first * kept - (last - first) * mean
+        return y
 
     def shares(self, duration: float) -> tuple[Array, Array]:
         """Return the shares (terms,) of v at the begin and at the end of a step that y takes up, v changing evenly."""
@@ -150,10 +150,10 @@ class RetardedCycle:
     @cached_property
     def seen_taken(self) -> Array:
         """Share of v in y as the contact of a phase sees it (m, terms)."""
-        middle, found = self.courses.shape[1] // 2 + 1, self.taken.copy()
+        middle, shares = self.courses.shape[1] // 2 + 1, self.taken.copy()
         for k in np.flatnonzero(self.varies):
-            found[k] = self.of.taken(float(self.durations[k]) / 2, self.courses[k, :middle])
-        return found
+            shares[k] = self.of.taken(float(self.durations[k]) / 2, self.courses[k, :middle])
+        return shares
 
     @cached_property
     def factors(self) -> Array:
@@ -183,9 +183,9 @@ class RetardedCycle:
         since = (ends - self.durations)[:, None] - ends  # from the end of phase i to the begin of a phase
         later = np.exp(-np.maximum(since, 0.0)[:, :, None] / self.of.times)
         before = (phases[:, None] > phases)[:, :, None]
-        found = np.where(before, later * self.seen_decays[:, None] * self.taken, 0.0)
-        found[phases, phases] = self.seen_taken
-        return found
+        parts = np.where(before, later * self.seen_decays[:, None] * self.taken, 0.0)
+        parts[phases, phases] = self.seen_taken
+        return parts
 
     @cached_property
     def lasting(self) -> Array:
@@ -205,8 +205,8 @@ class RetardedCycle:
         before = (1 + x / 2) / (1 + cycles * x)
         begun = self._kept * before
         by_lasting = self._kept * (1 - before)
-        found = by_lasting[:, None] * self.lasting + self._given
-        return np.asarray(found @ self.of.compliances), self.of.compliances * begun
+        by_phase = by_lasting[:, None] * self.lasting + self._given
+        return np.asarray(by_phase @ self.of.compliances), self.of.compliances * begun
 
     def rate(self, cycles: float) -> tuple[Array, Array]:
         """Return the change of y in each cycle of such a step: by each v_i (terms, i), and by y itself (terms,)."""

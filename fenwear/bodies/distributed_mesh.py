@@ -108,11 +108,11 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
     fdim = mesh.topology.dim - 1
     facets, values = [], []
     for tag, (group, marker) in enumerate(groups.items(), start=1):
-        found = locate_entities_boundary(mesh, fdim, marker)
-        if mesh.comm.allreduce(len(found)) == 0:
+        marked = locate_entities_boundary(mesh, fdim, marker)
+        if mesh.comm.allreduce(len(marked)) == 0:
             raise CaseError(InputError(group, f"no facet on the boundary of the {name} belongs to it"))
-        facets.append(found)
-        values.append(np.full(len(found), tag, dtype=np.int32))
+        facets.append(marked)
+        values.append(np.full(len(marked), tag, dtype=np.int32))
     if f"{name}_contact" not in groups and not any(_contact_name(name, group) for group in groups):
         raise CaseError(InputError(f"{name}_contact", f"missing, but required{_known(groups)}"))
     order = np.argsort(np.concatenate(facets), kind="stable")
@@ -208,8 +208,10 @@ def _meshed(
     place = disk_cache.known(MPI.COMM_SELF, lambda: [*shape, content], fresh=fresh) if keep else disk_cache.NOWHERE
     if stored := place.arrays:
         _check_size(float(stored["contact_nodes"]))
-        own = [{name.removeprefix(body): a for name, a in stored.items() if name.startswith(body)} for body in BODIES]
-        return RawMesh.of_arrays(own[0]), RawMesh.of_arrays(own[1])
+        by_body = [
+            {name.removeprefix(body): a for name, a in stored.items() if name.startswith(body)} for body in BODIES
+        ]
+        return RawMesh.of_arrays(by_body[0]), RawMesh.of_arrays(by_body[1])
     mesh, contact_nodes = _grouped(geometry, path, kind, parameters, names)
     punch, strip = (raw_mesh(mesh, body, _dim(kind)) for body in BODIES)
     both = zip(BODIES, (punch, strip), strict=True)
@@ -342,9 +344,9 @@ def _load(
             read_shapes(gmsh, path, _millimetres(geometry.unit or "mm"))
         else:
             _merge(gmsh, path)
-        whole = 3 if gmsh.model.getEntities(3) else 2
-        dim = whole if kind is None else _dim(kind)
-        if dim < whole and any(by_role(name).startswith(BODIES) for name in _groups(gmsh, 3)):
+        top_dim = 3 if gmsh.model.getEntities(3) else 2
+        dim = top_dim if kind is None else _dim(kind)
+        if dim < top_dim and any(by_role(name).startswith(BODIES) for name in _groups(gmsh, 3)):
             message = f"{path.name} has physical volumes: expected model.kind = 'solid' with it"
             raise CaseError(InputError("geometry.file", message))
         if shape:
@@ -394,8 +396,11 @@ def _check_size(contact_nodes: float) -> None:
     Raises:
         CaseError: it has too many contact nodes.
     """
-    what, advice = f"a contact of some {contact_nodes:,.0f} nodes", "Use larger elements at the contact, or a `grid`."
-    check_memory(MPI.COMM_SELF, MATRICES * 8 * contact_nodes**2, "geometry", what, advice)
+    subject, advice = (
+        f"a contact of some {contact_nodes:,.0f} nodes",
+        "Use larger elements at the contact, or a `grid`.",
+    )
+    check_memory(MPI.COMM_SELF, MATRICES * 8 * contact_nodes**2, "geometry", subject, advice)
 
 
 def _merge(gmsh: Any, path: Path) -> None:
@@ -462,12 +467,12 @@ def _with_contacts(body: BodyMesh) -> BodyMesh:
     named = {name: tag for group, tag in body.curves.items() if (name := _contact_name(body.name, group))}
     if not named:
         return body
-    tags, whole = body.facet_tags, min(named.values())
-    values = np.where(np.isin(tags.values, list(named.values())), whole, tags.values).astype(np.int32)
+    tags, common_tag = body.facet_tags, min(named.values())
+    values = np.where(np.isin(tags.values, list(named.values())), common_tag, tags.values).astype(np.int32)
     curves = {group: tag for group, tag in body.curves.items() if not _contact_name(body.name, group)}
     return replace(
         body,
         facet_tags=meshtags(body.mesh, tags.dim, tags.indices, values),
-        curves={**curves, f"{body.name}_contact": whole},
+        curves={**curves, f"{body.name}_contact": common_tag},
         contacts={name: tags.find(tag) for name, tag in sorted(named.items())},
     )

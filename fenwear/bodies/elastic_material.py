@@ -184,9 +184,9 @@ def region_field(body: BodyMesh, values: Mapping[str, Property], theta: fem.Func
             field.x.array[of_region] = value(field.x.array[of_region]) if callable(value) else value
         except CaseError as error:  # raised below, on all ranks
             problem = error
-    found = [one for one in body.mesh.comm.allgather(problem) if one is not None] if warm else []
-    if found:
-        raise found[0]
+    errors = [raised for raised in body.mesh.comm.allgather(problem) if raised is not None] if warm else []
+    if errors:
+        raise errors[0]
     field.x.scatter_forward()
     return field
 

@@ -209,15 +209,15 @@ class ElasticBody:
         """Return values at the trace nodes of the mesh (N_mesh, ...) at those of the contact surface (N, ...)."""
         if self.reading is None:
             return values
-        found = np.asarray(self.reading @ values.reshape(len(values), -1))
-        return found.reshape(len(found), *values.shape[1:])
+        flat = np.asarray(self.reading @ values.reshape(len(values), -1))
+        return flat.reshape(len(flat), *values.shape[1:])
 
     def on_trace(self, forces: Array) -> Array:
         """Return forces at the trace nodes of the contact surface (N, ...) at those of the mesh (N_mesh, ...)."""
         if self.reading is None:
             return forces
-        found = np.asarray(self.reading.T @ forces.reshape(len(forces), -1))
-        return found.reshape(len(found), *forces.shape[1:])
+        flat = np.asarray(self.reading.T @ forces.reshape(len(forces), -1))
+        return flat.reshape(len(flat), *forces.shape[1:])
 
     @property
     def size(self) -> int:

@@ -105,11 +105,11 @@ class FineBody(GridOperator):
 def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Array:
     """Return the displacements at a correction's points (m, d) by the body's loads, along (d, a); collective."""
     comm = elastic.body.mesh.comm
-    own = total(comm, np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64))
+    displacements = total(comm, np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64))
     answer, rotations, moved = correction.guided
     work = total(comm, answer.moved.T @ elastic.load)
-    own = own + answer.change(rotations, moved, elastic.guided_resultant, work) @ along
-    return np.asarray(own @ along.T)
+    displacements = displacements + answer.change(rotations, moved, elastic.guided_resultant, work) @ along
+    return np.asarray(displacements @ along.T)
 
 
 def at_nodes(
@@ -159,15 +159,15 @@ def fine(request: Request) -> FineBody:
         along=request.even_direction,
     )
     direction = np.ascontiguousarray(half.directions[0])
-    found = elastic.known.get(direction.tobytes())
-    if found is None or not found[2].holds(ground.grid):
+    entry = elastic.known.get(direction.tobytes())
+    if entry is None or not entry[2].holds(ground.grid):
         correction, unresolved = _resolved(elastic, ground, direction.T, key)
         guided = _guided(request, correction, at_nodes(correction, ground.grid, half.places, x, grid.spacing))
-        found = _held(replace(correction, guided=guided), direction), unresolved, ground.grid
+        entry = _held(replace(correction, guided=guided), direction), unresolved, ground.grid
         if entries(elastic.size, elastic.dim) > LARGE:  # else it waits for the fields of the end
             elastic.free_factor()
-        elastic.known[direction.tobytes()] = found  # it stays on other grids
-    correction, unresolved, over = found
+        elastic.known[direction.tobytes()] = entry  # it stays on other grids
+    correction, unresolved, over = entry
     weights = at_nodes(correction, over, half.places, x, grid.spacing)
     return FineBody(half, over, correction, weights, unresolved, by_loads(elastic, correction, direction))
 
@@ -219,11 +219,11 @@ def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> t
     while True:
         correction = correct(elastic, ground, tuple(counts), along)
         rests = rest_of(correction, ground)
-        more = (rests > RESOLVED) & (np.array(counts) < MOST) & (rests < FALLS * before)
-        if not more.any():
+        refined = (rests > RESOLVED) & (np.array(counts) < MOST) & (rests < FALLS * before)
+        if not refined.any():
             break
-        counts = [min(count + 2 * int(one), MOST) for count, one in zip(counts, more, strict=True)]
-        before = np.where(more, rests, before)
+        counts = [min(count + 2 * int(refine), MOST) for count, refine in zip(counts, refined, strict=True)]
+        before = np.where(refined, rests, before)
     if not rests.max() <= TRUSTED:
         message = (
             f"the {elastic.body.name}'s difference from a half-space is not smooth at the contact: polynomials "
@@ -254,18 +254,18 @@ def rest_of(correction: Correction, ground: Ground) -> Array:
     numbers: NDArray[np.int64] = np.zeros((1, 0), dtype=np.int64)
     for count in correction.counts:
         to_orders = np.asarray(np.kron(to_orders, coefficients(count)), dtype=np.float64)
-        own = np.tile(np.arange(count), len(numbers))
-        numbers = np.column_stack([np.repeat(numbers, count, axis=0), own])
+        degrees = np.tile(np.arange(count), len(numbers))
+        numbers = np.column_stack([np.repeat(numbers, count, axis=0), degrees])
     orders = np.einsum("pi,iajd->pajd", to_orders, correction.response)
-    mean, found = _mean_compliance(ground), []
+    mean, rests = _mean_compliance(ground), []
     for axis, count in enumerate(correction.counts):
         pairs = [(count - 2, count), (count - 4, count - 2)]
         sizes = [
             float(np.sqrt((orders[(numbers[:, axis] >= low) & (numbers[:, axis] < high)] ** 2).sum(axis=0)).max())
             for low, high in pairs
         ]
-        found.append(sizes[0] * min(sizes[0] / max(sizes[1], 1e-300), 1.0) / mean)
-    return np.array(found)
+        rests.append(sizes[0] * min(sizes[0] / max(sizes[1], 1e-300), 1.0) / mean)
+    return np.array(rests)
 
 
 def _mean_compliance(ground: Ground) -> float:

@@ -59,8 +59,8 @@ class RegularGrid:
 
     def with_numbers(self, numbers: Array) -> RegularGrid:
         """Return the grid of this plane with other ones."""
-        corner, spacing, counts = (tuple(float(one) for one in row) for row in numbers)
-        return replace(self, corner=corner, spacing=spacing, counts=tuple(int(one) for one in counts))
+        corner, spacing, counts = (tuple(float(number) for number in row) for row in numbers)
+        return replace(self, corner=corner, spacing=spacing, counts=tuple(int(count) for count in counts))
 
     @cached_property
     def flat(self) -> Array:
@@ -76,12 +76,12 @@ class RegularGrid:
     @cached_property
     def weights(self) -> Array:
         """Part of the plane that belongs to each node (n,), mm or mm²: half as much on the rim."""
-        whole = np.ones(1)
+        product = np.ones(1)
         for step, count in zip(self.spacing, self.counts, strict=True):
-            own = np.full(count, step)
-            own[[0, -1]] /= 2
-            whole = np.multiply.outer(whole, own).ravel()
-        return whole
+            on_axis = np.full(count, step)
+            on_axis[[0, -1]] /= 2
+            product = np.multiply.outer(product, on_axis).ravel()
+        return product
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -94,14 +94,14 @@ class RegularGrid:
         Args:
             other: A grid whose lines go through all nodes here that it reaches.
         """
-        whole: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        numbers: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
         for k, count in enumerate(other.counts):
             away = self.corner[k] + self.spacing[k] * np.arange(self.counts[k]) - other.corner[k]
             at = np.rint(away / other.spacing[k]).astype(np.int64)
             within = (at >= 0) & (at < count)
-            known = np.logical_and.outer(whole >= 0, within)
-            whole = np.where(known, np.add.outer(whole * count, at), -1).ravel()
-        return whole
+            known = np.logical_and.outer(numbers >= 0, within)
+            numbers = np.where(known, np.add.outer(numbers * count, at), -1).ravel()
+        return numbers
 
     def thinned(self, every: int, less: int = 0) -> RegularGrid:
         """Return a grid of every so manieth node of this one, in its middle as far as there is one.
@@ -140,8 +140,8 @@ class RegularGrid:
         Forces beyond this grid move to its rim, without their moment.
         """
         points = [
-            np.clip((low + step * np.arange(count) - first) / own, 0, last - 1)
-            for low, step, count, first, own, last in zip(
+            np.clip((low + step * np.arange(count) - first) / other_step, 0, last - 1)
+            for low, step, count, first, other_step, last in zip(
                 other.corner, other.spacing, other.counts, self.corner, self.spacing, self.counts, strict=True
             )
         ]
@@ -168,14 +168,14 @@ class RegularGrid:
 
     def _linear(self, points: list[Array]) -> csr_array:
         """Return the matrix to the crossings of points on each axis, in spacings, linear between nodes."""
-        whole = identity(1, format="csr")
+        matrix = identity(1, format="csr")
         for at, count in zip(points, self.counts, strict=True):
             near = np.rint(at)
             snapped = np.where(np.abs(at - near) < SNAP * count, near, at)
             low = np.minimum(np.floor(snapped).astype(np.int64), max(count - 2, 0))
             share, rows = snapped - low, np.arange(len(at))
             entries = (np.concatenate([1 - share, share]), (np.tile(rows, 2), np.concatenate([low, low + 1])))
-            one = csr_array(entries, shape=(len(at), count))
-            one.eliminate_zeros()
-            whole = kron(whole, one, format="csr")
-        return csr_array(whole)
+            on_axis = csr_array(entries, shape=(len(at), count))
+            on_axis.eliminate_zeros()
+            matrix = kron(matrix, on_axis, format="csr")
+        return csr_array(matrix)

@@ -125,9 +125,9 @@ def _weighed(space: fem.FunctionSpace, weight: Any, measure: ufl.Measure, motion
     """Return M A (owned, k) of motions A (owned, k), M the mass of unit density over a measure; collective."""
     field, v = fem.Function(space), ufl.TestFunction(space)
     mass = compiled(ufl.inner(field, v) * weight * measure)
-    found = np.empty_like(motions)
+    weighed = np.empty_like(motions)
     for k in range(motions.shape[1]):
         field.x.array[: len(motions)] = motions[:, k]
         field.x.scatter_forward()
-        found[:, k] = assembled_vector(mass)
-    return found
+        weighed[:, k] = assembled_vector(mass)
+    return weighed

@@ -91,10 +91,10 @@ class HalfSpace(GridOperator):
         """C along its directions, by forces along the model's axes."""
         places = self.places - self.places.min(axis=0)
         shape = tuple(int(count) for count in places.max(axis=0) + 1)
-        found = _influences(shape, self.spacing, self.shear, self.poisson, self.depth)
+        influences = _influences(shape, self.spacing, self.shear, self.poisson, self.depth)
         into = np.eye(self.dim)[list(self.axes)]  # the model's vectors along the grid, then into the body
         into[-1] *= -self.outward
-        table = np.tensordot(self._directions @ into.T, np.tensordot(into.T, found, (1, 1)), (1, 1))
+        table = np.tensordot(self._directions @ into.T, np.tensordot(into.T, influences, (1, 1)), (1, 1))
         return Convolution(places, np.asarray(table))
 
     def at(self, x: Array) -> HalfSpace:
@@ -114,13 +114,15 @@ def _influences(
 ) -> Array:
     """Return displacements by unit forces on cells at all distances of two nodes of a grid (d, d, 2 m - 1, ...)."""
     if len(shape) == 1:
-        own = _in_plane(np.asarray(spacing[0] * np.arange(shape[0])), spacing[0], shear, poisson, depth)
+        influences = _in_plane(np.asarray(spacing[0] * np.arange(shape[0])), spacing[0], shear, poisson, depth)
     else:
-        own = _in_space_on_grid(shape, spacing, shear, poisson)
+        influences = _in_space_on_grid(shape, spacing, shear, poisson)
     d = len(shape) + 1
     displacements = np.zeros((d, d, *(2 * count - 1 for count in shape)))
     every: list[Any] = [EVERY, EVERY]
-    displacements[tuple(every + [slice(count - 1, None) for count in shape])] = np.moveaxis(own, (-2, -1), (0, 1))
+    displacements[tuple(every + [slice(count - 1, None) for count in shape])] = np.moveaxis(
+        influences, (-2, -1), (0, 1)
+    )
     displacements /= np.prod(spacing)
     for axis, count in enumerate(shape):  # the other way along an axis what that axis has one share in changes its sign
         turned = np.ones(d)
@@ -182,7 +184,7 @@ def _grid(x: Array, weights: Array, key: str) -> tuple[NDArray[np.int64], tuple[
     if not regular or weights.max() > WIDE * np.prod(spacing):
         message = "expected contact nodes on a regular grid for 'half-space': even elements over all of the contact"
         raise CaseError(InputError(key, message))
-    return places, tuple(float(one) for one in spacing)
+    return places, tuple(float(step) for step in spacing)
 
 
 def extent_along(elastic: ElasticBody, axis: int) -> tuple[float, float]:
@@ -214,12 +216,12 @@ def _in_plane(x: Array, side: float, shear: float, poisson: float, depth: float)
         end = x + i * side / 2
         log -= i * end * (np.log(np.abs(end) / depth) - 1)
         sign += i * np.abs(end)
-    found = np.zeros((len(x), 2, 2))
+    displacements = np.zeros((len(x), 2, 2))
     for k, moved in enumerate((side / 2, -side / 2)):
-        found[:, k, k] = (1 - poisson) * log + moved
-    found[:, 1, 0] = np.pi / 2 * (0.5 - poisson) * sign
-    found[:, 0, 1] = -found[:, 1, 0]
-    return np.asarray(found / (np.pi * shear))
+        displacements[:, k, k] = (1 - poisson) * log + moved
+    displacements[:, 1, 0] = np.pi / 2 * (0.5 - poisson) * sign
+    displacements[:, 0, 1] = -displacements[:, 1, 0]
+    return np.asarray(displacements / (np.pi * shear))
 
 
 def _in_space(x: Array, sides: Sequence[float], shear: float, poisson: float) -> Array:

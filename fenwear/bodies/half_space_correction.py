@@ -89,9 +89,9 @@ class Ground:
         along = [x[axis] - at for axis, at in zip(self.grid.axes, source, strict=True)]
         down = into * (x[self.grid.normal] - self.grid.level)
         pushed = [*(force[axis] for axis in self.grid.axes), into * force[self.grid.normal]]
-        own = (_in_plane if len(order) == 2 else _in_space)(along, down, pushed, self.poisson, self.depth, by)
+        components = (_in_plane if len(order) == 2 else _in_space)(along, down, pushed, self.poisson, self.depth, by)
         displacement: list[Any] = [None] * len(order)
-        for axis, value in zip(order, own, strict=True):
+        for axis, value in zip(order, components, strict=True):
             displacement[axis] = value / (4 * np.pi * self.shear)
         displacement[self.grid.normal] = into * displacement[self.grid.normal]
         return displacement
@@ -183,30 +183,30 @@ def correct(elastic: ElasticBody, ground: Ground, counts: tuple[int, ...], along
     loads = _loads(elastic, ground, points)  # (owned, m, d)
     size, m, d = loads.shape
     held = elastic.supported
-    own = _nodal(elastic, ground, points)
+    nodal = _nodal(elastic, ground, points)
     loaded = (np.abs(loads).max(axis=(1, 2)) > 0) | np.isin(np.arange(size), held)
-    own[~loaded & (elastic.load == 0)] = 0.0  # beside the contact, where it is not finite
+    nodal[~loaded & (elastic.load == 0)] = 0.0  # beside the contact, where it is not finite
     asked = np.einsum("smd,ad->sma", loads, along).reshape(size, -1)
     lifted = np.zeros_like(asked)
-    lifted[held] = -np.einsum("smd,ad->sma", own[held], along).reshape(len(held), -1)
+    lifted[held] = -np.einsum("smd,ad->sma", nodal[held], along).reshape(len(held), -1)
     stiffness = elastic.free_stiffness()
     right = asked - times(stiffness, lifted)
     right[held] = 0.0
     moved = lifted + elastic.solve(right)
     reaction = times(stiffness, moved) - asked
     stiffness.destroy()
-    every, whole = loads.reshape(size, -1), own.reshape(size, -1)
-    found = moved.T @ every + asked.T @ whole
-    found += reaction[held].T @ whole[held]  # -g_j there
-    found = total(comm, found).reshape(m, along.shape[0], m, d)
-    part = np.einsum("iajd,bd->iajb", found, along).reshape(m * len(along), -1)
+    every, flat_nodal = loads.reshape(size, -1), nodal.reshape(size, -1)
+    response = moved.T @ every + asked.T @ flat_nodal
+    response += reaction[held].T @ flat_nodal[held]  # -g_j there
+    response = total(comm, response).reshape(m, along.shape[0], m, d)
+    part = np.einsum("iajd,bd->iajb", response, along).reshape(m * len(along), -1)
     rest = (part.T - part) / 2
     change = rest.reshape(m, len(along), m, len(along))
-    found = found + np.einsum("iajb,bd->iajd", change, along)
-    fields = moved.reshape(size, m, -1) + np.einsum("smd,ad->sma", own, along)
+    response = response + np.einsum("iajb,bd->iajd", change, along)
+    fields = moved.reshape(size, m, -1) + np.einsum("smd,ad->sma", nodal, along)
     uneven = float(2 * np.abs(rest).max())
     moments = np.moveaxis(elastic.couple_of(every).reshape(-1, m, d), 0, 2)
-    return Correction(counts, found, fields, uneven, (elastic.guide_answer, moments, np.zeros_like(moments)))
+    return Correction(counts, response, fields, uneven, (elastic.guide_answer, moments, np.zeros_like(moments)))
 
 
 def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
@@ -230,13 +230,13 @@ def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
         differs = law.stress(field) - alike.stress(field)
         work -= ufl.inner(differs, strain_of(v, kind)) * measure(mesh, kind) * dx(1)
     form = compiled(work)
-    found = np.empty((d * elastic.space.dofmap.index_map.size_local, len(points), d))
+    loads = np.empty((d * elastic.space.dofmap.index_map.size_local, len(points), d))
     for k, place in enumerate(points):
         source.value[:] = place
         for axis in range(d):
             force.value[:] = np.eye(d)[axis]
-            found[:, k, axis] = assembled_vector(form)
-    return found
+            loads[:, k, axis] = assembled_vector(form)
+    return loads
 
 
 def _borne(grid: RegularGrid, x: Any, normal: Any) -> Any:
@@ -257,12 +257,12 @@ def _nodal(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
     """Return the half-space's displacement at the own nodes from unit forces at points (owned, m, d)."""
     owned, d = elastic.space.dofmap.index_map.size_local, elastic.dim
     x = elastic.space.tabulate_dof_coordinates()[:owned, :d].T[:, :, None]
-    found = np.empty((owned, d, len(points), d))
+    displacements = np.empty((owned, d, len(points), d))
     with np.errstate(divide="ignore", invalid="ignore"):  # at the points themselves
         for axis in range(d):
             field = ground.field(x, list(points.T), list(np.eye(d)[axis]))
-            found[..., axis] = np.stack(np.broadcast_arrays(*field), axis=1)
-    return found.reshape(owned * d, len(points), d)
+            displacements[..., axis] = np.stack(np.broadcast_arrays(*field), axis=1)
+    return displacements.reshape(owned * d, len(points), d)
 
 
 def _outer(elastic: ElasticBody, grid: RegularGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -287,8 +287,8 @@ def below(elastic: ElasticBody, grid: RegularGrid, facets: NDArray[np.int32]) ->
 def _others(elastic: ElasticBody, ground: Ground) -> NDArray[np.int32]:
     """Return this rank's cells whose material is not that of the contact."""
     constants = cell_constants(elastic)
-    own = 2 * ground.shear * ground.poisson / (1 - 2 * ground.poisson), ground.shear
-    differs = np.abs(constants - own).max(axis=1) > 1e-9 * max(own)
+    of_contact = 2 * ground.shear * ground.poisson / (1 - 2 * ground.poisson), ground.shear
+    differs = np.abs(constants - of_contact).max(axis=1) > 1e-9 * max(of_contact)
     return np.flatnonzero(differs).astype(np.int32)
 
 
@@ -299,12 +299,12 @@ def cell_constants(elastic: ElasticBody) -> Array:
     topology = mesh.topology
     count = topology.index_map(topology.dim).size_local + topology.index_map(topology.dim).num_ghosts
     cells = fem.functionspace(mesh, ("DG", 0))
-    found = []
-    for one in elastic.law.lame:
+    constants = []
+    for parameter in elastic.law.lame:
         function = fem.Function(cells)
-        interpolate(ufl.as_ufl(one), function)
-        found.append(function.x.array[cells.dofmap.list[:count, 0]])
-    return np.stack(found, axis=1)
+        interpolate(ufl.as_ufl(parameter), function)
+        constants.append(function.x.array[cells.dofmap.list[:count, 0]])
+    return np.stack(constants, axis=1)
 
 
 def constants_of(elastic: ElasticBody, key: str, cells: NDArray[np.int64] | slice = EVERY) -> tuple[float, float]:
@@ -315,9 +315,9 @@ def constants_of(elastic: ElasticBody, key: str, cells: NDArray[np.int64] | slic
     """
     if not isinstance(elastic.law, Isotropic):
         raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: half-spaces are isotropic"))
-    found = np.concatenate(elastic.body.mesh.comm.allgather(cell_constants(elastic)[cells]))
-    if (np.ptp(found, axis=0) > SAME * found.max()).any():
+    constants = np.concatenate(elastic.body.mesh.comm.allgather(cell_constants(elastic)[cells]))
+    if (np.ptp(constants, axis=0) > SAME * constants.max()).any():
         message = "expected one material at the contact, got several: take 'condensed', or a smaller grid.size"
         raise CaseError(InputError(key, message))
-    first, second = found[0]
+    first, second = constants[0]
     return float(second), float(first / (2 * (first + second)))

@@ -52,12 +52,12 @@ class RawMesh:
         named = {
             "groups": self.groups,
             "points": {name: x.tolist() for name, x in self.points.items()},
-            "kinds": [(one.dim, one.group, one.kind) for one in self.elements],
+            "kinds": [(block.dim, block.group, block.kind) for block in self.elements],
         }
         return {
             "x": self.x,
             "named": np.frombuffer(json.dumps(named).encode(), dtype=np.uint8),
-            **{f"elements{number}": one.nodes for number, one in enumerate(self.elements)},
+            **{f"elements{number}": block.nodes for number, block in enumerate(self.elements)},
         }
 
     @classmethod
@@ -88,16 +88,16 @@ class GmshView:
 
     def getPhysicalGroups(self, dim: int = -1) -> list[tuple[int, int]]:  # noqa: N802
         """Return the dimension and tag of the groups."""
-        return sorted({(one.dim, one.group) for one in self.raw.elements if dim in (-1, one.dim)})
+        return sorted({(block.dim, block.group) for block in self.raw.elements if dim in (-1, block.dim)})
 
     def getPhysicalName(self, dim: int, tag: int) -> str:  # noqa: N802
         """Return the name of a group."""
-        return next(name for name, own in self.raw.groups[dim].items() if own == tag)
+        return next(name for name, number in self.raw.groups[dim].items() if number == tag)
 
     def getEntitiesForPhysicalGroup(self, dim: int, tag: int) -> list[int]:  # noqa: N802
         """Return the entities of a group."""
-        found = enumerate(self.raw.elements, start=1)
-        return [entity for entity, one in found if (one.dim, one.group) == (dim, tag)]
+        numbered = enumerate(self.raw.elements, start=1)
+        return [entity for entity, block in numbered if (block.dim, block.group) == (dim, tag)]
 
     def getNodes(self) -> tuple[NDArray[np.int64], Array, Array]:  # noqa: N802
         """Return the tags of the nodes and their coordinates, one after the other."""
@@ -106,29 +106,29 @@ class GmshView:
     def getElements(self, dim: int = -1, tag: int = -1) -> tuple[list[int], list[Any], list[Any]]:  # noqa: N802
         """Return the kinds of the elements of an entity, or of all, with their tags and their nodes."""
         kinds: dict[int, tuple[list[Any], list[Any]]] = {}
-        for one, tags in self._tagged(dim, tag):
-            of_kind = kinds.setdefault(one.kind, ([], []))
+        for block, tags in self._tagged(dim, tag):
+            of_kind = kinds.setdefault(block.kind, ([], []))
             of_kind[0].append(tags)
-            of_kind[1].append(one.nodes.ravel() + 1)
+            of_kind[1].append(block.nodes.ravel() + 1)
         joined = [(np.concatenate(tags), np.concatenate(nodes)) for tags, nodes in kinds.values()]
         return list(kinds), [of_kind[0] for of_kind in joined], [of_kind[1] for of_kind in joined]
 
     def getElementProperties(self, kind: int) -> tuple[str, int, int, int, Array, int]:  # noqa: N802
         """Return the properties of a kind of element: second its dimension, fourth the number of its nodes."""
-        one = next(one for one in self.raw.elements if one.kind == kind)
-        return "", one.dim, 0, one.nodes.shape[1], np.empty(0), 0
+        block = next(known for known in self.raw.elements if known.kind == kind)
+        return "", block.dim, 0, block.nodes.shape[1], np.empty(0), 0
 
     def _tagged(self, dim: int, entity: int) -> Iterator[tuple[Elements, NDArray[np.int64]]]:
         """Find elements by dimension and entity, -1 for all of them, with their tags."""
         first = 1
-        for number, one in enumerate(self.raw.elements, start=1):
-            tags = np.arange(first, first + len(one.nodes))
-            first += len(one.nodes)
-            if dim in (-1, one.dim) and entity in (-1, number):
-                yield one, tags
+        for number, block in enumerate(self.raw.elements, start=1):
+            tags = np.arange(first, first + len(block.nodes))
+            first += len(block.nodes)
+            if dim in (-1, block.dim) and entity in (-1, number):
+                yield block, tags
 
 
-def raw_mesh(mesh: GroupedMesh, body: str, whole: int) -> RawMesh:
+def raw_mesh(mesh: GroupedMesh, body: str, dim: int) -> RawMesh:
     """Return the part of a body of a mesh, its nodes numbered without gaps.
 
     Args:
@@ -136,18 +136,25 @@ def raw_mesh(mesh: GroupedMesh, body: str, whole: int) -> RawMesh:
         body: "punch" or "strip": what the names of its groups start with.
         whole: Dimension of the bodies.
     """
-    own = sorted((one for one in mesh.groups if one.name.startswith(f"{body}_")), key=lambda one: -one.dim)
-    groups: list[dict[str, int]] = [{} for _ in range(whole + 1)]
-    for tag, one in enumerate(own, start=1):
-        groups[one.dim][one.name] = tag
-    used = np.unique(np.concatenate([cells.ravel() for one in own if one.dim == whole for cells in one.cells.values()]))
+    body_groups = sorted(
+        (group for group in mesh.groups if group.name.startswith(f"{body}_")), key=lambda group: -group.dim
+    )
+    groups: list[dict[str, int]] = [{} for _ in range(dim + 1)]
+    for tag, mesh_group in enumerate(body_groups, start=1):
+        groups[mesh_group.dim][mesh_group.name] = tag
+    used = np.unique(
+        np.concatenate([cells.ravel() for group in body_groups if group.dim == dim for cells in group.cells.values()])
+    )
     elements = (
-        Elements(one.dim, groups[one.dim][one.name], kind, np.searchsorted(used, cells))
-        for one in own
-        if one.dim >= whole - 1
-        for kind, cells in one.cells.items()
+        Elements(group.dim, groups[group.dim][group.name], kind, np.searchsorted(used, cells))
+        for group in body_groups
+        if group.dim >= dim - 1
+        for kind, cells in group.cells.items()
     )
     points = {
-        one.name: mesh.points[cells.ravel(), :whole] for one in own if not one.dim for cells in one.cells.values()
+        group.name: mesh.points[cells.ravel(), :dim]
+        for group in body_groups
+        if not group.dim
+        for cells in group.cells.values()
     }
     return RawMesh(mesh.points[used], tuple(elements), groups, points)

@@ -109,11 +109,11 @@ def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | N
 
     Bodies whose factors are on different ranks are solved at once.
     """
-    answers = [_Answer(one) for one in requests]
+    answers = [_Answer(request) for request in requests]
     response = [answer.solve() for answer in answers]
     for answer in answers:
         answer.factor.free_copies()
-    return [answer.shared(*one) for answer, one in zip(answers, response, strict=True)]
+    return [answer.shared(*solved) for answer, solved in zip(answers, response, strict=True)]
 
 
 class _Answer:
@@ -186,18 +186,18 @@ class _Answer:
         """Return the response on every rank, and to each its part of that to temperature (q a, owned); collective."""
         if not self.factor.is_spread and self.comm.size > 1:  # where it is spread, equal to the last bit on all ranks
             counts = np.diff(self._temperatures)
-            own: Array = np.empty((self.request.count, counts[self.comm.rank] if len(counts) else 0))
+            local_part: Array = np.empty((self.request.count, counts[self.comm.rank] if len(counts) else 0))
             for some, rank in self._blocks():
                 block = np.ascontiguousarray(response[:, :, some])
                 self.comm.Bcast(block, root=rank)
                 response[:, :, some] = block
                 if len(counts):
-                    part = np.empty((own.shape[1], some.stop - some.start))
+                    part = np.empty((local_part.shape[1], some.stop - some.start))
                     sizes: Any = counts * part.shape[1]
                     sent = None if warm is None else (np.ascontiguousarray(warm[some].T), sizes)
                     self.comm.Scatterv(sent, part, root=rank)
-                    own[some] = part.T
-            warm = own if len(counts) else None
+                    local_part[some] = part.T
+            warm = local_part if len(counts) else None
         return response, warm
 
 

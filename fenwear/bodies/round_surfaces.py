@@ -58,21 +58,21 @@ def rounds_of(
         part: The connected part that each facet belongs to (f,).
         outward: Unit normals out of the body at the nodes (N, d), zero where they are not known.
     """
-    found: list[Round] = []
+    rounds: list[Round] = []
     which = np.full(len(trace), -1)
     for k in np.unique(part):
-        own = facets[part == k]
-        nodes = np.unique(own)
+        part_facets = facets[part == k]
+        nodes = np.unique(part_facets)
         x, normal = trace[nodes], outward[nodes]
-        one = _fitted(x, normal)
-        if one is None:
+        round_part = _fitted(x, normal)
+        if round_part is None:
             continue
-        sizes = np.linalg.norm(np.ptp(trace[own], axis=1), axis=1)
-        if sizes.max() > COARSE * one.radius:
+        sizes = np.linalg.norm(np.ptp(trace[part_facets], axis=1), axis=1)
+        if sizes.max() > COARSE * round_part.radius:
             continue
-        which[nodes] = len(found)
-        found.append(one)
-    return found, which
+        which[nodes] = len(rounds)
+        rounds.append(round_part)
+    return rounds, which
 
 
 def _fitted(x: Array, normal: Array) -> Round | None:
@@ -83,12 +83,12 @@ def _fitted(x: Array, normal: Array) -> Round | None:
     for middle, axis, radius in _candidates(x, normal):
         if not radius < FLAT * size:
             continue
-        one = Round(middle, axis, radius, 1.0)
-        ways = one.ways(x)
+        fitted = Round(middle, axis, radius, 1.0)
+        ways = fitted.ways(x)
         if np.abs(np.linalg.norm(ways, axis=1) - radius).max() > TRUE * size:
             continue
         inside = float(np.einsum("nc,nc->", ways, normal)) > 0
-        return one if inside else Round(middle, axis, radius, -1.0)
+        return fitted if inside else Round(middle, axis, radius, -1.0)
     return None
 
 
@@ -97,11 +97,13 @@ def _candidates(x: Array, normal: Array) -> list[tuple[Array, Array, float]]:
     origin = x.mean(axis=0)
     arm = x - origin
     # |x|^2 = 2 c x + (R^2 - |c|^2), in least squares; of a plane there is none.
-    found, _, rank, _ = np.linalg.lstsq(np.column_stack([2 * arm, np.ones(len(x))]), (arm**2).sum(axis=1), rcond=1e-12)
+    solution, _, rank, _ = np.linalg.lstsq(
+        np.column_stack([2 * arm, np.ones(len(x))]), (arm**2).sum(axis=1), rcond=1e-12
+    )
     candidates: list[tuple[Array, Array, float]] = []
     if rank == x.shape[1] + 1:
-        centre = found[:-1]
-        candidates.append((origin + centre, np.zeros_like(centre), float(np.sqrt(found[-1] + centre @ centre))))
+        centre = solution[:-1]
+        candidates.append((origin + centre, np.zeros_like(centre), float(np.sqrt(solution[-1] + centre @ centre))))
     if x.shape[1] == 3:
         candidates.append(_cylinder(x, normal))
     return candidates

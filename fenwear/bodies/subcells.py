@@ -49,11 +49,11 @@ def _simplices(lattice: NDArray[np.int64]) -> NDArray[np.int64]:
     dim = lattice.shape[1]
     sums = np.cumsum(lattice[:, ::-1], axis=1)[:, ::-1]
     node = {tuple(int(n) for n in sums[k]): k for k in range(len(sums))}
-    found = []
+    simplices = []
     for start in node:
         for order in permutations(range(dim)):
             steps = np.cumsum(np.eye(dim, dtype=np.int64)[list(order)], axis=0)
             way = [start, *(tuple(int(n) for n in corner) for corner in np.array(start) + steps)]
             if all(corner in node for corner in way):
-                found.append([node[corner] for corner in way])
-    return np.array(found, dtype=np.int64)
+                simplices.append([node[corner] for corner in way])
+    return np.array(simplices, dtype=np.int64)

@@ -128,7 +128,7 @@ class Substructures(Factor):
         inner = np.setdiff1d(np.unique(np.concatenate(numbers)), self._stays)
         order = np.concatenate([inner, self._stays])
         ascending = np.argsort(order)
-        self._places = [ascending[np.searchsorted(order[ascending], own)] for own in numbers]
+        self._places = [ascending[np.searchsorted(order[ascending], of_rank)] for of_rank in numbers]
         joint = np.zeros((len(order), len(order)))
         for at, part in zip(self._places, parts, strict=True):
             joint[np.ix_(at, at)] += part
@@ -149,21 +149,23 @@ class Substructures(Factor):
         self._local[: self._owned] = right  # what ranks share counts on its owner alone
         assert self._inside is not None
         self._forces = solved(self._inside, self._local)[self._boundary.local]
-        found = self.comm.gather(self._forces, root=self.owner)
-        whole: Array = np.zeros((len(self._joint), right.shape[1]))
-        for at, forces in zip(self._places, found or [], strict=True):
-            whole[at] += forces
-        return whole
+        gathered = self.comm.gather(self._forces, root=self.owner)
+        joint: Array = np.zeros((len(self._joint), right.shape[1]))
+        for at, forces in zip(self._places, gathered or [], strict=True):
+            joint[at] += forces
+        return joint
 
     def solve_here(self, right: Array) -> Array:
         """Return the displacements of all boundaries, on the owner."""
         return np.asarray(scipy.linalg.cho_solve((self._joint, True), right)) if self.is_owner else right
 
-    def scatter(self, found: Array, columns: int) -> Array:
+    def scatter(self, solutions: Array, columns: int) -> Array:
         """Return this rank's part of solutions (owned, k); collective."""
         del columns
-        own = self.comm.scatter([found[at] for at in self._places] if self.is_owner else None, root=self.owner)
-        self._local[self._boundary.local] += own - self._forces
+        local_part = self.comm.scatter(
+            [solutions[at] for at in self._places] if self.is_owner else None, root=self.owner
+        )
+        self._local[self._boundary.local] += local_part - self._forces
         assert self._inside is not None
         return solved(self._inside, self._local)[: self._owned]
 

@@ -79,10 +79,10 @@ class Supports:
         self._pivots = self._pivots_of(description)
         self.pivot = self._pivots[0]
         self.imposed = fem.Function(space)
-        own = [*self._described(description.supports), *self._on_axis()]
+        held = [*self._described(description.supports), *self._on_axis()]
         self.loose: list[Loose] = []
-        self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
-        self.conditions = own + self._regularise()
+        self.modes, self.names, self._loose = self._free_modes(self._owned(held), description.no_turning_about)
+        self.conditions = held + self._regularise()
         self.held = self._owned(self.conditions)
         self.mirrors = self._mirrors(description.supports)
 
@@ -102,16 +102,16 @@ class Supports:
         return planes
 
     def _described(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
-        key, found = f"{self.body.name}.supports", []
+        key, conditions = f"{self.body.name}.supports", []
         for number, support in enumerate(supports):
             for axis, moved in zip(support.fix, support.by or (0.0,) * len(support.fix), strict=True):
                 component = self._component(axis, f"{key}.{number}.fix")
                 dofs = self._support_dofs(support, component, f"{key}.{number}")
-                found.append(self._condition(component, dofs))
+                conditions.append(self._condition(component, dofs))
                 if moved:
                     self.imposed.x.array[dofs] = moved
         self.imposed.x.scatter_forward()
-        return found
+        return conditions
 
     def _on_axis(self) -> list[fem.DirichletBC]:
         """Return the support u_r = 0 at r = 0 of an axisymmetric body, without which u_r / r is not finite."""
@@ -140,8 +140,8 @@ class Supports:
         x = collapsed.tabulate_dof_coordinates()[:, : points.shape[1]]
         distance = np.linalg.norm(x[:, None] - points[None], axis=2)
         tolerance = 1e-6 * self._size()
-        found = body.mesh.comm.allreduce((distance < tolerance).any(axis=0).astype(int))
-        missing = points[found == 0]
+        counts = body.mesh.comm.allreduce((distance < tolerance).any(axis=0).astype(int))
+        missing = points[counts == 0]
         if len(missing):
             place = ", ".join("(" + ", ".join(f"{c:g}" for c in p) + ")" for p in missing)
             raise CaseError(InputError(f"{key}.at", f"the {body.name} has no node at {place} mm. Name a node"))
@@ -192,11 +192,11 @@ class Supports:
         owned = np.repeat(part, self.dim)
         of_nodes = np.rint(self._trace.pick(owned[:, None].astype(float))[surface.nodes, 0, 0]).astype(np.int64)
         for k in range(count):
-            found = self._modes_of(k, owned == k, surface.outward[of_nodes == k], held, guided)
-            modes += found[0]
-            names += [name if count == 1 else f"{name}_{self._part_name(of_nodes, k)}" for name in found[1]]
-            loose += found[2]
-            if found[0] and not (of_nodes == k).any():
+            free = self._modes_of(k, owned == k, surface.outward[of_nodes == k], held, guided)
+            modes += free[0]
+            names += [name if count == 1 else f"{name}_{self._part_name(of_nodes, k)}" for name in free[1]]
+            loose += free[2]
+            if free[0] and not (of_nodes == k).any():
                 raise CaseError(InputError(f"{self.body.name}.supports", self._untouched(k)))
         return modes, names, loose
 
@@ -226,7 +226,7 @@ class Supports:
             return [np.array(description.pivot)] * self._count
         body, comm, tolerance = self.body, self.body.mesh.comm, 1e-6 * self._size()
         nodes = self.space.tabulate_dof_coordinates()[: len(self._part), : self.dim]
-        found = np.full((self._count, self.dim), np.nan)
+        pivots = np.full((self._count, self.dim), np.nan)
         for number, support in enumerate(description.supports):
             if support.on is not None and support.on not in body.points:
                 continue
@@ -235,9 +235,9 @@ class Supports:
             parts = np.where(distance < tolerance, self._part[:, None], -1).max(axis=0, initial=-1)
             parts = np.max(comm.allgather(parts), axis=0)
             for k in range(self._count):
-                if np.isnan(found[k]).any() and (parts == k).any():
-                    found[k] = points[parts == k].mean(axis=0)
-        return list(np.nan_to_num(found))
+                if np.isnan(pivots[k]).any() and (parts == k).any():
+                    pivots[k] = points[parts == k].mean(axis=0)
+        return list(np.nan_to_num(pivots))
 
     def _untouched(self, k: int) -> str:
         """Say which part neither touches nor is held; collective."""
@@ -246,13 +246,13 @@ class Supports:
         return _parts_text(self.body.name, part_boxes(self.body.mesh, part, count), k)
 
     def _modes_of(
-        self, number: int, own: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
+        self, number: int, in_part: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
     ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
         """Return the free modes of a part with these degrees of freedom (owned,) and contact normals (k, d)."""
         names, forbidden = _balanced(self.kind, normal)
         columns = [*names, *forbidden]
         turns = [self._turn(axis) for axis in guided]
-        basis, comm = self.rigid_basis(self._pivots[number])[:, columns] * own[:, None], self.body.mesh.comm
+        basis, comm = self.rigid_basis(self._pivots[number])[:, columns] * in_part[:, None], self.body.mesh.comm
         rows = basis[held]
         gram = comm.allreduce(rows.T @ rows)
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())

@@ -150,12 +150,14 @@ def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: boo
         CaseError: a body is none for its operator.
         ConvergenceError: a stiffness has no factor.
     """
-    found = {k: _decided(one) for k, one in enumerate(requests) if one.elastic.operator == AUTO}
-    wanted = [one.on_mesh() for one in requests if one.elastic.operator == CONDENSED]
+    decided = {k: _decided(request) for k, request in enumerate(requests) if request.elastic.operator == AUTO}
+    wanted = [request.on_mesh() for request in requests if request.elastic.operator == CONDENSED]
     condensed = iter(condense_together(wanted, keep=keep, fresh=fresh) if wanted else [])
     return [
-        next(condensed) if one.elastic.operator == CONDENSED else found.get(k) or OPERATORS[one.elastic.operator](one)
-        for k, one in enumerate(requests)
+        next(condensed)
+        if request.elastic.operator == CONDENSED
+        else decided.get(k) or OPERATORS[request.elastic.operator](request)
+        for k, request in enumerate(requests)
     ]
 
 
@@ -167,7 +169,7 @@ def _decided(request: Request) -> SurfaceOperator | None:
     """
     elastic, key = request.elastic, f"{request.elastic.body.name}.operator"
     try:
-        found = fine(request)
+        decided = fine(request)
     except CaseError as error:
         if elastic.reach is not None or elastic.mortar is None:
             raise
@@ -175,5 +177,5 @@ def _decided(request: Request) -> SurfaceOperator | None:
         elastic.taken = f"{key}: '{CONDENSED}' is used: {error}"
         return None
     elastic.operator = "fine"
-    elastic.taken = f"{key}: 'fine' is used: polynomials leave {100 * found.unresolved:.2g} % of the compliance"
-    return found
+    elastic.taken = f"{key}: 'fine' is used: polynomials leave {100 * decided.unresolved:.2g} % of the compliance"
+    return decided

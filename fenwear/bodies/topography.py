@@ -49,11 +49,11 @@ def _wave(wanted: Topography, grid: RegularGrid, key: str) -> Array:
     assert wanted.wavelength is not None
     if len(wanted.wavelength) > len(grid.counts):
         raise CaseError(InputError(f"{key}.wavelength", f"expected {len(grid.counts)} length(s)"))
-    found = np.full(len(grid.flat), float(wanted.amplitude or 0.0))
+    heights = np.full(len(grid.flat), float(wanted.amplitude or 0.0))
     for axis, length in enumerate(wanted.wavelength):
         _fine_enough(grid, axis, length, f"{key}.wavelength")
-        found *= np.cos(2 * np.pi * (grid.flat[:, axis] - grid.middle[axis]) / length)
-    return found
+        heights *= np.cos(2 * np.pi * (grid.flat[:, axis] - grid.middle[axis]) / length)
+    return heights
 
 
 def _fine_enough(grid: RegularGrid, axis: int, length: float, key: str) -> None:
@@ -75,15 +75,15 @@ def _self_affine(wanted: Topography, grid: RegularGrid, key: str) -> Array:
     if wanted.longest <= shortest:
         raise CaseError(InputError(f"{key}.longest", f"expected more than the shortest wave length, {shortest:.4g} mm"))
     waves = [2 * np.pi * np.fft.fftfreq(k, step) for k, step in zip(grid.counts, grid.spacing, strict=True)]
-    q = np.sqrt(sum(one**2 for one in np.meshgrid(*waves, indexing="ij")))
+    q = np.sqrt(sum(component**2 for component in np.meshgrid(*waves, indexing="ij")))
     has = (q >= 2 * np.pi / wanted.longest * (1 - 1e-9)) & (q <= 2 * np.pi / shortest)
     if not has.any():
         raise CaseError(InputError(f"{key}.longest", "no wave of these lengths fits on the contact grid"))
     d = len(grid.counts)
     spectrum = np.where(has, np.where(has, q, 1.0) ** (-(wanted.hurst + d / 2)), 0.0)
     noise = np.fft.fftn(np.random.default_rng(wanted.seed).standard_normal(grid.counts))
-    found = np.fft.ifftn(spectrum * noise / np.maximum(np.abs(noise), 1e-300)).real.ravel()
-    return np.asarray(found * (wanted.rms or 0.0) / np.sqrt(np.mean(found**2)))
+    heights = np.fft.ifftn(spectrum * noise / np.maximum(np.abs(noise), 1e-300)).real.ravel()
+    return np.asarray(heights * (wanted.rms or 0.0) / np.sqrt(np.mean(heights**2)))
 
 
 def _measured(path: Path, wanted: Topography, key: str) -> Heights:
@@ -93,22 +93,24 @@ def _measured(path: Path, wanted: Topography, key: str) -> Heights:
         CaseError: it cannot be read, or has holes that are not to be filled.
     """
     try:
-        found = read_heights(path)
+        measured = read_heights(path)
     except CaseError as error:
         raise CaseError([InputError(f"{key}.file", problem.message) for problem in error.problems]) from None
-    missing = int((~np.isfinite(found.heights)).sum())
+    missing = int((~np.isfinite(measured.heights)).sum())
     if wanted.holes == "keep":
-        found = replace(found, far=np.zeros_like(found.far))
-    if found.holes and wanted.holes != "fill":
-        far = f", {found.far.sum()} of them fill values or spikes far beyond the others" if found.far.any() else ""
+        measured = replace(measured, far=np.zeros_like(measured.far))
+    if measured.holes and wanted.holes != "fill":
+        far = (
+            f", {measured.far.sum()} of them fill values or spikes far beyond the others" if measured.far.any() else ""
+        )
         kept = "" if missing else ", or 'keep' if these heights are real"
-        message = f"{path.name} has {found.holes} holes{far}. Set {key}.holes = 'fill'{kept}."
+        message = f"{path.name} has {measured.holes} holes{far}. Set {key}.holes = 'fill'{kept}."
         raise CaseError(InputError(f"{key}.file", message))
     try:
-        found = found.filled() if found.holes else found
+        measured = measured.filled() if measured.holes else measured
     except ValueError as error:
         raise CaseError(InputError(f"{key}.file", f"{path.name}: {error}")) from None
-    return found if wanted.level is None else found.levelled(wanted.level)
+    return measured if wanted.level is None else measured.levelled(wanted.level)
 
 
 def _interpolated(measured: Heights, grid: RegularGrid, key: str) -> Array:
@@ -117,12 +119,14 @@ def _interpolated(measured: Heights, grid: RegularGrid, key: str) -> Array:
 
     if len(measured.places) != len(grid.counts):
         raise CaseError(InputError(key, f"has {len(measured.places)} coordinate(s), the contact {len(grid.counts)}"))
-    for axis, own in enumerate(measured.places):
-        spare = np.ptp(own) * (1 + SLACK) - grid.sides[axis]
+    for axis, places in enumerate(measured.places):
+        spare = np.ptp(places) * (1 + SLACK) - grid.sides[axis]
         if spare < 0:
-            message = f"is {np.ptp(own):.4g} mm long, the contact grid {grid.sides[axis]:.4g}: expected a map over it"
+            message = (
+                f"is {np.ptp(places):.4g} mm long, the contact grid {grid.sides[axis]:.4g}: expected a map over it"
+            )
             raise CaseError(InputError(key, message))
-        step = float(np.median(np.diff(own)))
+        step = float(np.median(np.diff(places)))
         if grid.spacing[axis] > COARSE / 2 * step:
             nodes = int(float(np.max(grid.sides)) / step) + 1
             message = (
@@ -130,8 +134,8 @@ def _interpolated(measured: Heights, grid: RegularGrid, key: str) -> Array:
                 f"too coarse for its roughness. Set grid.nodes = {nodes}, or average the map"
             )
             raise CaseError(InputError(key, message))
-    middles = np.array([(own[0] + own[-1]) / 2 for own in measured.places])
+    middles = np.array([(axis_places[0] + axis_places[-1]) / 2 for axis_places in measured.places])
     at = grid.flat - grid.middle + middles
-    low, high = (np.array([own[end] for own in measured.places]) for end in (0, -1))
+    low, high = (np.array([axis_places[end] for axis_places in measured.places]) for end in (0, -1))
     read = RegularGridInterpolator(measured.places, measured.heights)
     return np.asarray(read(np.clip(at, low, high)))

@@ -179,7 +179,7 @@ def _extended(
 ) -> Array:
     """Return the harmonic function of values at the trace nodes (N,), 0 at `fixed`, at all nodes; collective."""
     given, zero = fem.Function(space), fem.Function(space)
-    given.x.array[trace.local] = values[trace.own]
+    given.x.array[trace.local] = values[trace.owned]
     given.x.scatter_forward()
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     a = compiled(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)

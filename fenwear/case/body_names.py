@@ -69,7 +69,7 @@ class Names:
         wrong = next((name for name in between if not NAME.fullmatch(name)), None)
         if wrong is not None:
             message = f"expected words of letters, digits, - and _, such as 'pad', got {wrong!r}"
-        elif any(f"{one}_".startswith(f"{other}_") for one, other in names.to_keep_apart):
+        elif any(f"{first}_".startswith(f"{other}_") for first, other in names.to_keep_apart):
             message = f"expected names that keep the bodies' groups apart, got {above!r}, {below!r}"
         else:
             return names
@@ -129,7 +129,7 @@ class Names:
         return (lambda message: log(self.with_names(message))) if self.given else log
 
     @contextmanager
-    def told_in_errors(self) -> Iterator[None]:
+    def names_in_errors(self) -> Iterator[None]:
         """Let the errors of a block have the bodies' names."""
         try:
             yield
@@ -164,14 +164,14 @@ class Names:
 BY_ROLE = Names()
 
 
-def told_by_name(function: Callable[P, T]) -> Callable[P, T]:
+def with_body_names(function: Callable[P, T]) -> Callable[P, T]:
     """Let the errors of a function have the names of the bodies of the case, or of the system, that it is given."""
 
     @wraps(function)
     def named(*args: P.args, **kwargs: P.kwargs) -> T:
-        given = (getattr(one, "names", None) for one in (*args, *kwargs.values()))
-        names = next((one for one in given if isinstance(one, Names)), BY_ROLE)
-        with names.told_in_errors():
+        given = (getattr(argument, "names", None) for argument in (*args, *kwargs.values()))
+        names = next((candidate for candidate in given if isinstance(candidate, Names)), BY_ROLE)
+        with names.names_in_errors():
             return function(*args, **kwargs)
 
     return named
@@ -190,7 +190,7 @@ def renamed(data: Any, change: Callable[[str], str]) -> Any:
         if key == "on" and isinstance(value, str):
             tables[key] = change(value)
         elif key == "regions" and isinstance(value, Mapping):
-            tables[key] = {change(name) if isinstance(name, str) else name: one for name, one in value.items()}
+            tables[key] = {change(name) if isinstance(name, str) else name: entry for name, entry in value.items()}
         else:
             tables[key] = renamed(value, change)
     return tables

@@ -26,8 +26,8 @@ OF = ("T", "p", "v", "x", "y", "z")  # what the share of asperities and the film
 CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `system.contact_laws`
 
 
-def _own_or_registered(name: Any, own: Callable[[Any], Any]) -> Any:
-    return name if isinstance(name, str) and name in CONTACT_LAWS else own(name)
+def _built_in_or_registered(name: Any, handler: Callable[[Any], Any]) -> Any:
+    return name if isinstance(name, str) and name in CONTACT_LAWS else handler(name)
 
 
 class ThirdBody(Part):
@@ -198,7 +198,7 @@ class Lubrication(Part):
 class Contact(Part):
     """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
 
-    law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_own_or_registered)] = Field(
+    law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_built_in_or_registered)] = Field(
         default="auto",
         description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, as "
         "in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically "
@@ -243,7 +243,7 @@ class Contact(Part):
         if name == "p" and any(self.splits_pressure(law) for law in wear):
             return True
         given = (law.given_coefficient for law in wear)
-        return lost or self.friction_asks(name) or any(depends_on(one, name) for one in given)
+        return lost or self.friction_asks(name) or any(depends_on(law, name) for law in given)
 
     @property
     def uniform_share(self) -> float | None:

@@ -109,8 +109,8 @@ def _build(node: ast.AST, text: str, depth: int) -> Function:
                 (only,) = inners
                 return lambda state: function(only(state))
             return lambda state: function(*(inner(state) for inner in inners))
-    found = ast.get_source_segment(text, node) or type(node).__name__  # ast.unparse may exhaust the stack
-    raise ValueError(f"expected an expression of {KNOWN}; {found!r} is not known in {text!r}")
+    source = ast.get_source_segment(text, node) or type(node).__name__  # ast.unparse may exhaust the stack
+    raise ValueError(f"expected an expression of {KNOWN}; {source!r} is not known in {text!r}")
 
 
 def _constant(value: float, text: str) -> Function:
@@ -217,13 +217,13 @@ def register_law(
         raise CaseError(InputError("law", f"expected a word as the name of a law, got {str(name)!r}"))
     if not callable(function):
         raise CaseError(InputError(key, "expected a function of the state"))
-    own = dict(states)
-    known = {**_STATES, **own}
+    new_states = dict(states)
+    known = {**_STATES, **new_states}
     _check_of(key, of, (*VARIABLES, *known))
-    for word, state in own.items():
+    for word, state in new_states.items():
         _check_state(word, state, (*VARIABLES, WEAR, *known))
-    _STATES.update(own)
-    _LAWS[name] = _Law(function, frozenset({*of, *own}))
+    _STATES.update(new_states)
+    _LAWS[name] = _Law(function, frozenset({*of, *new_states}))
     return function
 
 
@@ -234,7 +234,7 @@ def forget_laws() -> None:
 
 
 def _check_of(key: str, of: Sequence[str], known: Sequence[str]) -> None:
-    unknown = [one for one in of if one not in known]
+    unknown = [variable for variable in of if variable not in known]
     if unknown or isinstance(of, str):
         message = f"expected a list of some of {', '.join(known)}, got {unknown[0] if unknown else of!r}"
         raise CaseError(InputError(key, message))
@@ -274,7 +274,9 @@ def states_of_law(name: str) -> dict[str, State]:
 def variables_of_law(name: str) -> frozenset[str]:
     """Return the variables of a registered law and of its states; none of an unknown law."""
     states = states_of_law(name)
-    return frozenset({*(_LAWS[name].of if name in _LAWS else ()), *(one for s in states.values() for one in s.of)})
+    return frozenset(
+        {*(_LAWS[name].of if name in _LAWS else ()), *(variable for s in states.values() for variable in s.of)}
+    )
 
 
 def check_law(name: str) -> None:
@@ -316,23 +318,23 @@ def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now
         not math.isfinite(float(values @ values)) and not np.isfinite(values).all()
     ):  # a square may be beyond all numbers
         node = int(np.flatnonzero(~np.isfinite(values))[0])
-        at = ", ".join(f"{one} = {np.broadcast_to(now[one], shape)[node]:g}" for one in of)
+        at = ", ".join(f"{variable} = {np.broadcast_to(now[variable], shape)[node]:g}" for variable in of)
         raise CaseError(InputError(f"state {name!r}", f"expected finite numbers, got {values[node]:g} at {at}"))
     return values
 
 
-def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
+def _called(subject: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
     given = {key: now[key].copy() if now[key].shape == shape else np.full(shape, now[key]) for key in of}
     try:
-        found = np.asarray(function(given))
-        if found.dtype.kind == "c":
+        result = np.asarray(function(given))
+        if result.dtype.kind == "c":
             raise ValueError("it gives complex numbers")
-        values = found.astype(float)  # a copy of what may be the user's own
+        values = result.astype(float)  # a copy of what may be the user's own
     except KeyError as error:
         named = ", ".join(sorted(given))
-        raise ValueError(f"{what} needs {error}, and `of` names {named}. Add it to `of`") from error
+        raise ValueError(f"{subject} needs {error}, and `of` names {named}. Add it to `of`") from error
     except Exception as error:  # a user's own code may raise anything
-        raise ValueError(f"{what} fails: {error}") from error
+        raise ValueError(f"{subject} fails: {error}") from error
     if values.shape not in ((), shape):
-        raise ValueError(f"{what} gives {values.shape} values; expected one for each of {shape[0]} nodes")
+        raise ValueError(f"{subject} gives {values.shape} values; expected one for each of {shape[0]} nodes")
     return values if values.shape == shape else np.full(shape, values)

@@ -155,10 +155,10 @@ AGAINST_STICK = (
 
 def case_problems(case: Case) -> list[str]:
     """Return the problems of a case: each a key and the expected value."""
-    found = [check.message for check in CHECKS if check.wrong(case)]
+    messages = [check.message for check in CHECKS if check.wrong(case)]
     if case.sticks:
-        found += [f"{problem} with contact.law = 'coulomb'" for problem in case.against_stick]
-    return [*found, *chain(*(problems(case) for problems in SUBJECTS))]
+        messages += [f"{problem} with contact.law = 'coulomb'" for problem in case.against_stick]
+    return [*messages, *chain(*(problems(case) for problems in SUBJECTS))]
 
 
 def turning(case: Case) -> bool:

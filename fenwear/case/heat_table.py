@@ -170,6 +170,6 @@ def diffusion_of(motion: OneWay | Rotation, steps: Iterable[Any], materials: Ite
         if isinstance(motion, OneWay)
         else ("diffusion_area", "angular_speed", motion.angular_speed)
     )
-    fastest = max([speed, *(one for step in steps for one in getattr(step, key) or ())])
+    fastest = max([speed, *(step_speed for step in steps for step_speed in getattr(step, key) or ())])
     diffusivities = [(m.conductivity or 0.0) / ((m.density or 0.0) * (m.heat_capacity or 0.0)) for m in materials]
     return {name: min(diffusivities) / fastest} if fastest > 0 else {}

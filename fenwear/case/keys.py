@@ -80,12 +80,12 @@ READ_FIRST = {
 
 def all_keys() -> list[Key]:
     """Return every key of a case file, tables before what is in them."""
-    found = [*(key for key in READ_FIRST.values() if "." not in key.path), *_keys(Case, "", "")]
+    listed = [*(key for key in READ_FIRST.values() if "." not in key.path), *_keys(Case, "", "")]
     for path, key in READ_FIRST.items():
         if "." in path:
-            table = next(n for n, other in enumerate(found) if other.path == path.rpartition(".")[0])
-            found.insert(table + 1, key)
-    return found
+            table = next(n for n, other in enumerate(listed) if other.path == path.rpartition(".")[0])
+            listed.insert(table + 1, key)
+    return listed
 
 
 def find_keys(path: str) -> list[Key]:
@@ -98,16 +98,16 @@ def find_keys(path: str) -> list[Key]:
         CaseError: there is none; names the nearest.
     """
     keys = all_keys()
-    found = [key for key in keys if _matches(key.path, path)]
-    if not found:
+    matching = [key for key in keys if _matches(key.path, path)]
+    if not matching:
         known = list(dict.fromkeys(key.path for key in keys))
         last = path.rpartition(".")[2]
         same = [key for key in known if key.rpartition(".")[2] == last]
         close = same or difflib.get_close_matches(path, known, 3, 0.5)
         hint = f"; did you mean {' or '.join(close[:3])}?" if close else "; fenwear info KEY explains one key or table"
         raise CaseError(InputError(path, f"no such key{hint}"))
-    below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in found)]
-    return [*found, *below]
+    below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in matching)]
+    return [*matching, *below]
 
 
 def _matches(pattern: str, path: str) -> bool:
@@ -143,8 +143,8 @@ def _below(field: FieldInfo, parts: list[Any], path: str, kind: str) -> Iterator
     yield replace(key, table=bool(parts))
     for part in parts:
         words = get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
-        own = str(words[0]) if len(words) == 1 else kind
-        yield from _keys(part, f"{path}{listed}.", own)
+        part_kind = str(words[0]) if len(words) == 1 else kind
+        yield from _keys(part, f"{path}{listed}.", part_kind)
     if not parts and get_origin(field.annotation) is dict:
         yield replace(key, path=f"{path}.NAME", values=_values(get_args(field.annotation)[1]), default="")
 
@@ -165,8 +165,8 @@ def _values(annotation: Any) -> str:
         return "table"
     if origin is tuple:
         return "list"
-    found = [_values(a) for a in get_args(annotation) if a is not NoneType and not isinstance(a, Unit)]
-    return " or ".join(dict.fromkeys(text for text in found if text))
+    texts = [_values(a) for a in get_args(annotation) if a is not NoneType and not isinstance(a, Unit)]
+    return " or ".join(dict.fromkeys(text for text in texts if text))
 
 
 def _default(field: FieldInfo) -> str:

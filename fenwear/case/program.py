@@ -201,12 +201,12 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
     stages: list[Stage] = []
     half_cycle, time, slid = 0, 0.0, 0.0
     for number, (step, acting) in enumerate(zip(program.steps, _acting(program.steps), strict=True)):
-        given, loads, factors, own = acting.given, acting.loads, acting.factors, acting.of(case)
-        strokes, cycles = _cycles(own, step, given, number)
+        given, loads, factors, acting_case = acting.given, acting.loads, acting.factors, acting.of(case)
+        strokes, cycles = _cycles(acting_case, step, given, number)
         count = min(cycles, program.levels) if any(a != b for a, b in given.values()) else 1
         edges = [round(cycles * k / count) for k in range(count + 1)]
         for low, high in itertools.pairwise(edges):
-            at = _at(own, given, (low + high) / 2 / cycles)
+            at = _at(acting_case, given, (low + high) / 2 / cycles)
             part = (low / cycles, high / cycles)
             period, distance, _ = cycle_of(at)
             stages.append(
@@ -259,16 +259,16 @@ def _cycles(case: Case, step: ProgramStep, ramps: Mapping[str, tuple[float, floa
     if step.cycles is not None:
         return strokes, step.cycles
     varies = any(a != b for a, b in ramps.values())
-    found = [cycle_of(_at(case, ramps, share)) for share in (MIDDLES if varies else MIDDLES[:1])]
-    duration, distance = (float(np.mean([one[k] for one in found])) for k in (0, 1))
+    samples = [cycle_of(_at(case, ramps, share)) for share in (MIDDLES if varies else MIDDLES[:1])]
+    duration, distance = (float(np.mean([sample[k] for sample in samples])) for k in (0, 1))
     radius = None if case.program is None else case.program.radius
-    key, whole, each, unit = "distance", step.distance, distance * (radius or 1.0), "mm"
+    key, amount, each, unit = "distance", step.distance, distance * (radius or 1.0), "mm"
     if step.time is not None:
-        key, whole, each, unit = "time", step.time, duration, "s"
-    cycles = round((whole or 0.0) / each)
+        key, amount, each, unit = "time", step.time, duration, "s"
+    cycles = round((amount or 0.0) / each)
     if cycles < 1:
         key = f"program.steps.{number}.{key}"
-        raise CaseError(InputError(key, f"expected at least a cycle of {each:.4g} {unit}, got {whole:.4g} {unit}"))
+        raise CaseError(InputError(key, f"expected at least a cycle of {each:.4g} {unit}, got {amount:.4g} {unit}"))
     return strokes, cycles
 
 

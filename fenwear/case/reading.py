@@ -231,7 +231,7 @@ def make_case(
     names = Names.of(data)
     roles = {name: names.role_of(name) for name in (*meshes, *stresses)}
     on = {roles[name]: mesh if roles[name] == name else mesh.for_role(roles[name]) for name, mesh in meshes.items()}
-    with names.told_in_errors():
+    with names.names_in_errors():
         return _made(data, folder, Given(on, {roles[name]: law for name, law in stresses.items()}))
 
 
@@ -247,8 +247,8 @@ def _made(data: Mapping[str, Any], folder: Path | None, given: Given) -> Case:
         case = Case.model_validate(data)
     except pydantic.ValidationError as error:
         # A list whose entries are wrong counts as too short besides.
-        found = [e for e in error.errors() if e["type"] != "too_short" or e["ctx"]["actual_length"] == len(e["input"])]
-        raise CaseError([p for e in found for p in problems_of(e, data)]) from None
+        errors = [e for e in error.errors() if e["type"] != "too_short" or e["ctx"]["actual_length"] == len(e["input"])]
+        raise CaseError([p for e in errors for p in problems_of(e, data)]) from None
     if open_end:
         case = case.model_copy(update={"run": case.run.model_copy(update={"half_cycles": half_cycles_of(case)})})
     check_length(case)
@@ -325,9 +325,10 @@ def changed_case(case: Case, *settings: str) -> Case:
     for setting in settings:
         _apply(data, setting)
     changed = make_case(data, case.folder, meshes=case.given.meshes, stresses=case.given.stresses)
-    own, before = changed.written, case.written  # quantities are resolved now: how they were written is known of before
-    as_were = {key: before.united.get(key, text) for key, text in own.united.items()}
-    return changed.at(case.folder, Written(own.bare, as_were))
+    # quantities are resolved now: how they were written is known of before
+    written, before = changed.written, case.written
+    as_were = {key: before.united.get(key, text) for key, text in written.united.items()}
+    return changed.at(case.folder, Written(written.bare, as_were))
 
 
 def heat_of(settings: Sequence[str]) -> Heat:
@@ -342,8 +343,8 @@ def heat_of(settings: Sequence[str]) -> Heat:
     try:
         return Heat.model_validate(data["heat"])
     except pydantic.ValidationError as error:
-        found = [{**one, "loc": ("heat", *one["loc"])} for one in error.errors()]
-        raise CaseError([p for one in found for p in problems_of(one, data)]) from None
+        errors = [{**problem, "loc": ("heat", *problem["loc"])} for problem in error.errors()]
+        raise CaseError([p for problem in errors for p in problems_of(problem, data)]) from None
 
 
 def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noqa: PLR0911
@@ -375,13 +376,13 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noq
         case "literal_error":
             return [InputError(key, f"expected {message}{got}{_nearest(error['input'], message)}")]
         case "value_error":
-            return _own_problems(key, message)
+            return _problems_with(key, message)
         case kind if kind in EXPECTED:
             return [InputError(key, f"expected {EXPECTED[kind]}{got}")]
     return [InputError(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
 
 
-def _own_problems(key: str, message: str) -> list[InputError]:
+def _problems_with(key: str, message: str) -> list[InputError]:
     """Return the problems that a check of the schema reports."""
     if not key:
         return [InputError(*line.split(": ", 1)) for line in message.splitlines()]
@@ -440,4 +441,6 @@ def _tables(location: Sequence[str | int]) -> list[Any]:
 
 def _kinds(tables: Sequence[Any]) -> dict[str | int, Any]:
     """Return tables by the word that their key `kind` has."""
-    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in tables if "kind" in one.model_fields}
+    return {
+        get_args(table.model_fields["kind"].annotation)[0]: table for table in tables if "kind" in table.model_fields
+    }

@@ -51,9 +51,9 @@ def _ramp(quantity: Any) -> Any:
     return Annotated[tuple[quantity, ...], Field(min_length=1, max_length=2), OneOrTwo(), listed] | None
 
 
-def _either(one: str, other: str) -> Check:
+def _either(key: str, other: str) -> Check:
     """Return the check of two keys of which at most one is given."""
-    return Check(lambda step: len(step.present(one, other)) > 1, f"{one}: give either {one} or {other}")
+    return Check(lambda step: len(step.present(key, other)) > 1, f"{key}: give either {key} or {other}")
 
 
 def _slides(key: str) -> Check:

@@ -102,9 +102,9 @@ class Case(Part):
 
     def loads_of(self, body: str) -> tuple[Load | CourseLoad, ...]:
         """Return all loads of a body, "punch" or "strip": its own, and on the punch that of the cycle's table."""
-        own: tuple[Load | CourseLoad, ...] = getattr(self, body).loads
+        loads: tuple[Load | CourseLoad, ...] = getattr(self, body).loads
         course = self.course_load if body == "punch" else None
-        return own if course is None else (*own, course)
+        return loads if course is None else (*loads, course)
 
     @property
     def loading(self) -> tuple[Any, ...]:
@@ -197,8 +197,8 @@ class Case(Part):
 
     def graded_as(self, other: Case) -> Case:
         """Return the case with the grading of another one's strip, if they differ by less than `NEAR`."""
-        own, others = self.diffusion, other.diffusion
-        if own.keys() != others.keys() or any(not 1 / NEAR < own[key] / others[key] < NEAR for key in own):
+        grading, others = self.diffusion, other.diffusion
+        if grading.keys() != others.keys() or any(not 1 / NEAR < grading[key] / others[key] < NEAR for key in grading):
             return self
         near = self.model_copy()
         near._diffusion = others
@@ -229,13 +229,13 @@ class Case(Part):
     def coefficients(self) -> dict[str, Any]:
         """The coefficients that may depend on the state, by their keys."""
         contact = self.contact
-        found: dict[str, Any] = {"contact.friction": contact.friction}
+        coefficients: dict[str, Any] = {"contact.friction": contact.friction}
         if contact.lubrication:
-            found[f"contact.lubrication.{contact.lubrication.key}"] = contact.lubrication.coefficient
+            coefficients[f"contact.lubrication.{contact.lubrication.key}"] = contact.lubrication.coefficient
         if contact.third_body:
-            found["contact.third_body.life"] = contact.third_body.life
+            coefficients["contact.third_body.life"] = contact.third_body.life
         wear = self.wear.by_body.items()
-        return found | {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in wear}
+        return coefficients | {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in wear}
 
     @property
     def passing_laws(self) -> list[str]:

@@ -101,7 +101,7 @@ def _kinds(part: type[BaseModel], name: str) -> frozenset[object]:
         if get_origin(kind) is Annotated:
             return plain(get_args(kind)[0])
         if get_origin(kind) in (Union, UnionType):
-            return {one for part in get_args(kind) for one in plain(part)}
+            return {plain_type for part in get_args(kind) for plain_type in plain(part)}
         return {kind}
 
     return frozenset(plain(part.model_fields[name].annotation) - {type(None)})
@@ -153,17 +153,17 @@ class Part(BaseModel):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        own = [vars(kind) for kind in type(self).__mro__]
-        for keys in (keys for names in own for keys in names.get("one_of", ())):
+        namespaces = [vars(kind) for kind in type(self).__mro__]
+        for keys in (keys for names in namespaces for keys in names.get("one_of", ())):
             if len(self.present(*keys)) != 1:
                 got = " and ".join(self.present(*keys)) or "none"
                 raise ValueError(f"give one of {', '.join(keys[:-1])} and {keys[-1]}, got {got}")
-        for keys in (keys for names in own for keys in names.get("together", ())):
+        for keys in (keys for names in namespaces for keys in names.get("together", ())):
             given = self.present(*keys)
             missing = [key for key in keys if key not in given]
             if given and missing:
                 raise ValueError(f"{missing[0]}: expected together with {' and '.join(given)}, and only then")
-        for check in (check for names in own for check in names.get("checks", ())):
+        for check in (check for names in namespaces for check in names.get("checks", ())):
             if check.wrong(self):
                 raise ValueError(check.message.format(self))
         return self

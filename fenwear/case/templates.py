@@ -86,7 +86,8 @@ def find_template(name: str) -> Template:
     head, _, text = (_folder() / f"{name}.toml").read_text("utf-8").partition(BETWEEN)
     table = tomllib.loads(head)
     template = {
-        key: Dimension(one["value"], one.get("unit", "mm"), one["about"]) for key, one in table["dimensions"].items()
+        key: Dimension(entry["value"], entry.get("unit", "mm"), entry["about"])
+        for key, entry in table["dimensions"].items()
     }
     return Template(name, table["title"], template, text.lstrip("\n"))
 
@@ -115,16 +116,20 @@ def fill_in(template: Template, settings: Sequence[str] = ()) -> str:
     if problems:
         raise CaseError(problems)
     text = _environment().from_string(template.text).render(values(template, given))
-    return REMARK.sub(lambda found: f"{found[1]:<{COLUMN - 2}}  {found[2]}", text)
+    return REMARK.sub(lambda match: f"{match[1]:<{COLUMN - 2}}  {match[2]}", text)
 
 
 def values(template: Template, given: Mapping[str, str | float] = MappingProxyType({})) -> dict[str, str | float]:
     """Return the values of all dimensions of a template: the given ones, and the usual ones of the rest."""
-    found: dict[str, str | float] = {}
-    for name, one in template.dimensions.items():
-        usual = _environment().from_string(one.value).render(found) if isinstance(one.value, str) else one.value
-        found[name] = given.get(name, usual)
-    return found
+    filled: dict[str, str | float] = {}
+    for name, dimension in template.dimensions.items():
+        usual = (
+            _environment().from_string(dimension.value).render(filled)
+            if isinstance(dimension.value, str)
+            else dimension.value
+        )
+        filled[name] = given.get(name, usual)
+    return filled
 
 
 @cache

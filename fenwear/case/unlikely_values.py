@@ -207,8 +207,8 @@ def _dependences(part: BaseModel | Mapping[str, Any], path: str) -> Iterator[tup
     for name, value in items:
         key = f"{path}.{name}" if path else name
         if isinstance(value, Dependence):
-            own = part.unit if isinstance(part, WearLaw) and name == "coefficient" else unit_of(fields[name])
-            yield key, value, own
+            unit = part.unit if isinstance(part, WearLaw) and name == "coefficient" else unit_of(fields[name])
+            yield key, value, unit
         elif isinstance(value, BaseModel | Mapping):
             yield from _dependences(value, key)
 

@@ -153,7 +153,7 @@ class Dependence(_State):
         if self.law is not None:
             return name in variables_of_law(self.law)
         if self.regions is not None:
-            return any(depends_on(one, name) for one in self.regions.values())
+            return any(depends_on(region, name) for region in self.regions.values())
         return super().depends_on(name)
 
     @property
@@ -171,7 +171,7 @@ class Dependence(_State):
     def unlike(self) -> bool:
         """Whether regions differ in it."""
         given = list((self.regions or {}).values())
-        return any(one != given[0] for one in given)
+        return any(value != given[0] for value in given)
 
     def scale(self, unit: str) -> float:
         """Return the factor that converts the values to a unit.
@@ -462,11 +462,11 @@ class WearLaw(Part):
                 converted["coefficient"] = convert(data["coefficient"], cls.coefficient_unit(*exponents))
             except ValueError as error:
                 raise ValueError(f"coefficient: {error}") from None
-        own = data.get("coating")
-        if isinstance(own, Mapping) and own.get("coefficient") is not None:
+        coating = data.get("coating")
+        if isinstance(coating, Mapping) and coating.get("coefficient") is not None:
             try:
                 unit = cls.coefficient_unit(*exponents)
-                converted["coating"] = {**own, "coefficient": convert(own["coefficient"], unit)}
+                converted["coating"] = {**coating, "coefficient": convert(coating["coefficient"], unit)}
             except ValueError as error:
                 raise ValueError(f"coating.coefficient: {error}") from None
         return converted
@@ -515,15 +515,15 @@ class WearLaw(Part):
     @property
     def of_coating(self) -> WearLaw | None:
         """The law by which the coating wears; None without."""
-        own = self.coating
-        if own is None:
+        coating = self.coating
+        if coating is None:
             return None
         keys = ("coefficient", "archard", "hardness", "energy", "per_area")
-        changes: dict[str, Any] = {key: getattr(own, key) for key in keys}
-        if own.per_area is not None:
+        changes: dict[str, Any] = {key: getattr(coating, key) for key in keys}
+        if coating.per_area is not None:
             changes |= {"pressure_threshold": 0.0, "pressure_cap": None}
-        if own.touching_from is not None:
-            changes["touching_from"] = own.touching_from
+        if coating.touching_from is not None:
+            changes["touching_from"] = coating.touching_from
         return self.model_copy(update={**changes, "coating": None})
 
     @property
@@ -541,8 +541,8 @@ class WearLaw(Part):
     @property
     def given_coefficient(self) -> float | Dependence | None:
         """Coefficients that may depend on the state: the coefficient, or k_A."""
-        found: float | Dependence | None = self.coefficient if self.per_area is None else self.per_area
-        return found
+        coefficient: float | Dependence | None = self.coefficient if self.per_area is None else self.per_area
+        return coefficient
 
     @property
     def scale(self) -> float:

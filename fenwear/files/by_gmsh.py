@@ -131,8 +131,11 @@ def _mesh(name: str, arrays: dict[str, NDArray[Any]], word: str) -> MeshFile:
         start += len(labels)
     sets = []
     for dim, tag, text, entities in named["groups"]:
-        own = [np.zeros(0, np.int64), *(one for entity in entities for one in members.get((dim, entity), []))]
-        sets.append(MeshSet(text or f"{ENTITIES[dim]} group {tag}", "elements", np.concatenate(own)))
+        group_elements = [
+            np.zeros(0, np.int64),
+            *(elements for entity in entities for elements in members.get((dim, entity), [])),
+        ]
+        sets.append(MeshSet(text or f"{ENTITIES[dim]} group {tag}", "elements", np.concatenate(group_elements)))
     if word:
         twice = {tag for dim, tag in members if any((other, tag) in members for other in range(4) if other != dim)}
         for (dim, tag), parts in members.items():

@@ -30,10 +30,10 @@ def entities(gmsh: Any) -> list[dict[str, Any]]:
 
     Of solids they are volumes and surfaces, of flat shapes surfaces and curves.
     """
-    whole = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
+    top_dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
     rows = []
-    for dim, tag in sorted(gmsh.model.getEntities(), key=lambda one: (-one[0], one[1])):
-        if dim < max(whole - 1, 1):
+    for dim, tag in sorted(gmsh.model.getEntities(), key=lambda entity: (-entity[0], entity[1])):
+        if dim < max(top_dim - 1, 1):
             continue
         box = np.array(gmsh.model.getBoundingBox(dim, tag)).round(6) + 0.0
         rows.append({
@@ -97,7 +97,7 @@ def _solids(gmsh: Any) -> list[tuple[int, int]]:
     while loose:
         first = min(loose)
         shell, edges = [first], loose.pop(first)
-        while near := [tag for tag, own in loose.items() if own & edges]:
+        while near := [tag for tag, curves in loose.items() if curves & edges]:
             for tag in near:
                 edges |= loose.pop(tag)
             shell += near
@@ -153,16 +153,16 @@ def name_parts(
                 message = f"{name} has no part {text!r}{hint} It has {count}: `fenwear info {name}` lists them."
                 problems.append(InputError(f"geometry.groups.{group}", message))
     for group, text in planes:
-        own = [
-            one for key, parts in groups.items() for one in parts if key.partition("_")[0] == group.partition("_")[0]
+        body_parts = [
+            part for key, parts in groups.items() for part in parts if key.partition("_")[0] == group.partition("_")[0]
         ]
         try:
-            found = _on_plane(gmsh, text, [one for one in own if one[0] == dim], length)
+            sides = _on_plane(gmsh, text, [part for part in body_parts if part[0] == dim], length)
         except ValueError as error:
             problems.append(InputError(f"geometry.groups.{group}", str(error)))
             continue
-        groups[group] += found
-        if not found:
+        groups[group] += sides
+        if not sides:
             message = f"{name} has no {ENTITIES[dim - 1]} of this body on the plane {text!r}. Correct the place."
             problems.append(InputError(f"geometry.groups.{group}", message))
     problems += _make_groups(gmsh, groups, dim)
@@ -197,8 +197,8 @@ def _on_plane(
     near = FLAT * float((box[3:] - box[:3]).max())
     sides = []
     for dim, tag in gmsh.model.getBoundary(list(regions), combined=False, oriented=False):
-        own = np.array(gmsh.model.getBoundingBox(dim, tag))
-        if max(abs(own[axis] - at), abs(own[3 + axis] - at)) <= near:
+        bounds = np.array(gmsh.model.getBoundingBox(dim, tag))
+        if max(abs(bounds[axis] - at), abs(bounds[3 + axis] - at)) <= near:
             sides.append((dim, tag))
     return sides
 
@@ -208,15 +208,15 @@ def _make_groups(gmsh: Any, groups: Mapping[str, list[tuple[int, int]]], dim: in
     problems, owners = [], dict[tuple[int, int], str]()
     for group, parts in groups.items():
         largest = max((d for d, _ in parts), default=0)
-        own = sorted({one for one in parts if one[0] == largest})
-        if not own:
+        largest_parts = sorted({part for part in parts if part[0] == largest})
+        if not largest_parts:
             continue
-        for one in own:
-            other = owners.setdefault(one, group)
+        for member in largest_parts:
+            other = owners.setdefault(member, group)
             if other != group and largest == dim:
-                message = f"{ENTITIES[largest]} {one[1]} is in {other} and in {group}. Leave one of them out."
+                message = f"{ENTITIES[largest]} {member[1]} is in {other} and in {group}. Leave one of them out."
                 problems.append(InputError(f"geometry.groups.{group}", message))
-        tag = gmsh.model.addPhysicalGroup(largest, [t for _, t in own])
+        tag = gmsh.model.addPhysicalGroup(largest, [t for _, t in largest_parts])
         gmsh.model.setPhysicalName(largest, tag, group)
     return problems
 
@@ -245,19 +245,19 @@ def set_sizes(gmsh: Any, size: float | None, sizes: Mapping[str, float], names: 
     fields = []
     for name, least in sizes.items():
         dim, tag = names[name]
-        own = [int(entity) for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
+        entities = [int(entity) for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)]
         distance = gmsh.model.mesh.field.add("Distance")
         gmsh.model.mesh.field.setNumbers(
-            distance, ("PointsList", "CurvesList", "SurfacesList", "SurfacesList")[dim], own
+            distance, ("PointsList", "CurvesList", "SurfacesList", "SurfacesList")[dim], entities
         )
         gmsh.model.mesh.field.setNumber(distance, "Sampling", 200)
         grown = gmsh.model.mesh.field.add("MathEval")
         gmsh.model.mesh.field.setString(grown, "F", f"{least:.12g} + {GROWTH} * F{distance}")
         fields.append(grown)
     if fields:
-        whole = gmsh.model.mesh.field.add("Min")
-        gmsh.model.mesh.field.setNumbers(whole, "FieldsList", fields)
-        gmsh.model.mesh.field.setAsBackgroundMesh(whole)
+        field_of_least = gmsh.model.mesh.field.add("Min")
+        gmsh.model.mesh.field.setNumbers(field_of_least, "FieldsList", fields)
+        gmsh.model.mesh.field.setAsBackgroundMesh(field_of_least)
 
 
 def _usual_size(gmsh: Any) -> float:

@@ -104,7 +104,7 @@ class _Instance:
     name: str
     part: str
     line: int
-    own: _Scope
+    scope: _Scope
     shift: Array
     turn: tuple[Array, Array]  # matrix, point
 
@@ -240,7 +240,7 @@ class _Deck:
         if unknown:
             raise self.fail(line, f"*{name}: the option {unknown[0]} is not supported. Known are {', '.join(known)}.")
 
-    def whole(self, line: int, text: str) -> int:
+    def integer(self, line: int, text: str) -> int:
         """Return a whole number."""
         try:
             value = _float(text)
@@ -270,7 +270,7 @@ class _Deck:
             rows = [_split(text) for _, text in data]
             table = np.zeros((len(rows), 4))
             for k, ((number, _), row) in enumerate(zip(data, rows, strict=True)):
-                table[k, 0] = self.whole(number, row[0])
+                table[k, 0] = self.integer(number, row[0])
                 table[k, 1 : 1 + len(row[1:4])] = [self.number(number, cell) for cell in row[1:4]]
         bad = np.flatnonzero((table[:, 0] != np.round(table[:, 0])) | ~np.isfinite(table).all(axis=1)
                              | (np.abs(table[:, 0]) > 2**62))  # fmt: skip
@@ -347,7 +347,7 @@ class _Deck:
         kind = self.kind_of(line, name)
         if kind == 0:
             self.shapeless[name] += len(data)
-            labels = np.array([self.whole(number, _split(text)[0]) for number, text in data], dtype=np.int64)
+            labels = np.array([self.integer(number, _split(text)[0]) for number, text in data], dtype=np.int64)
             lines = np.array([n for n, _ in data], int)
             block = _Elements(0, np.zeros((len(labels), 0), np.int64), labels, lines)
         else:
@@ -403,7 +403,7 @@ class _Deck:
             try:
                 open_row += [int(cell) for cell in (cells[:-1] if goes_on else cells)]
             except ValueError:
-                open_row += [self.whole(number, cell.strip()) for cell in (cells[:-1] if goes_on else cells)]
+                open_row += [self.integer(number, cell.strip()) for cell in (cells[:-1] if goes_on else cells)]
             if len(open_row) > wide or (len(open_row) < wide and not goes_on):
                 raise self.fail(number, f"expected {count} nodes of a {name}, got {len(open_row) - 1}")
             if len(open_row) == wide:
@@ -438,23 +438,23 @@ class _Deck:
     ) -> None:
         if not given.get(word):
             raise self.fail(line, f"*{word} has no name: expected *{word}, {word}=NAME")
-        found = self.set_of(sets, given[word], line)
+        target = self.set_of(sets, given[word], line)
         instance = given.get("INSTANCE", "")
         for number, text in self.input(line, given, data):
             cells = [cell for cell in _split(text) if cell]
             if "GENERATE" in given:
                 if len(cells) < 2:
                     raise self.fail(number, f"GENERATE: expected first, last and step, got {text!r}")
-                first, last = (self.whole(number, cell) for cell in cells[:2])
-                step = self.whole(number, cells[2]) if len(cells) > 2 else 1
+                first, last = (self.integer(number, cell) for cell in cells[:2])
+                step = self.integer(number, cells[2]) if len(cells) > 2 else 1
                 labels = self.range(number, first, last, step)
-                found.entries.append(_Entry(number, labels=labels, scope=instance, ranges=True))
+                target.entries.append(_Entry(number, labels=labels, scope=instance, ranges=True))
                 continue
             numbers = [int(cell) for cell in cells if cell.isdecimal()]
             if any(label > 2**62 for label in numbers):
                 raise self.fail(number, f"expected numbers or names of sets, got {text[:40]!r}")
             names = tuple(cell for cell in cells if not cell.isdecimal())
-            found.entries.append(_Entry(number, names, np.array(numbers, dtype=np.int64), instance))
+            target.entries.append(_Entry(number, names, np.array(numbers, dtype=np.int64), instance))
 
     def surface(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         self.only(line, "SURFACE", given, ("NAME", "TYPE", "INTERNAL", "TRIM", "REGION TYPE", "NO OFFSET", "NO THICK"))
@@ -465,7 +465,7 @@ class _Deck:
             message = f"*SURFACE, TYPE={kind} is not supported. Give the surface by faces of elements, or by nodes."
             raise self.fail(line, message)
         of_nodes = kind == "NODE"
-        found = self.set_of(self.scope.nsets if of_nodes else self.scope.surfaces, given["NAME"], line)
+        target = self.set_of(self.scope.nsets if of_nodes else self.scope.surfaces, given["NAME"], line)
         for number, text in data:
             cells = _split(text)
             side = "" if of_nodes else "".join(cells[1:2]).upper() or "free"
@@ -473,7 +473,7 @@ class _Deck:
                 raise self.fail(number, f"the face {side} is not supported. Expected S1 to S6, SPOS or SNEG.")
             digit = cells[0].isdecimal()
             labels = np.array([int(cells[0])] if digit else [], dtype=np.int64)
-            found.entries.append(_Entry(number, () if digit else (cells[0],), labels, sides=side))
+            target.entries.append(_Entry(number, () if digit else (cells[0],), labels, sides=side))
 
     # ------------------------------------------------------------------------------------- parts, instances
 
@@ -494,16 +494,16 @@ class _Deck:
         if not name or _key(name) in self.instances:
             raise self.fail(line, f"*INSTANCE: expected a name that no other instance has, got {name!r}")
         if _key(part) not in self.parts:
-            known = listed(one.name for one in self.parts.values())
+            known = listed(part.name for part in self.parts.values())
             raise self.fail(line, f"*INSTANCE {name}: the part {part!r} does not exist; the deck has {known}")
         rows = [[self.number(number, cell) for cell in _split(text)] for number, text in data]
         if len(rows) > 2 or (rows and len(rows[0]) > 3) or (len(rows) > 1 and len(rows[1]) < 7):
             raise self.fail(line, "*INSTANCE: expected a line of 3 shifts, and one of two points and an angle")
         shift = np.array([*(rows[0] if rows else ()), 0.0, 0.0, 0.0][:3])
         turn = _turn(self.file, data[1][0], rows[1]) if len(rows) > 1 else GLOBAL
-        own = _Scope(name.strip('"'))
-        self.instances[_key(name)] = _Instance(name.strip('"'), _key(part), line, own, shift, turn)
-        self.scope, self.system = own, GLOBAL
+        scope = _Scope(name.strip('"'))
+        self.instances[_key(name)] = _Instance(name.strip('"'), _key(part), line, scope, shift, turn)
+        self.scope, self.system = scope, GLOBAL
 
     def include(self, line: int, given: dict[str, str], _data: list[tuple[int, str]]) -> None:
         self.lines_of(self.beside(line, given.get("INPUT", "")), line)
@@ -557,7 +557,7 @@ class _Placed:
     element_order: Ints
 
 
-class _Whole:
+class _Assembly:
     """Points and elements of all instances, and where each one's labels are."""
 
     def __init__(self, deck: _Deck) -> None:
@@ -570,9 +570,9 @@ class _Whole:
             raise deck.fail(0, "has parts and no *INSTANCE of them. Write the assembly with the deck.")
         if deck.model.labels or deck.model.elements:
             self.add("", deck.model, lambda x: x)
-        for key, one in deck.instances.items():
-            scope = _joined(deck.parts[one.part], one.own)
-            self.add(key, scope, lambda x, one=one: _moved(x, one))  # type: ignore[misc]
+        for key, instance in deck.instances.items():
+            scope = _joined(deck.parts[instance.part], instance.scope)
+            self.add(key, scope, lambda x, instance=instance: _moved(x, instance))  # type: ignore[misc]
 
     def add(self, key: str, scope: _Scope, move: Callable[[Array], Array]) -> None:
         fail = self.deck.fail
@@ -617,30 +617,30 @@ class _Whole:
         self.elements += len(every)
 
 
-def _joined(part: _Scope, own: _Scope) -> _Scope:
+def _joined(part: _Scope, added: _Scope) -> _Scope:
     """Return a part with what its instance adds."""
     return _Scope(
-        own.name, part.labels + own.labels, part.points + own.points, part.lines + own.lines,
-        part.elements + own.elements, {**part.nsets, **own.nsets}, {**part.elsets, **own.elsets},
-        {**part.surfaces, **own.surfaces},
+        added.name, part.labels + added.labels, part.points + added.points, part.lines + added.lines,
+        part.elements + added.elements, {**part.nsets, **added.nsets}, {**part.elsets, **added.elsets},
+        {**part.surfaces, **added.surfaces},
     )  # fmt: skip
 
 
-def _moved(points: Array, one: _Instance) -> Array:
-    turn, about = one.turn
-    return (points + one.shift - about) @ turn.T + about
+def _moved(points: Array, instance: _Instance) -> Array:
+    turn, about = instance.turn
+    return (points + instance.shift - about) @ turn.T + about
 
 
 def _assembled(deck: _Deck) -> MeshFile:
     """Return the mesh of all instances with all sets."""
-    whole = _Whole(deck)
-    points = np.concatenate(whole.points)
-    mesh = MeshFile(deck.path.name, points, tuple(whole.blocks), ())
-    resolve = _Resolver(deck, whole, mesh)
+    assembly = _Assembly(deck)
+    points = np.concatenate(assembly.points)
+    mesh = MeshFile(deck.path.name, points, tuple(assembly.blocks), ())
+    resolve = _Resolver(deck, assembly, mesh)
     sets = resolve.all_sets()
     notes = resolve.notes + [f"no shape: {count:,} elements of type {name}" for name, count in deck.shapeless.items()]
     used = np.zeros(len(points), dtype=bool)
-    for block in whole.blocks:
+    for block in assembly.blocks:
         if block.kind != 15:
             used[block.nodes] = True
     if not used.all():
@@ -648,30 +648,30 @@ def _assembled(deck: _Deck) -> MeshFile:
     if deck.passed:
         text = ", ".join(f"*{name}" + (f" ({n})" if n > 1 else "") for name, n in sorted(deck.passed.items()) if n)
         notes.append(f"not of the mesh: {text}")
-    return MeshFile(deck.path.name, points, tuple(whole.blocks), tuple(sets), tuple(note for note in notes if note))
+    return MeshFile(deck.path.name, points, tuple(assembly.blocks), tuple(sets), tuple(note for note in notes if note))
 
 
 class _Resolver:
     """Sets of sets, of labels and of faces, as members of the whole mesh."""
 
-    def __init__(self, deck: _Deck, whole: _Whole, mesh: MeshFile) -> None:
-        self.deck, self.whole, self.mesh = deck, whole, mesh
+    def __init__(self, deck: _Deck, assembly: _Assembly, mesh: MeshFile) -> None:
+        self.deck, self.assembly, self.mesh = deck, assembly, mesh
         self.notes: list[str] = []
         self.known: dict[tuple[str, str, str], Ints] = {}
 
     def all_sets(self) -> list[MeshSet]:
-        found = []
-        scopes = dict(self.whole.placed)
+        mesh_sets = []
+        scopes = dict(self.assembly.placed)
         scopes.setdefault("", _Placed(self.deck.model, *(np.zeros(0, np.int64) for _ in range(4))))
         for key, placed in scopes.items():
             prefix = f"{placed.scope.name}." if key else ""
             for word, sets, of in (("nset", placed.scope.nsets, "nodes"), ("elset", placed.scope.elsets, "elements")):
-                for name, one in sets.items():
-                    members = np.unique(self.members(word, key, name, one.line, ()))
-                    found.append(MeshSet(prefix + one.name, of, members, one.line))  # type: ignore[arg-type]
-            for one in placed.scope.surfaces.values():
-                found.append(MeshSet(prefix + one.name, "sides", self.faces(one, key), one.line))
-        return found
+                for name, deck_set in sets.items():
+                    members = np.unique(self.members(word, key, name, deck_set.line, ()))
+                    mesh_sets.append(MeshSet(prefix + deck_set.name, of, members, deck_set.line))  # type: ignore[arg-type]
+            for deck_set in placed.scope.surfaces.values():
+                mesh_sets.append(MeshSet(prefix + deck_set.name, "sides", self.faces(deck_set, key), deck_set.line))
+        return mesh_sets
 
     def find(self, word: str, scope: str, name: str, line: int) -> tuple[str, str, _Set]:
         """Return the scope, key and set of a name, which may begin with that of its instance."""
@@ -680,53 +680,55 @@ class _Resolver:
         if dot:
             places.append((_key(first), _key(rest)))
         for place, key in places:
-            holder = self.whole.placed[place].scope if place in self.whole.placed else self.deck.model
+            holder = self.assembly.placed[place].scope if place in self.assembly.placed else self.deck.model
             sets = {"nset": holder.nsets, "elset": holder.elsets}[word]
-            if (place in self.whole.placed or not place) and key in sets:
+            if (place in self.assembly.placed or not place) and key in sets:
                 return place, key, sets[key]
-        holder = self.whole.placed[scope].scope if scope in self.whole.placed else self.deck.model
+        holder = self.assembly.placed[scope].scope if scope in self.assembly.placed else self.deck.model
         has = {"nset": holder.nsets, "elset": holder.elsets}[word].values()
         kind = "node" if word == "nset" else "element"
-        raise self.deck.fail(line, f"no {kind} set is named {name!r}; the deck has {listed(one.name for one in has)}")
+        raise self.deck.fail(
+            line, f"no {kind} set is named {name!r}; the deck has {listed(deck_set.name for deck_set in has)}"
+        )
 
     def members(self, word: str, scope: str, name: str, line: int, within: tuple[str, ...]) -> Ints:
         """Return the points or elements of a set."""
-        place, key, one = self.find(word, scope, name, line)
+        place, key, deck_set = self.find(word, scope, name, line)
         at = (word, place, key)
         if at in self.known:
             return self.known[at]
         path = f"{word} {place}.{key}"
         if path in within or len(within) > DEEPEST:
-            raise self.deck.fail(one.line, f"the set {one.name!r} holds itself. Remove the circle.")
+            raise self.deck.fail(deck_set.line, f"the set {deck_set.name!r} holds itself. Remove the circle.")
         parts: list[Ints] = [np.zeros(0, np.int64)]
-        for entry in one.entries:
+        for entry in deck_set.entries:
             of = _key(entry.scope) if entry.scope else place
-            if entry.scope and of not in self.whole.placed:
-                known = listed(p.scope.name for k, p in self.whole.placed.items() if k)
+            if entry.scope and of not in self.assembly.placed:
+                known = listed(p.scope.name for k, p in self.assembly.placed.items() if k)
                 raise self.deck.fail(entry.line, f"no instance is named {entry.scope!r}; the deck has {known}")
             if entry.sides == "nodes":
                 elements = self.members("elset", of, entry.names[0], entry.line, (*within, path))
                 parts += [cells.ravel() for kind, cells in self.mesh.cells(elements).items() if kind != 15]
                 continue
             if len(entry.labels):
-                parts.append(self.labelled(word, of, entry, one))
+                parts.append(self.labelled(word, of, entry, deck_set))
             for other in entry.names:
                 instance, dot, number = other.partition(".")
-                if dot and number.isdecimal() and _key(instance) in self.whole.placed:
+                if dot and number.isdecimal() and _key(instance) in self.assembly.placed:
                     label = _Entry(entry.line, labels=np.array([int(number)]))
-                    parts.append(self.labelled(word, _key(instance), label, one))
+                    parts.append(self.labelled(word, _key(instance), label, deck_set))
                 else:
                     parts.append(self.members(word, of, other, entry.line, (*within, path)))
         self.known[at] = np.concatenate(parts)
         return self.known[at]
 
-    def labelled(self, word: str, scope: str, entry: _Entry, one: _Set) -> Ints:
+    def labelled(self, word: str, scope: str, entry: _Entry, deck_set: _Set) -> Ints:
         """Return the numbers of the labelled nodes or elements."""
-        placed = self.whole.placed.get(scope)
+        placed = self.assembly.placed.get(scope)
         kind = "node" if word == "nset" else "element"
         labels = entry.labels
         if placed is None:
-            raise self.deck.fail(entry.line, f"the set {one.name!r} names {kind} {labels[0]} without its instance")
+            raise self.deck.fail(entry.line, f"the set {deck_set.name!r} names {kind} {labels[0]} without its instance")
         known, order = (
             (placed.labels, placed.order) if word == "nset" else (placed.element_labels, placed.element_order)
         )
@@ -734,28 +736,28 @@ class _Resolver:
         if not there.all():
             missing = labels[~there]
             if not entry.ranges or not there.any():
-                message = f"the set {one.name!r} names {kind} {missing[0]}, which does not exist. Correct the set."
+                message = f"the set {deck_set.name!r} names {kind} {missing[0]}, which does not exist. Correct the set."
                 raise self.deck.fail(entry.line, message)
-            self.notes.append(f"set {one.name}, line {entry.line}: {len(missing)} of its range are no {kind}s")
+            self.notes.append(f"set {deck_set.name}, line {entry.line}: {len(missing)} of its range are no {kind}s")
         return order[np.searchsorted(known, labels[there])]
 
-    def faces(self, one: _Set, scope: str) -> Ints:
+    def faces(self, deck_set: _Set, scope: str) -> Ints:
         """Return the sides of a surface: of given faces, or all free ones of its elements."""
         parts: list[Ints] = [np.zeros((0, 2), np.int64)]
-        for entry in one.entries:
+        for entry in deck_set.entries:
             if entry.names and not entry.names[0]:
-                raise self.deck.fail(entry.line, f"the surface {one.name!r} names no elements")
+                raise self.deck.fail(entry.line, f"the surface {deck_set.name!r} names no elements")
             if entry.names:
                 elements = np.unique(self.members("elset", scope, entry.names[0], entry.line, ()))
             else:
-                elements = self.labelled("elset", scope, entry, one)
+                elements = self.labelled("elset", scope, entry, deck_set)
             if entry.sides == "free":
                 dims = self.mesh.element_dims(np.arange(self.mesh.starts[-1]))
                 free = self.mesh.boundary(np.flatnonzero(dims == self.mesh.dim))
                 parts.append(free[np.isin(free[:, 0], elements)])
                 continue
             if entry.sides in ("SPOS", "SNEG"):
-                self.notes.append(f"surface {one.name}, line {entry.line}: faces of shells are no sides, left out")
+                self.notes.append(f"surface {deck_set.name}, line {entry.line}: faces of shells are no sides, left out")
                 continue
             side = int(entry.sides[1]) - 1
             counts = np.array([len(KINDS[block.kind].sides) for block in self.mesh.blocks])

@@ -80,13 +80,13 @@ def listed_file(path: Path) -> tuple[str, dict[str, Any]]:
         except TableError as error:
             raise CaseError(InputError(str(path), str(error))) from None
         columns = [{"name": head.name, "unit": head.unit} for head in table.heads]
-        found = {
+        content = {
             "file": path.name, "kind": "table", "columns": columns, "rows": len(table.rows),
             "encoding": table.encoding, "separator": table.separator, "decimal": table.decimal,
             "directives": [{"line": n, "name": name, "value": value} for n, name, value in table.directives],
             "comments": [{"line": n, "text": text} for n, text in table.comments], "left_out": list(table.left_out),
         }  # fmt: skip
-        return table.listing(), found
+        return table.listing(), content
     if suffix in MAPS:
         heights = read_heights(path)
         return heights.text(), {"file": path.name, "kind": "heights", **heights.numbers()}
@@ -101,24 +101,24 @@ def _mesh(path: Path) -> tuple[str, dict[str, Any]]:
         kinds[KINDS[block.kind].name] = kinds.get(KINDS[block.kind].name, 0) + len(block.nodes)
     low, high = (end(mesh.points, axis=0).tolist() for end in (np.min, np.max))
     sets = []
-    for one in mesh.sets:
-        dim = mesh.set_dim(one)
+    for mesh_set in mesh.sets:
+        dim = mesh.set_dim(mesh_set)
         sets.append({
-            "name": one.name, "of": one.of, "dim": dim, "count": len(one.members), "measure": MEASURES[dim],
-            "size": mesh.measure(one), "line": one.line,
+            "name": mesh_set.name, "of": mesh_set.of, "dim": dim, "count": len(mesh_set.members),
+            "measure": MEASURES[dim], "size": mesh.measure(mesh_set), "line": mesh_set.line,
         })  # fmt: skip
     counts = ", ".join(f"{count:,} {name}" for name, count in kinds.items())
     box = " to ".join("(" + ", ".join(f"{x:.6g}" for x in end) + ")" for end in (low, high))
     kind = READERS[path.suffix.lower()][0]
     lines = [f"{path.name} ({kind}): {len(mesh.points):,} nodes, {counts}, {box} in the file's unit"]
-    lines += [_set_text(one) for one in sets] or ["no sets: name regions by geometry.groups, facets by planes"]
-    found = {"file": path.name, "kind": "mesh", "nodes": len(mesh.points), "elements": kinds, "from": low, "to": high,
+    lines += [_set_text(row) for row in sets] or ["no sets: name regions by geometry.groups, facets by planes"]
+    content = {"file": path.name, "kind": "mesh", "nodes": len(mesh.points), "elements": kinds, "from": low, "to": high,
              "sets": sets, "notes": list(mesh.notes)}  # fmt: skip
-    return "\n".join((*lines, *mesh.notes)), found
+    return "\n".join((*lines, *mesh.notes)), content
 
 
-def _set_text(one: Mapping[str, Any]) -> str:
-    what = (
-        "nodes" if one["of"] == "nodes" else f"{one['of']} ({ENTITIES[one['dim']]}), {one['measure']} {one['size']:.6g}"
+def _set_text(row: Mapping[str, Any]) -> str:
+    extent = (
+        "nodes" if row["of"] == "nodes" else f"{row['of']} ({ENTITIES[row['dim']]}), {row['measure']} {row['size']:.6g}"
     )
-    return f"  {one['name']}: {one['count']:,} {what}" + (f", line {one['line']}" if one["line"] else "")
+    return f"  {row['name']}: {row['count']:,} {extent}" + (f", line {row['line']}" if row["line"] else "")

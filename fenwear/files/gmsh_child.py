@@ -38,7 +38,12 @@ def arrays_of(model: Any) -> dict[str, Any]:
             arrays[f"labels{len(blocks)}"], arrays[f"nodes{len(blocks)}"] = labels, nodes
             blocks.append((dim, tag, int(kind), model.mesh.getElementProperties(kind)[0]))
     groups = [
-        (dim, tag, model.getPhysicalName(dim, tag), [int(one) for one in model.getEntitiesForPhysicalGroup(dim, tag)])
+        (
+            dim,
+            tag,
+            model.getPhysicalName(dim, tag),
+            [int(entity) for entity in model.getEntitiesForPhysicalGroup(dim, tag)],
+        )
         for dim, tag in model.getPhysicalGroups()
     ]
     named = json.dumps({"blocks": blocks, "groups": groups})

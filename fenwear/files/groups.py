@@ -94,11 +94,11 @@ class GroupedMesh:
         """Return a row of each group: what it is, and how large."""
         return [
             {
-                "group": one.name, "set": one.source, "dim": one.dim, "elements": one.count,
-                "nodes": len(np.unique(np.concatenate([cells.ravel() for cells in one.cells.values()]))),
-                "measure": MEASURES[one.dim], "size": measure(self.points, one.cells),
+                "group": group.name, "set": group.source, "dim": group.dim, "elements": group.count,
+                "nodes": len(np.unique(np.concatenate([cells.ravel() for cells in group.cells.values()]))),
+                "measure": MEASURES[group.dim], "size": measure(self.points, group.cells),
             }
-            for one in sorted(self.groups, key=lambda group: (group.name.partition("_")[0], -group.dim, group.name))
+            for group in sorted(self.groups, key=lambda group: (group.name.partition("_")[0], -group.dim, group.name))
         ]  # fmt: skip
 
 
@@ -168,7 +168,7 @@ class _Sides:
 
     @cached_property
     def corners(self) -> Ints:
-        """The corners of all, ascending and filled with -1 (n, 4)."""
+        """The corners of all, ascending and real_set with -1 (n, 4)."""
         return self.mesh.side_corners(self.mesh.all_sides(self.elements))
 
     def has(self, corners: Ints) -> NDArray[np.bool_]:
@@ -191,12 +191,12 @@ class _Choice:
         self.mesh, self.wanted, self.by_role, self.length, self.scale = mesh, wanted, by_role, length, scale
         self.problems: list[InputError] = []
         self.by_name: dict[str, list[MeshSet]] = {}
-        for one in mesh.sets:
-            self.by_name.setdefault(normal(one.name), []).append(one)
-        for one in mesh.sets:  # the name without that of its instance, where no other has it
-            short = normal(one.name.rpartition(".")[2])
-            if "." in one.name:
-                self.by_name.setdefault(short, []).append(one)
+        for mesh_set in mesh.sets:
+            self.by_name.setdefault(normal(mesh_set.name), []).append(mesh_set)
+        for mesh_set in mesh.sets:  # the name without that of its instance, where no other has it
+            short = normal(mesh_set.name.rpartition(".")[2])
+            if "." in mesh_set.name:
+                self.by_name.setdefault(short, []).append(mesh_set)
 
     def result(self, dim: int) -> GroupedMesh:
         chosen = self.chosen()
@@ -214,46 +214,47 @@ class _Choice:
         if self.problems:
             raise CaseError(self.problems)
         notes = list(self.mesh.notes)
-        whole = {k for k, b in enumerate(self.mesh.blocks) if KINDS[b.kind].dim == dim}
-        left = sum(len(self.mesh.blocks[k].nodes) for k in whole) - sum(r.count for r in regions)
+        region_blocks = {k for k, b in enumerate(self.mesh.blocks) if KINDS[b.kind].dim == dim}
+        left = sum(len(self.mesh.blocks[k].nodes) for k in region_blocks) - sum(r.count for r in regions)
         if left:
             notes.append(f"in no region, left out: {left:,} {ENTITIES[dim]} elements")
-        unused = tuple(one.name for one in self.mesh.sets if one not in used)
+        unused = tuple(mesh_set.name for mesh_set in self.mesh.sets if mesh_set not in used)
         return GroupedMesh(self.scale * self.mesh.points, tuple(groups), unused, tuple(notes))
 
     def wrong(self, key: str, message: str) -> None:
         self.problems.append(InputError(key, message))
 
-    def where(self, one: MeshSet) -> str:
+    def where(self, mesh_set: MeshSet) -> str:
         """Return a set and where it stands, for messages."""
-        return f"{one.name}" + (f" in line {one.line}" if one.line else "")
+        return f"{mesh_set.name}" + (f" in line {mesh_set.line}" if mesh_set.line else "")
 
     def chosen(self) -> dict[str, list[MeshSet | str]]:
         """Return the sets, or planes, of each group."""
-        found: dict[str, list[MeshSet | str]] = {}
+        chosen: dict[str, list[MeshSet | str]] = {}
         for group, value in self.wanted.items():
             names = [value] if isinstance(value, str) else list(value)
             if not group.startswith(tuple(f"{body}_" for body in BODIES)):
                 self.wrong(f"geometry.groups.{group}", "expected a group that starts with punch_ or strip_")
                 continue
-            found[group] = []
+            chosen[group] = []
             for name in names:
                 if name and PLANE.fullmatch(name) and normal(name) not in self.by_name:
-                    found[group].append(name)
+                    chosen[group].append(name)
                 elif name:
-                    found[group] += self.named(group, name)
-        mapped = {one.name for sets in found.values() for one in sets if isinstance(one, MeshSet)}
+                    chosen[group] += self.named(group, name)
+        mapped = {mesh_set.name for sets in chosen.values() for mesh_set in sets if isinstance(mesh_set, MeshSet)}
         alike: dict[str, list[MeshSet]] = {}
         for key, sets in self.by_name.items():
             group = self.by_role(key)
             if group.startswith(tuple(f"{body}_" for body in BODIES)) and group not in self.wanted:
-                alike.setdefault(group, []).extend(one for one in sets if one.name not in mapped)
-        for group, own in alike.items():
-            found[group] = list(own)
-            if len({normal(one.name) for one in own}) > 1:
-                text = f"several sets have this name: {listed(one.name for one in own)}. Name one of them, or all"
+                alike.setdefault(group, []).extend(mesh_set for mesh_set in sets if mesh_set.name not in mapped)
+        for group, namesakes in alike.items():
+            chosen[group] = list(namesakes)
+            if len({normal(mesh_set.name) for mesh_set in namesakes}) > 1:
+                known = listed(mesh_set.name for mesh_set in namesakes)
+                text = f"several sets have this name: {known}. Name one of them, or all"
                 self.wrong(f"geometry.groups.{group}", text)
-        return {group: sets for group, sets in found.items() if sets}
+        return {group: sets for group, sets in chosen.items() if sets}
 
     def named(self, group: str, name: str) -> list[MeshSet]:
         """Return the sets of a name."""
@@ -262,7 +263,7 @@ class _Choice:
             return self.by_name[key]
         close = difflib.get_close_matches(key, self.by_name, n=1)
         hint = f"Did you mean {self.by_name[close[0]][0].name!r}? " if close else ""
-        has = listed(one.name for one in self.mesh.sets)
+        has = listed(mesh_set.name for mesh_set in self.mesh.sets)
         self.wrong(f"geometry.groups.{group}", f"{self.mesh.name} has no set {name!r}. {hint}It has {has}.")
         return []
 
@@ -270,16 +271,17 @@ class _Choice:
         """Return the groups that are regions, and complain of those that hold nothing."""
         groups = []
         for name, sets in chosen.items():
-            real = [one for one in sets if isinstance(one, MeshSet)]
-            for one in real:
-                if not len(one.members):
+            real = [mesh_set for mesh_set in sets if isinstance(mesh_set, MeshSet)]
+            for real_set in real:
+                if not len(real_set.members):
                     self.wrong(
-                        name, f'the set {self.where(one)} of {self.mesh.name} is empty. Fill it, or leave it out by "".'
+                        name,
+                        f'the set {self.where(real_set)} of {self.mesh.name} is empty. Fill it, or leave it out by "".',
                     )
-            cells = [one for one in real if one.of == "elements" and self.mesh.set_dim(one) == dim]
+            cells = [mesh_set for mesh_set in real if mesh_set.of == "elements" and self.mesh.set_dim(mesh_set) == dim]
             if not cells or (len(cells) < len(real) and not self.is_region(name, cells, real)):
                 continue
-            elements = np.unique(np.concatenate([one.members for one in cells]))
+            elements = np.unique(np.concatenate([mesh_set.members for mesh_set in cells]))
             elements = elements[self.mesh.element_dims(elements) == dim]
             kinds = self.mesh.cells(elements)
             unusable = [KINDS[kind].name for kind in kinds if kind not in USABLE]
@@ -290,7 +292,7 @@ class _Choice:
                 self.wrong(self.mesh.name, f"some elements of {name} are there twice. Remove one of them.")
             bad = bad_elements(self.mesh, elements)
             if len(bad):
-                text = ", ".join(self.mesh.place(int(one)) for one in bad[:SHOWN])
+                text = ", ".join(self.mesh.place(int(element)) for element in bad[:SHOWN])
                 rest = f" and {len(bad) - SHOWN} more" if len(bad) > SHOWN else ""
                 message = f"degenerate or twisted: {text}{rest}. Check the order of their nodes, or mesh it again."
                 self.wrong(f"{self.mesh.name}: {name}", message)
@@ -299,12 +301,14 @@ class _Choice:
 
     def is_region(self, name: str, cells: list[MeshSet], every: list[MeshSet]) -> bool:
         """Return whether of sets of one name, of elements and of others, the elements are meant."""
-        if any(name.startswith(f"{body}_contact") for body in BODIES) or any(one.of == "sides" for one in every):
+        if any(name.startswith(f"{body}_contact") for body in BODIES) or any(
+            mesh_set.of == "sides" for mesh_set in every
+        ):
             return False
-        nodes = [one.members for one in every if one.of == "nodes"]
+        nodes = [mesh_set.members for mesh_set in every if mesh_set.of == "nodes"]
         if not nodes:
             return False
-        corners = [part.ravel() for one in cells for part in self.mesh.cells(one.members).values()]
+        corners = [part.ravel() for mesh_set in cells for part in self.mesh.cells(mesh_set.members).values()]
         return np.array_equal(np.unique(np.concatenate(corners)), np.unique(np.concatenate(nodes)))
 
     def first_of(self, elements: Any, kind: str) -> int:
@@ -312,22 +316,22 @@ class _Choice:
 
     def elements_of(self, regions: list[Group], body: str) -> Ints:
         """Return the elements of a body (n,)."""
-        own = [one.elements for one in regions if one.name.startswith(f"{body}_")]
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *own]))
+        elements = [region.elements for region in regions if region.name.startswith(f"{body}_")]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *elements]))
 
     def lower(self, name: str, sets: list[MeshSet | str], bodies: Mapping[str, _Sides], dim: int) -> list[Group]:
         """Return a group of facets or points; none where something is wrong."""
         body = bodies[name.partition("_")[0]]
-        source = ", ".join(one if isinstance(one, str) else self.where(one) for one in sets)
+        source = ", ".join(part if isinstance(part, str) else self.where(part) for part in sets)
         cells: dict[int, Ints] = {}
         points: list[Ints] = []
-        for one in self.counting(sets, dim):
-            if isinstance(one, MeshSet) and one.of == "elements" and self.mesh.set_dim(one) == dim:
+        for chosen_set in self.counting(sets, dim):
+            if isinstance(chosen_set, MeshSet) and chosen_set.of == "elements" and self.mesh.set_dim(chosen_set) == dim:
                 text = f"has {ENTITIES[dim]} elements; expected {ENTITIES[dim - 1]} elements, their faces or nodes"
-                self.wrong(name, f"the set {self.where(one)} {text}. Name a surface or a node set.")
+                self.wrong(name, f"the set {self.where(chosen_set)} {text}. Name a surface or a node set.")
                 continue
-            found, alone = self.facets(name, one, body)
-            for kind, rows in found.items():
+            facets, alone = self.facets(name, chosen_set, body)
+            for kind, rows in facets.items():
                 cells[kind] = stacked(cells.get(kind), rows)
             points += [alone] if len(alone) else []
         if cells:
@@ -338,37 +342,39 @@ class _Choice:
 
     def counting(self, sets: list[MeshSet | str], dim: int) -> list[MeshSet | str]:
         """Return the sets of a group of facets that count: sides before nodes before elements of bodies."""
-        of = [one.of for one in sets if isinstance(one, MeshSet)]
+        of = [part.of for part in sets if isinstance(part, MeshSet)]
         if "sides" in of:
-            return [one for one in sets if isinstance(one, str) or one.of == "sides"]
+            return [part for part in sets if isinstance(part, str) or part.of == "sides"]
         if "nodes" in of:
-            return [one for one in sets if isinstance(one, str) or one.of == "nodes" or self.mesh.set_dim(one) < dim]
+            return [
+                part for part in sets if isinstance(part, str) or part.of == "nodes" or self.mesh.set_dim(part) < dim
+            ]
         return sets
 
-    def facets(self, name: str, one: MeshSet | str, body: _Sides) -> tuple[dict[int, Ints], Ints]:
+    def facets(self, name: str, part: MeshSet | str, body: _Sides) -> tuple[dict[int, Ints], Ints]:
         """Return the facets that a set, or a plane, gives by their kind, or else its points."""
         none, boundary = np.zeros(0, np.int64), body.boundary
-        if isinstance(one, str) or one.of == "nodes":
-            nodes = self.on_plane(name, one) if isinstance(one, str) else one.members
-            own = self.facets_within(boundary, nodes)
-            if isinstance(one, str) and not len(own):
-                spot = f"{self.mesh.name} has no facets of this body on the plane {one!r}. Correct the place."
+        if isinstance(part, str) or part.of == "nodes":
+            nodes = self.on_plane(name, part) if isinstance(part, str) else part.members
+            facets = self.facets_within(boundary, nodes)
+            if isinstance(part, str) and not len(facets):
+                spot = f"{self.mesh.name} has no facets of this body on the plane {part!r}. Correct the place."
                 self.wrong(f"geometry.groups.{name}", spot)
-            return self.mesh.sides(own), none if len(own) else nodes
-        if one.of == "sides":
-            inner = ~_rows_in(self.mesh.side_corners(one.members), self.mesh.side_corners(boundary))
+            return self.mesh.sides(facets), none if len(facets) else nodes
+        if part.of == "sides":
+            inner = ~_rows_in(self.mesh.side_corners(part.members), self.mesh.side_corners(boundary))
             if inner.any():
-                place = self.mesh.place(int(one.members[inner][0, 0]))
-                text = f"the surface {self.where(one)} has faces that are not on the boundary of the body's regions"
+                place = self.mesh.place(int(part.members[inner][0, 0]))
+                text = f"the surface {self.where(part)} has faces that are not on the boundary of the body's regions"
                 self.wrong(name, f"{text}, such as one of {place}. Correct the faces, or the regions.")
-            return self.mesh.sides(one.members), none
-        if self.mesh.set_dim(one) == 0:
-            return {}, np.concatenate([rows.ravel() for rows in self.mesh.cells(one.members).values()])
-        cells = self.mesh.cells(one.members)
+            return self.mesh.sides(part.members), none
+        if self.mesh.set_dim(part) == 0:
+            return {}, np.concatenate([rows.ravel() for rows in self.mesh.cells(part.members).values()])
+        cells = self.mesh.cells(part.members)
         stray = sum(int((~body.has(rows[:, : KINDS[kind].corners])).sum()) for kind, rows in cells.items())
-        if stray and self.mesh.set_dim(one) == self.mesh.dim - 1:
+        if stray and self.mesh.set_dim(part) == self.mesh.dim - 1:
             text = f"has {stray} elements that are no sides of the elements of its body. Correct the set."
-            self.wrong(name, f"the set {self.where(one)} of {self.mesh.name} {text}")
+            self.wrong(name, f"the set {self.where(part)} of {self.mesh.name} {text}")
         return cells, none
 
     def on_plane(self, name: str, text: str) -> Ints:
@@ -393,31 +399,38 @@ class _Choice:
 
     def check(self, groups: list[Group], regions: list[Group], dim: int) -> None:
         """Complain of bodies without a region or a contact, of mixed kinds, and of elements in two groups."""
-        has = listed(one.name for one in self.mesh.sets)
+        has = listed(mesh_set.name for mesh_set in self.mesh.sets)
         for body in BODIES:
-            kinds = {KINDS[kind].name: one for one in regions if one.name.startswith(f"{body}_") for kind in one.cells}
+            kinds = {
+                KINDS[kind].name: region
+                for region in regions
+                if region.name.startswith(f"{body}_")
+                for kind in region.cells
+            }
             if len(kinds) > 1:
                 names, last = " and ".join(kinds), list(kinds)[-1]
                 place = self.mesh.place(self.first_of(kinds[last].elements, last))
                 text = f"the {body} mixes {names} (such as {place}). Mesh it with elements of one kind."
                 self.wrong(self.mesh.name, text)
-            whole = any(one.name.startswith(f"{body}_") for one in regions)
-            if not whole:
+            has_region = any(region.name.startswith(f"{body}_") for region in regions)
+            if not has_region:
                 text = f"no set of {ENTITIES[dim]} elements is named {body}_...: set geometry.groups.{body}_body"
                 self.wrong(self.mesh.name, f'{text} = "SET". It has {has}.')
-            contacts = [one for one in groups if one.name.startswith(f"{body}_contact")]
-            named = [one.name for one in contacts if one.name != f"{body}_contact"]
+            contacts = [group for group in groups if group.name.startswith(f"{body}_contact")]
+            named = [contact.name for contact in contacts if contact.name != f"{body}_contact"]
             if 0 < len(named) < len(contacts):
                 text = f"has {body}_contact and {listed(named)}. Keep {body}_contact alone, or the others"
                 self.wrong(self.mesh.name, text)
-            for one in contacts:
-                if whole and one.dim != dim - 1:
-                    text = f"{one.source} has no whole facet of the {body}; expected {ENTITIES[dim - 1]} elements"
-                    self.wrong(one.name, f"{text} or all nodes of facets. Correct the set in {self.mesh.name}.")
+            for contact in contacts:
+                if has_region and contact.dim != dim - 1:
+                    text = f"{contact.source} has no whole facet of the {body}; expected {ENTITIES[dim - 1]} elements"
+                    self.wrong(contact.name, f"{text} or all nodes of facets. Correct the set in {self.mesh.name}.")
             if not contacts:
                 text = f"no set of facets or their nodes is named {body}_contact: set geometry.groups.{body}_contact"
                 self.wrong(self.mesh.name, f'{text} = "SET", or a plane: "y = 0 mm". It has {has}.')
-        facets = ([one for one in groups if one.dim == dim - 1 and one.name.startswith(body)] for body in BODIES)
+        facets = (
+            [group for group in groups if group.dim == dim - 1 and group.name.startswith(body)] for body in BODIES
+        )
         for alike in (regions, *facets):
             for first, second, rows in _shared(alike):
                 kind = ENTITIES[first.dim]
@@ -441,30 +454,30 @@ def _rows_in(rows: Ints, among: Ints) -> Any:
 
 def _shared(groups: list[Group]) -> list[tuple[Group, Group, int]]:
     """Return pairs of groups with elements in common, and how many."""
-    found: list[tuple[Group, Group, int]] = []
-    for kind in sorted({kind for one in groups for kind in one.cells}):
-        own = [one for one in groups if kind in one.cells]
-        rows = np.concatenate([np.sort(one.cells[kind], axis=1) for one in own])
-        owner = np.repeat(np.arange(len(own)), [len(one.cells[kind]) for one in own])
+    shared: list[tuple[Group, Group, int]] = []
+    for kind in sorted({kind for group in groups for kind in group.cells}):
+        of_kind = [group for group in groups if kind in group.cells]
+        rows = np.concatenate([np.sort(group.cells[kind], axis=1) for group in of_kind])
+        owner = np.repeat(np.arange(len(of_kind)), [len(group.cells[kind]) for group in of_kind])
         order, new = sorted_rows(rows)
         same = ~new[1:]
         pairs = np.sort(np.column_stack([owner[order[1:][same]], owner[order[:-1][same]]]), axis=1)
         different = pairs[pairs[:, 0] != pairs[:, 1]]
         for (a, b), count in zip(*np.unique(different, axis=0, return_counts=True), strict=True):
-            found.append((own[a], own[b], int(count)))
-    return found
+            shared.append((of_kind[a], of_kind[b], int(count)))
+    return shared
 
 
 def into_gmsh(gmsh: Any, mesh: GroupedMesh, name: Callable[[str], str]) -> None:
     """Add the groups to gmsh's current model: each is a discrete entity and a physical group, with a name."""
-    used = np.unique(np.concatenate([cells.ravel() for one in mesh.groups for cells in one.cells.values()]))
+    used = np.unique(np.concatenate([cells.ravel() for group in mesh.groups for cells in group.cells.values()]))
     first = True
-    for tag, one in enumerate(sorted(mesh.groups, key=lambda group: -group.dim), start=1):
-        gmsh.model.addDiscreteEntity(one.dim, tag)
+    for tag, mesh_group in enumerate(sorted(mesh.groups, key=lambda group: -group.dim), start=1):
+        gmsh.model.addDiscreteEntity(mesh_group.dim, tag)
         if first:
-            gmsh.model.mesh.addNodes(one.dim, tag, used + 1, mesh.points[used].ravel())
+            gmsh.model.mesh.addNodes(mesh_group.dim, tag, used + 1, mesh.points[used].ravel())
             first = False
-        for kind, cells in one.cells.items():
+        for kind, cells in mesh_group.cells.items():
             gmsh.model.mesh.addElementsByType(tag, kind, [], cells.ravel() + 1)
-        gmsh.model.addPhysicalGroup(one.dim, [tag], tag)
-        gmsh.model.setPhysicalName(one.dim, tag, name(one.name))
+        gmsh.model.addPhysicalGroup(mesh_group.dim, [tag], tag)
+        gmsh.model.setPhysicalName(mesh_group.dim, tag, name(mesh_group.name))

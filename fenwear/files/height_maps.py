@@ -74,15 +74,17 @@ class Heights:
 
     def text(self) -> str:
         """Return `numbers` in lines."""
-        found = self.numbers()
-        size = " x ".join(map(str, found["points"]))
-        length = " x ".join(f"{one:.4g}" for one in found["length_mm"])
-        step = " x ".join(f"{1e3 * one:.4g}" for one in found["spacing_mm"])
-        tilt = " and ".join(f"{one:.3g}" for one in found["tilt_mrad"])
+        numbers = self.numbers()
+        size = " x ".join(map(str, numbers["points"]))
+        length = " x ".join(f"{side:.4g}" for side in numbers["length_mm"])
+        step = " x ".join(f"{1e3 * spacing:.4g}" for spacing in numbers["spacing_mm"])
+        tilt = " and ".join(f"{angle:.3g}" for angle in numbers["tilt_mrad"])
         lines = [
             f"{self.name}: {size} heights, {length} mm, one every {step} µm",
-            f"  range {1e3 * found['range_mm']:.4g} µm, Sq {1e3 * found['Sq_mm']:.4g} µm over a plane of {tilt} mrad",
-            f"  holes: {found['holes']}" + (f", of them {found['far']} far beyond the others" if found["far"] else ""),
+            f"  range {1e3 * numbers['range_mm']:.4g} µm, Sq {1e3 * numbers['Sq_mm']:.4g} µm "
+            f"over a plane of {tilt} mrad",
+            f"  holes: {numbers['holes']}"
+            + (f", of them {numbers['far']} far beyond the others" if numbers["far"] else ""),
         ]
         return "\n".join((*lines, *self.notes))
 
@@ -119,8 +121,8 @@ class Heights:
                 units.append(float(np.prod([sizes[axis] for axis in axes])))
         matrix = np.column_stack(terms)
         good = np.isfinite(self.heights.ravel()) & ~self.far.ravel()
-        found = np.linalg.lstsq(matrix[good], self.heights.ravel()[good], rcond=None)[0]
-        return matrix * np.array(units), found / np.array(units)
+        coefficients = np.linalg.lstsq(matrix[good], self.heights.ravel()[good], rcond=None)[0]
+        return matrix * np.array(units), coefficients / np.array(units)
 
 
 BROKEN = (OSError, ValueError, KeyError, EOFError, IndexError, TypeError, AttributeError, RuntimeError, MemoryError,
@@ -152,9 +154,13 @@ Raw = tuple[Sequence[Array], Array, list[str]]
 
 def _checked(path: Path, places: Sequence[Array], heights: Array, notes: list[str]) -> Heights:
     """Return a map with rising coordinates, and with fill values and spikes marked."""
-    places = [np.asarray(one, dtype=np.float64) for one in places]
-    if heights.shape != tuple(len(one) for one in places) or not heights.shape or min(heights.shape) < 2:
-        sizes = " by ".join(str(len(one)) for one in places)
+    places = [np.asarray(axis_places, dtype=np.float64) for axis_places in places]
+    if (
+        heights.shape != tuple(len(axis_places) for axis_places in places)
+        or not heights.shape
+        or min(heights.shape) < 2
+    ):
+        sizes = " by ".join(str(len(axis_places)) for axis_places in places)
         raise ValueError(f"expected heights {sizes} along x and y, got {' by '.join(map(str, heights.shape))}")
     for axis, name in zip(range(len(places)), "xy", strict=False):
         steps = np.diff(places[axis])
@@ -193,12 +199,12 @@ def _harmonic(heights: Array, holes: Mask) -> Array:
 
     number, size = np.arange(heights.size).reshape(heights.shape), heights.size
     along = [np.moveaxis(number, axis, 0) for axis in range(heights.ndim)]
-    ends = np.concatenate([[one[:-1].ravel(), one[1:].ravel()] for one in along], axis=1)
+    ends = np.concatenate([[lines[:-1].ravel(), lines[1:].ravel()] for lines in along], axis=1)
     joined = coo_array((np.ones(ends.shape[1]), ends), shape=(size, size)).tocsr()
     rows = laplacian(joined + joined.T).tocsr()[number[holes]]
-    found = heights.copy()
-    found[holes] = spsolve(rows[:, number[holes]].tocsc(), -(rows @ heights.ravel()))
-    return found
+    filled = heights.copy()
+    filled[holes] = spsolve(rows[:, number[holes]].tocsc(), -(rows @ heights.ravel()))
+    return filled
 
 
 def _unit(text: object, of: str) -> float:
@@ -218,13 +224,13 @@ def _unit(text: object, of: str) -> float:
 
 def _named(names: Sequence[str], wanted: Sequence[str]) -> str | None:
     """Return the name that is one of those wanted, whatever its case."""
-    return next((name for one in wanted for name in names if name.casefold() == one), None)
+    return next((name for candidate in wanted for name in names if name.casefold() == candidate), None)
 
 
 def _from_npz(path: Path) -> Raw:
     with np.load(path, allow_pickle=False) as data:
         names = list(data.keys())
-        height, x, unit = (_named(names, one) for one in (NAMES, ("x",), ("unit", "units")))
+        height, x, unit = (_named(names, accepted) for accepted in (NAMES, ("x",), ("unit", "units")))
         if height is None or x is None or unit is None:
             missing = ", ".join(name for name, there in (("height", height), ("x", x), ("unit", unit)) if there is None)
             raise ValueError(f"lacks {missing}: expected height (m, n), x (m,), y (n,) and a unit")
@@ -244,20 +250,20 @@ def _from_nc(path: Path) -> Raw:
 
     engine = "scipy" if path.read_bytes()[:3] == b"CDF" else "h5netcdf"
     with xarray.open_dataset(path, engine=engine) as data:  # type: ignore[arg-type]
-        name = _named([str(one) for one in data.data_vars], NAMES)
+        name = _named([str(variable) for variable in data.data_vars], NAMES)
         if name is None:
             raise ValueError(f"has no variable height; it has {', '.join(map(str, data.variables)) or 'none'}")
         height = data[name].transpose(*(axis for axis in ("x", "y") if axis in data[name].dims), ...)
         parts: list[Array] = []
-        for one in (*map(str, height.dims), name):
-            if one not in data.variables:
-                raise ValueError(f"has no variable {one} with the places of the heights along it")
-            attributes = data[one].attrs
+        for axis_name in (*map(str, height.dims), name):
+            if axis_name not in data.variables:
+                raise ValueError(f"has no variable {axis_name} with the places of the heights along it")
+            attributes = data[axis_name].attrs
             unit = next((attributes[key] for key in ("units", "unit", "length_unit") if key in attributes), None)
             if unit is None:
-                raise ValueError(f"{one} has no attribute units")
-            values = np.asarray(height if one == name else data[one], dtype=np.float64)
-            parts.append(values * _unit(unit, one))
+                raise ValueError(f"{axis_name} has no attribute units")
+            values = np.asarray(height if axis_name == name else data[axis_name], dtype=np.float64)
+            parts.append(values * _unit(unit, axis_name))
         return parts[:-1], parts[-1], []
 
 
@@ -312,7 +318,7 @@ def raster(axes: Sequence[Array], heights: Array) -> Raw:
     except QhullError:
         raise ValueError("the points lie on a line: expected a raster, or points over an area") from None
     outside = ~np.isfinite(scattered_heights)
-    scattered_heights[outside] = NearestNDInterpolator(points, heights)(*(one[outside] for one in mesh))
+    scattered_heights[outside] = NearestNDInterpolator(points, heights)(*(coordinate[outside] for coordinate in mesh))
     size = " x ".join(map(str, counts))
     return grid, scattered_heights, [f"{count:,} scattered points: interpolated onto a raster of {size}"]
 
@@ -335,19 +341,19 @@ def _from_instrument(path: Path) -> Raw:
     except ImportError:
         raise ValueError(f"{path.suffix} files need pip install SurfaceTopography. {advice}") from None
     try:
-        found = open_topography(str(path)).topography()
+        topography = open_topography(str(path)).topography()
     except Exception as error:  # each of its readers has errors of its own
         reason = str(error).partition("\n")[0].rstrip(".")
         raise ValueError(f"SurfaceTopography fails ({type(error).__name__}: {reason}). {advice}") from None
-    if not found.unit:
+    if not topography.unit:
         raise ValueError(f"has no unit of length. {advice}")
-    unit = _unit(found.unit, "the map")
-    if not found.is_uniform:
-        return [np.asarray(found.positions()) * unit], np.asarray(found.heights()) * unit, []
-    heights = found.heights()  # masked where there are holes
+    unit = _unit(topography.unit, "the map")
+    if not topography.is_uniform:
+        return [np.asarray(topography.positions()) * unit], np.asarray(topography.heights()) * unit, []
+    heights = topography.heights()  # masked where there are holes
     z = np.array(getattr(heights, "data", heights), dtype=np.float64)
     z[np.broadcast_to(np.asarray(getattr(heights, "mask", False)), z.shape)] = np.nan
-    axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, found.physical_sizes, strict=True)]
+    axes = [(np.arange(n) + 0.5) * size / n for n, size in zip(z.shape, topography.physical_sizes, strict=True)]
     return [axis * unit for axis in axes], z * unit, []
 
 

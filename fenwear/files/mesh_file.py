@@ -171,12 +171,12 @@ class MeshFile:
         """Number of each block's first element, and of all elements."""
         return np.cumsum([0, *(len(block.nodes) for block in self.blocks)])
 
-    def set_dim(self, one: MeshSet) -> int:
+    def set_dim(self, mesh_set: MeshSet) -> int:
         """Return the largest dimension of what a set holds."""
-        if one.of == "nodes":
+        if mesh_set.of == "nodes":
             return 0
-        dims = self.element_dims(one.members if one.of == "elements" else one.members[:, 0])
-        return int(dims.max(initial=0)) - (one.of == "sides")
+        dims = self.element_dims(mesh_set.members if mesh_set.of == "elements" else mesh_set.members[:, 0])
+        return int(dims.max(initial=0)) - (mesh_set.of == "sides")
 
     def element_dims(self, elements: Ints) -> Ints:
         """Return the dimensions of elements."""
@@ -191,8 +191,8 @@ class MeshFile:
         """Yield each block of elements, those that are of it, and the rows of their nodes (n, k)."""
         of = self.block_of(elements)
         for number in np.unique(of):
-            block, own = self.blocks[number], elements[of == number]
-            yield block, own, block.nodes[own - self.starts[number]]
+            block, block_elements = self.blocks[number], elements[of == number]
+            yield block, block_elements, block.nodes[block_elements - self.starts[number]]
 
     def cells(self, elements: Ints) -> dict[int, Ints]:
         """Return the points of elements (n, k) by their kind."""
@@ -209,31 +209,33 @@ class MeshFile:
             block = self.blocks[number]
             kind = KINDS[block.kind]
             for side in range(len(kind.sides)):
-                own = members[(blocks == number) & (members[:, 1] == side), 0] - self.starts[number]
+                rows = members[(blocks == number) & (members[:, 1] == side), 0] - self.starts[number]
                 columns = kind.side_nodes(side)
                 of = 8 if kind.dim == 2 and len(columns) == 3 else SIDE_KINDS[len(columns)]
-                if len(own):
-                    points[of] = stacked(points.get(of), block.nodes[own][:, columns])
+                if len(rows):
+                    points[of] = stacked(points.get(of), block.nodes[rows][:, columns])
         return points
 
     def all_sides(self, elements: Ints) -> Ints:
         """Return every side of elements (n, 2): the element and the number of the side."""
         pairs = [np.zeros((0, 2), np.int64)]
-        for block, own, _ in self.by_block(elements):
+        for block, block_elements, _ in self.by_block(elements):
             for side in range(len(KINDS[block.kind].sides)):
-                pairs.append(np.column_stack([own, np.full(len(own), side)]))
+                pairs.append(np.column_stack([block_elements, np.full(len(block_elements), side)]))
         return np.concatenate(pairs)
 
     def side_corners(self, members: Ints) -> Ints:
         """Return the corners of sides, ascending and filled with -1 (n, 4)."""
-        found = np.full((len(members), 4), -1, dtype=np.int64)
+        corner_rows = np.full((len(members), 4), -1, dtype=np.int64)
         blocks = self.block_of(members[:, 0])
         for number in np.unique(blocks):
             block = self.blocks[number]
             for side, corners in enumerate(KINDS[block.kind].sides):
-                own = (blocks == number) & (members[:, 1] == side)
-                found[own, : len(corners)] = block.nodes[members[own, 0] - self.starts[number]][:, list(corners)]
-        return np.sort(found, axis=1)
+                mask = (blocks == number) & (members[:, 1] == side)
+                corner_rows[mask, : len(corners)] = block.nodes[members[mask, 0] - self.starts[number]][
+                    :, list(corners)
+                ]
+        return np.sort(corner_rows, axis=1)
 
     def boundary(self, elements: Ints) -> Ints:
         """Return the sides of one of these elements alone (n, 2)."""
@@ -245,18 +247,18 @@ class MeshFile:
     def place(self, element: int) -> str:
         """Return an element's number and line, for messages."""
         number = int(self.block_of(np.array([element]))[0])
-        block, own = self.blocks[number], element - int(self.starts[number])
-        line = f" (line {block.lines[own]})" if block.lines[own] else ""
-        return f"element {block.labels[own]}{line}"
+        block, row = self.blocks[number], element - int(self.starts[number])
+        line = f" (line {block.lines[row]})" if block.lines[row] else ""
+        return f"element {block.labels[row]}{line}"
 
-    def measure(self, one: MeshSet) -> float:
+    def measure(self, mesh_set: MeshSet) -> float:
         """Return the length, area or volume of a set, in powers of the file's unit; 0 of nodes."""
-        if one.of == "nodes":
+        if mesh_set.of == "nodes":
             return 0.0
-        if one.of == "sides":
-            return measure(self.points, self.sides(one.members))
-        dims = self.element_dims(one.members)
-        return measure(self.points, self.cells(one.members[dims == dims.max(initial=0)]))
+        if mesh_set.of == "sides":
+            return measure(self.points, self.sides(mesh_set.members))
+        dims = self.element_dims(mesh_set.members)
+        return measure(self.points, self.cells(mesh_set.members[dims == dims.max(initial=0)]))
 
 
 def in_space(x: Array) -> Array:
@@ -344,20 +346,20 @@ def _slopes(number: int) -> Array:
 
 def bad_elements(mesh: MeshFile, elements: Ints) -> Ints:
     """Return the elements that are degenerate or twisted at a node; mirrored elements are neither."""
-    found = [np.zeros(0, np.int64)]
-    for block, own, nodes in mesh.by_block(elements):
+    bad = [np.zeros(0, np.int64)]
+    for block, block_elements, nodes in mesh.by_block(elements):
         if block.kind not in USABLE:
             continue
         slopes = _slopes(block.kind)
-        for some in (slice(k, k + AT_ONCE) for k in range(0, len(own), AT_ONCE)):
+        for some in (slice(k, k + AT_ONCE) for k in range(0, len(block_elements), AT_ONCE)):
             x = mesh.points[nodes[some]][:, :, : KINDS[block.kind].dim]
             edges = np.tensordot(x, slopes, (1, 2)).transpose(0, 3, 2, 1)  # (n, nodes, along, d)
             sizes = np.linalg.norm(edges, axis=3)
             signs = np.linalg.det(edges) / np.maximum(np.prod(sizes, axis=2), 1e-300)
             good = (signs > FLATTEST).all(axis=1) | (signs < -FLATTEST).all(axis=1)
             good &= sizes.min(axis=(1, 2)) > FLAT * sizes.max(axis=(1, 2))
-            found.append(own[some][~good])
-    return np.concatenate(found)
+            bad.append(block_elements[some][~good])
+    return np.concatenate(bad)
 
 
 def sound(mesh: MeshFile) -> MeshFile:

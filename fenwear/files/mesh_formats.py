@@ -146,7 +146,7 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
         sides = np.asarray(get(f"side_ss{number}"), dtype=np.int64) - 1
         if elements.size and not (elements.min() >= 0 and elements.max() < start):
             raise ValueError(f"side set {number} has elements that do not exist")
-        sets.append(MeshSet(_name(names, ids, number, "sideset"), "sides", _own_sides(mesh, elements, sides)))
+        sets.append(MeshSet(_name(names, ids, number, "sideset"), "sides", _ordered_sides(mesh, elements, sides)))
     ids, names = get("ns_prop1"), _texts(get("ns_names"))
     for number in _numbered("node_ns", get):
         nodes = np.unique(np.asarray(get(f"node_ns{number}"), dtype=np.int64) - 1)
@@ -155,17 +155,17 @@ def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any])
     return MeshFile(name, points, tuple(blocks), tuple(sets))
 
 
-def _own_sides(mesh: MeshFile, elements: Ints, sides: Ints) -> Ints:
+def _ordered_sides(mesh: MeshFile, elements: Ints, sides: Ints) -> Ints:
     """Return elements and sides in the order of sides that `KINDS` has."""
     kinds = np.array([block.kind for block in mesh.blocks])[mesh.block_of(elements)]
-    found = sides.copy()
+    converted = sides.copy()
     for kind, order in SOLID_SIDES.items():
-        own = kinds == kind
-        found[own] = np.array(order)[sides[own]]
+        of_kind = kinds == kind
+        converted[of_kind] = np.array(order)[sides[of_kind]]
     most = np.array([len(KINDS[kind].sides) for kind in kinds])
-    if ((found < 0) | (found >= most)).any():
+    if ((converted < 0) | (converted >= most)).any():
         raise ValueError("a side set has sides that its elements do not have")
-    return np.column_stack([elements, found])
+    return np.column_stack([elements, converted])
 
 
 def _numbered(stem: str, get: Callable[[str], Any]) -> Iterator[int]:
@@ -182,7 +182,7 @@ def _text(value: Any) -> str:
 def _texts(value: Any) -> list[str]:
     if value is None:
         return []
-    rows = (b"".join(bytes(np.asarray(one, dtype="S1")) for one in row) for row in value)
+    rows = (b"".join(bytes(np.asarray(letter, dtype="S1")) for letter in row) for row in value)
     return [re.sub(r"\0.*", "", row.decode("utf-8", "replace"), flags=re.DOTALL).strip() for row in rows]
 
 
@@ -257,16 +257,16 @@ class _Vtu:
             nodes = named["connectivity"].astype(np.int64)
             kept = []
             for kind in np.unique(kinds):
-                own = np.flatnonzero(kinds == kind)
+                selected = np.flatnonzero(kinds == kind)
                 if int(kind) not in VTK_KINDS:
-                    notes.add(f"{len(own):,} cells of VTK's type {kind} are left out")
+                    notes.add(f"{len(selected):,} cells of VTK's type {kind} are left out")
                     continue
                 number = VTK_KINDS[int(kind)]
                 count = KINDS[number].nodes
-                table = nodes[ends[own][:, None] - count + np.arange(count)]
+                table = nodes[ends[selected][:, None] - count + np.arange(count)]
                 known_nodes(table, len(part) // 3, f"type {kind} of cells")
                 blocks.append(Block.of(number, start + table[:, ORDERS.get(number, slice(None))]))
-                kept.append(own)
+                kept.append(selected)
             cells = np.concatenate(kept) if kept else np.zeros(0, np.int64)
             for name, values in data.items():
                 if len(values) == len(kinds):
@@ -274,8 +274,8 @@ class _Vtu:
             points.append(part.reshape(-1, 3).astype(np.float64))
             start += len(points[-1])
         total = sum(len(block.nodes) for block in blocks)
-        whole = {name: np.concatenate(parts) for name, parts in arrays.items()}
-        sets = _sets({name: values for name, values in whole.items() if len(values) == total})
+        joined = {name: np.concatenate(parts) for name, parts in arrays.items()}
+        sets = _sets({name: values for name, values in joined.items() if len(values) == total})
         return MeshFile(self.path.name, np.concatenate(points), tuple(blocks), tuple(sets), tuple(sorted(notes)))
 
     def array(self, element: ElementTree.Element | None) -> NDArray[Any]:
@@ -323,8 +323,8 @@ def _sets(arrays: Mapping[str, NDArray[Any]]) -> Iterator[MeshSet]:
     """Yield a set for each value of whole-numbered arrays of cells."""
     for name, values in arrays.items():
         if values.ndim == 1 and len(values) and np.array_equal(values, np.round(values)):
-            found = np.unique(values)
-            for value in found if len(found) <= MOST_VALUES else []:
+            distinct = np.unique(values)
+            for value in distinct if len(distinct) <= MOST_VALUES else []:
                 yield MeshSet(f"{name} {int(value)}", "elements", np.flatnonzero(values == value))
 
 

@@ -31,7 +31,7 @@ import numpy as np
 import scipy
 from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
-from fenwear.case.body_names import told_by_name
+from fenwear.case.body_names import with_body_names
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, ConvergenceError
 from fenwear.contact.complementarity import complementarity_error
@@ -158,7 +158,7 @@ class SteadyState:
         return f"<Steady: {n} contact nodes, {len(self.directions)} half-cycles, largest pressure {most:.5g} MPa>"
 
 
-@told_by_name
+@with_body_names
 def steady(system: Tribosystem, *, properties_within: float | None = None) -> SteadyState:
     """Solve for the cyclic steady state; collective.
 

@@ -19,7 +19,7 @@ from fenwear.bodies.material_regions import contact_density, contact_regions
 from fenwear.bodies.surface_operators import check_operators
 from fenwear.bodies.worn_mesh import follow_wear, movable_surface
 from fenwear.case import Body, Case
-from fenwear.case.body_names import ROLES, told_by_name
+from fenwear.case.body_names import ROLES, with_body_names
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.common.parallel import release
@@ -176,7 +176,7 @@ class Bodies:
         return replace(self, punch=punch, strip=strip)
 
 
-@told_by_name
+@with_body_names
 def build_bodies(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,

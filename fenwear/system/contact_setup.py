@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fenwear.bodies.worn_mesh import element_height
 from fenwear.case import Case, Heat
-from fenwear.case.body_names import Names, told_by_name
+from fenwear.case.body_names import Names, with_body_names
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, InputError, Remedies
 from fenwear.common.parallel import Team
@@ -527,7 +527,7 @@ class ContactSetup:
         """The wear of all phases at the mean pressure and the initial temperature."""
         return self.wear.phases([self.conditions(k) for k in range(len(self.motion.phases))])
 
-    @told_by_name
+    @with_body_names
     def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.case import Case
-from fenwear.case.body_names import told_by_name
+from fenwear.case.body_names import with_body_names
 from fenwear.case.motion_table import Cycle
 from fenwear.case.program import stages_of
 from fenwear.heat.passage import Passage
@@ -35,7 +35,7 @@ from fenwear.system.strokes import Sliding, check_stays, make_sliding
 STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stays in its place for the heat
 
 
-@told_by_name
+@with_body_names
 def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
     """Bring the surfaces opposite each other in every phase of the motion; collective.
 
@@ -101,7 +101,7 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
     return placed
 
 
-@told_by_name
+@with_body_names
 def place_at_rest(
     bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case, *, passes: bool = False
 ) -> ContactSetup:

@@ -16,7 +16,7 @@ from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.response import Request, identity
 from fenwear.bodies.surface_operators import Relocatable, SurfaceOperator, operators_for
-from fenwear.case.body_names import told_by_name
+from fenwear.case.body_names import with_body_names
 from fenwear.case.program import speeds_of
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
@@ -165,7 +165,7 @@ class Tribosystem(ContactSetup):
     ) -> ContactSolver:
         return CondensedContact(phases, self.remedies, self.team, most)
 
-    @told_by_name
+    @with_body_names
     def check_touching(self) -> None:
         """Make sure that the surfaces touch in some phase; collective.
 

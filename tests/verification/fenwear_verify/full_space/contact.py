@@ -411,7 +411,7 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
     values = part.data[:, None] * traction[columns]
     dim = elastic.dim
     place = np.full(len(elastic.trace.blocks), -1)
-    place[elastic.trace.own] = elastic.trace.local
+    place[elastic.trace.owned] = elastic.trace.local
     own = place[nodes] >= 0
     rows = (dim * place[nodes[own], None] + np.arange(dim)).ravel()
     shape = (elastic.stiffness.getLocalSize()[0], len(traction))

@@ -234,12 +234,11 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     """
     from fenwear.checks import RULES, Seen, law_warnings, unique_text
     from fenwear.results.time_steps import REGIMES, regime_of
-    from fenwear.steps.stick_interface import meshed
     from fenwear.steps.stick_state import TimeStepRecords
 
     system.check_touching()
     problem = system.law_state.problem
-    setup = meshed(problem.interface).needs.text()
+    setup = problem.interface.needs.text()
     records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
     thick, weights = system.case.model.thickness, problem.weights
     stuck = float(weights @ records.sticking.all(axis=0)) / float(weights @ (records.pressure > 0).any(axis=0))

@@ -30,7 +30,7 @@ import numpy as np
 import scipy.linalg
 
 from fenwear.case.dependence import WEAR, State, evaluate_of_state
-from fenwear.common.arrays import Array
+from fenwear.common.arrays import Added, Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.laws.friction import ContactConditions
 from fenwear.surfaces import ContactPair
@@ -162,21 +162,11 @@ FORGETFUL = Memory({}, {}, frozenset())  # of laws that remember nothing
 
 
 @dataclass(frozen=True)
-class Held:
+class Held(Added):
     """States of the contact (q, n) and of the strip (q_s, n_s), or changes of them."""
 
     contact: Array
     strip: Array
-
-    def __add__(self, other: Held) -> Held:
-        return Held(self.contact + other.contact, self.strip + other.strip)
-
-    def __sub__(self, other: Held) -> Held:
-        return Held(self.contact - other.contact, self.strip - other.strip)
-
-    def times(self, factor: float) -> Held:
-        """Return the states times a factor."""
-        return Held(factor * self.contact, factor * self.strip)
 
     def at_contact(self, pair: ContactPair) -> Array:
         """Return the states at the contact's nodes (q + q_s, n)."""

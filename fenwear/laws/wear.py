@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fenwear.case import Dependence, WearLaw
-from fenwear.common.arrays import Array
+from fenwear.common.arrays import Added, Array
 from fenwear.laws.coating import Shares, left_of, shares
 from fenwear.laws.friction import ContactConditions, Friction
 from fenwear.laws.pressure_law import PressureLaw
@@ -28,7 +28,7 @@ STIFF: Array = np.zeros(0)  # what bodies have crept that do not creep
 
 
 @dataclass(frozen=True)
-class WornDepths:
+class WornDepths(Added):
     """Worn depths, and the states of what lies between the surfaces and of what creeps.
 
     Attributes:
@@ -45,38 +45,9 @@ class WornDepths:
     crept: Array = field(default_factory=lambda: STIFF)
     carried: Array = field(default_factory=lambda: NOTHING)
 
-    def __add__(self, other: WornDepths) -> WornDepths:
-        return WornDepths(
-            self.punch + other.punch,
-            self.strip + other.strip,
-            _added(self.between, other.between),
-            _added(self.crept, other.crept),
-            _added(self.carried, other.carried),
-        )
-
-    def __sub__(self, other: WornDepths) -> WornDepths:
-        return self + other.times(-1.0)
-
     def same(self, other: WornDepths) -> bool:
         """Return whether all of it is equal to another's."""
-        mine, theirs = ((one.punch, one.strip, *one._kept) for one in (self, other))
-        return all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
-
-    def times(self, factor: float) -> WornDepths:
-        """Return the depths times a factor."""
-        return WornDepths(factor * self.punch, factor * self.strip, *(factor * state for state in self._kept))
-
-    @property
-    def _kept(self) -> tuple[Array, Array, Array]:
-        """Unworn parts; where nothing is, still as wide as the surface, which rows of a run have to be alike in."""
-        return self.between, self.crept, self.carried
-
-
-def _added(one: Array, other: Array) -> Array:
-    """Return the sum of states of layers or creep; an empty state adds nothing."""
-    if not len(other):
-        return one
-    return one + other if len(one) else other
+        return all(map(np.array_equal, vars(self).values(), vars(other).values()))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from fenwear.steps.gross_sliding import LAW as SLIDING
 from fenwear.steps.run_state import SUMS, RunState, Totals, approach, with_worn
 from fenwear.steps.stick_cycle import PartialSlipProblem, on_other_grid
 from fenwear.steps.stick_final import FinalShape, final_shape
-from fenwear.steps.stick_interface import StickInterface, meshed
+from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_jump import first_cycle, jumped
 from fenwear.steps.stick_setup import (
     Ends,
@@ -245,7 +245,7 @@ def system_of(
         ConvergenceError: a time step of the first cycle did not converge.
     """
     problem = placed_by_slip(case, bodies, fresh=fresh, condensed=condensed)
-    interface, fineness = meshed(problem.interface), None
+    interface, fineness = problem.interface, None
     sliding = replace(interface.sliding, motion=_motion_at_rest(interface, case))
     placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case, passes=interface.moves)
     system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))

@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.common.arrays import Array, Mask
+from fenwear.common.arrays import Added, Array, Mask
 from fenwear.contact import ContactState
 from fenwear.heat.heat_exchange import HeatExchange
 from fenwear.heat.temperature import HeatState
@@ -50,7 +50,7 @@ MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
 
 @dataclass(frozen=True)
-class Totals:
+class Totals(Added):
     """Totals, of one state or of k of them.
 
     Attributes:
@@ -62,16 +62,6 @@ class Totals:
     sums: Array
     energy: Array
     pressure: Array
-
-    def __add__(self, other: Totals) -> Totals:
-        return Totals(self.sums + other.sums, self.energy + other.energy, self.pressure + other.pressure)
-
-    def __sub__(self, other: Totals) -> Totals:
-        return self + other.times(-1.0)
-
-    def times(self, factor: float) -> Totals:
-        """Return the totals times a factor."""
-        return Totals(factor * self.sums, factor * self.energy, factor * self.pressure)
 
     def of(self, name: str) -> Array:
         """Return the sum () or (k,) of this name in `SUMS`."""

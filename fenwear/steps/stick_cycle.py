@@ -27,7 +27,7 @@ from fenwear.laws.sliding_tensors import CycleShear, SlidingWays
 from fenwear.laws.wear import PhasesWear, WornDepths
 from fenwear.steps.stick_heat import StickHeat, coupled_step
 from fenwear.steps.stick_increment import advance
-from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_interface import StickInterface, untouched
 from fenwear.steps.stick_position import LoadEffect, Position, surface_strain
 from fenwear.steps.stick_program import Program, TimeStep
 from fenwear.steps.stick_state import NO_HEAT, NO_SHIFT, Imposed, PartialSlipState, StickState, TimeStepRecords
@@ -59,7 +59,7 @@ class PartialSlipProblem:
         pressed: State in which the first cycle begins, unworn, under the loads of the case, once it is known.
     """
 
-    interface: OppositeBodies
+    interface: StickInterface
     program: Program
     wear: LocalWear
     friction: Array

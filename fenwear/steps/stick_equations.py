@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps.stick_creep import Displaced, StickCreep
-from fenwear.steps.stick_interface import OppositeBodies
+from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_position import Position
 from fenwear.steps.stick_state import Imposed, StickState
 
@@ -123,7 +123,7 @@ class Step:
     patience = NEVER  # Newton steps without success that end it
 
     def __init__(
-        self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
+        self, interface: StickInterface, position: Position, before: StickState, imposed: Imposed, friction: Array
     ) -> None:
         creep = interface.creep
         position = creep.grown(position, imposed.duration)

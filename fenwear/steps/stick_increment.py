@@ -11,7 +11,7 @@ import scipy
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps.stick_equations import ContactStatus, StatusSolution, Step
-from fenwear.steps.stick_interface import OppositeBodies
+from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_position import Position, along_tangents
 from fenwear.steps.stick_products import GridStep
 from fenwear.steps.stick_state import Imposed, StickState
@@ -27,7 +27,7 @@ class ManyAnswersError(ConvergenceError):
 
 
 def advance(
-    interface: OppositeBodies,
+    interface: StickInterface,
     before: StickState,
     start: Imposed,
     end: Imposed,
@@ -66,14 +66,14 @@ def advance(
         raise
 
 
-def _step(interface: OppositeBodies, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
+def _step(interface: StickInterface, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
     """Return the equations of a time step, on a grid by its products."""
     gridded = position.compliance.on_grid is not None
     return (GridStep if gridded else Step)(interface, position, before, end, friction)
 
 
 def _check_force(
-    interface: OppositeBodies, position: Position, before: StickState, start: Imposed, end: Imposed, friction: Array
+    interface: StickInterface, position: Position, before: StickState, start: Imposed, end: Imposed, friction: Array
 ) -> None:
     """Raise where an imposed force is more than the contact in gross sliding carries.
 
@@ -100,7 +100,7 @@ def _check_force(
 
 
 def _advance(
-    interface: OppositeBodies,
+    interface: StickInterface,
     position: Position,
     before: StickState,
     start: Imposed,

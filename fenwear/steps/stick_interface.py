@@ -13,75 +13,24 @@ from fenwear.bodies.response import Request, identity
 from fenwear.bodies.surface_operators import SurfaceOperator, operators_for
 from fenwear.case import Case
 from fenwear.common.arrays import Array
-from fenwear.common.parallel import ALONE, Team
-from fenwear.laws import Layers, common_modulus, layers_of
-from fenwear.laws.wear import WornDepths
+from fenwear.common.parallel import Team
+from fenwear.laws import common_modulus, layers_of
 from fenwear.steps.stick_creep import StickCreep, stiff
 from fenwear.steps.stick_position import LoadEffect, Position, along_tangents, position_of, surface_gradient
 from fenwear.steps.stick_program import steps_of
 from fenwear.steps.stick_state import StickState
 from fenwear.surfaces import (
     ContactPair,
-    RigidEquilibrium,
     check_distance,
     pair,
     rigid_equilibrium,
 )
 from fenwear.surfaces.placement import HERE, Placement
-from fenwear.surfaces.sliding_field import SlidingField
 from fenwear.surfaces.track import Border
 from fenwear.system import Bodies, Resources, Sliding, setup_resources
 
 
-class OppositeBodies:
-    """Two bodies that stay opposite each other under one load.
-
-    Args:
-        punch, strip: Their response along all axes at the contact's nodes.
-        rigid: The rigid modes, their load, and the pair of surfaces.
-        field: Displacement of the strip by the rig.
-    """
-
-    moves = False
-    team = ALONE  # the ranks that have them, of which one leads
-    moved: WornDepths | None = None  # depths that the meshes have followed
-
-    def __init__(
-        self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
-    ) -> None:
-        self.punch, self.strip, self.field = punch, strip, field
-        self.creep = stiff(punch, strip)
-        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, punch.by_load, strip.by_load)
-        self._positions: dict[float | Placement, Position] = {0.0: position_of(rigid, punch, strip, field)}
-        self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
-
-    @cached_property
-    def gradient(self) -> csr_array:
-        """Takes values at the nodes to their derivatives along the surface there, see `strain.surface_gradient`."""
-        return surface_gradient(self.middle.pair.punch)
-
-    @property
-    def middle(self) -> Position:
-        """The middle position of the strip."""
-        return self._positions[0.0]
-
-    @property
-    def bulk(self) -> Array:
-        """Displacement of the strip at the nodes of its operator by a unit bulk strain (q, d), mm: none."""
-        return np.zeros_like(self.strip.by_load)
-
-    def position(self, offset: float | Placement) -> Position:
-        """Return the place of the strip moved by this amount of its motion: its one place."""
-        del offset
-        return self.middle
-
-    def loaded(self, fraction: float | None) -> LoadEffect:
-        """Return the effect of the loads at a fraction of the cycle, here a constant."""
-        del fraction
-        return self._load
-
-
-class StickInterface(OppositeBodies):
+class StickInterface:
     """Two meshed bodies condensed along all axes, and the places of the strip under the punch.
 
     Args:
@@ -139,8 +88,18 @@ class StickInterface(OppositeBodies):
         else:
             self.punch, self.strip = condensed
         self.creep = self._creep()
-        self._positions = {0.0: self._position(middle)}
+        self._positions: dict[float | Placement, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float | None, LoadEffect] = {}
+
+    @cached_property
+    def gradient(self) -> list[csr_array]:
+        """Derivatives along the surface of values at the nodes, see `surface_gradient`."""
+        return surface_gradient(self.middle.pair.punch)
+
+    @property
+    def middle(self) -> Position:
+        """The middle position of the strip."""
+        return self._positions[0.0]
 
     def _needs(self, nodes: int, on_strip: int) -> Resources:
         """Return the resources for condensed bodies, C of each position and Newton's matrix; collective.
@@ -230,18 +189,7 @@ class StickInterface(OppositeBodies):
         return along_tangents(found) if self.far else found
 
 
-def meshed(bodies: OppositeBodies) -> StickInterface:
-    """Return the bodies, which must have been made from meshes.
-
-    Raises:
-        ValueError: they were not.
-    """
-    if not isinstance(bodies, StickInterface):
-        raise ValueError("expected bodies with meshes")
-    return bodies
-
-
-def untouched(interface: OppositeBodies) -> StickState:
+def untouched(interface: StickInterface) -> StickState:
     """Return the unloaded bodies before they touch."""
     n, d = interface.middle.pair.normal.shape
     none = np.zeros((n, d - 1))

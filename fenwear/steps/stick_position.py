@@ -26,7 +26,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.response import identity
 from fenwear.bodies.subcells import linear_cells
 from fenwear.bodies.surface_operators import SurfaceOperator
-from fenwear.common.arrays import Array
+from fenwear.common.arrays import Added, Array
 from fenwear.surfaces import Compliance, ContactPair, Interface, RigidEquilibrium
 from fenwear.surfaces.common_normal import contact_frame
 from fenwear.surfaces.placement import in_model, in_space
@@ -34,7 +34,7 @@ from fenwear.surfaces.sliding_field import SlidingField
 
 
 @dataclass(frozen=True)
-class LoadEffect:
+class LoadEffect(Added):
     """Effect of the loads at one time of the cycle.
 
     Attributes:
@@ -49,20 +49,6 @@ class LoadEffect:
     on_strip: Array
     forced_punch: Array
     forced_strip: Array
-
-    def times(self, factor: float) -> LoadEffect:
-        """Return the effect of the loads times a factor."""
-        if factor == 1:
-            return self
-        return LoadEffect(*(factor * part for part in self._parts))
-
-    def plus(self, other: LoadEffect) -> LoadEffect:
-        """Return the sum of the effects of both loads."""
-        return LoadEffect(*(one + more for one, more in zip(self._parts, other._parts, strict=True)))
-
-    @property
-    def _parts(self) -> tuple[Array, Array, Array, Array, Array]:
-        return self.resultant, self.on_punch, self.on_strip, self.forced_punch, self.forced_strip
 
 
 @dataclass(frozen=True)

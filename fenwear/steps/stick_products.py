@@ -26,7 +26,7 @@ from fenwear.algebra.krylov import flexible
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import ConvergenceError
 from fenwear.steps.stick_equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
-from fenwear.steps.stick_interface import OppositeBodies
+from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_position import Position
 from fenwear.steps.stick_state import Imposed, StickState
 from fenwear.surfaces.grid_compliance import STIFF
@@ -51,7 +51,7 @@ class GridStep(Step):
     close, few, patience = CLOSE, FEW, PATIENCE
 
     def __init__(
-        self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
+        self, interface: StickInterface, position: Position, before: StickState, imposed: Imposed, friction: Array
     ) -> None:
         super().__init__(interface, position, before, imposed, friction)
         on = self.position.compliance.on_grid

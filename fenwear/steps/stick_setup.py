@@ -24,7 +24,7 @@ from fenwear.common.errors import CaseError, InputError
 from fenwear.common.parallel import memory_size
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_heat import stick_heat
-from fenwear.steps.stick_interface import StickInterface, meshed
+from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_program import Program, far_enough, make_program, passes, steps_of
 from fenwear.steps.stick_state import TimeStepRecords
 from fenwear.surfaces.sliding_field import Screw
@@ -132,7 +132,7 @@ def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
     if case.heat is None:
         return problem
     steps = len(problem.program.steps) // problem.program.half_cycles
-    heat = stick_heat(meshed(problem.interface), case, steps)
+    heat = stick_heat(problem.interface, case, steps)
     return replace(problem, heat=heat)
 
 

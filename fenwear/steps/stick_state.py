@@ -51,7 +51,7 @@ class Imposed:
             return b if a is None or b is None else a + share * (b - a)
 
         return Imposed(
-            self.loaded.times(1 - share).plus(other.loaded.times(share)),
+            self.loaded.times(1 - share) + other.loaded.times(share),
             self.opening + share * (other.opening - self.opening),
             between(self.displacement, other.displacement),
             between(self.force, other.force),

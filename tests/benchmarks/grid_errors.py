@@ -26,9 +26,9 @@ from fenwear.laws.local_laws import BodyRate, LocalWear
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_final import final_shape
 from fenwear.steps.stick_increment import advance
-from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_interface import untouched
 from fenwear.steps.stick_state import Imposed, StickState
-from fenwear_verify.half_space_stick import Elastic, on_grid
+from fenwear_verify.half_space_stick import Elastic, OppositeBodies, on_grid
 from fenwear_verify.stick_solids import RIGID, to_and_fro
 
 YOUNG, LOAD, RADIUS, FRICTION, PULLED = 210_000.0, 100.0, 10.0, 0.5, 0.7

@@ -17,13 +17,13 @@ from fenwear.laws.local_laws import BodyRate, LocalWear
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_final import final_shape
 from fenwear.steps.stick_increment import _step, advance
-from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_interface import untouched
 from fenwear.steps.stick_jump import first_cycle, jumped
 from fenwear.steps.stick_products import CLOSE, GridStep
 from fenwear.steps.stick_setup import partial_slip_problem
 from fenwear.steps.stick_state import FrettingCycle, Imposed, StickState
 from fenwear.surfaces import compliance
-from fenwear_verify.half_space_stick import Elastic, on_grid
+from fenwear_verify.half_space_stick import Elastic, OppositeBodies, on_grid
 from fenwear_verify.stick_solids import to_and_fro
 
 STEEL, BRASS = Elastic(80_769.0, 0.3), Elastic(37_000.0, 0.34)

@@ -7,7 +7,7 @@ and its force for all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
@@ -17,11 +17,16 @@ from scipy.sparse import csr_array, eye_array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.half_space import HalfSpace, influence
+from fenwear.bodies.surface_operators import SurfaceOperator
 from fenwear.common.arrays import Array
-from fenwear.steps.stick_interface import OppositeBodies
+from fenwear.common.parallel import ALONE
+from fenwear.laws import Layers
+from fenwear.steps.stick_creep import stiff
+from fenwear.steps.stick_interface import StickInterface
+from fenwear.steps.stick_position import LoadEffect, Position, position_of
 from fenwear.surfaces import ContactPair, RigidEquilibrium
-from fenwear.surfaces.placement import HERE
-from fenwear.surfaces.sliding_field import ALONG_X
+from fenwear.surfaces.placement import HERE, Placement
+from fenwear.surfaces.sliding_field import ALONG_X, SlidingField
 
 # Signs of (u_x, u_y, u_z) at the mirror images in x and in y: pulled along x, or pressed alone.
 MIRRORS = {"pulled": ((1, -1, 1), (1, -1, 1)), "pressed": ((-1, 1, 1), (1, -1, 1))}
@@ -33,6 +38,38 @@ class Elastic:
 
     shear: float
     poisson: float
+
+
+class OppositeBodies(StickInterface):
+    """Two bodies that stay opposite each other under one load.
+
+    Args:
+        punch, strip: Their response along all axes at the contact's nodes.
+        rigid: The rigid modes, their load, and the pair of surfaces.
+        field: Displacement of the strip by the rig.
+    """
+
+    def __init__(
+        self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
+    ) -> None:
+        self.punch, self.strip, self.field = punch, strip, field
+        self.team, self.moves, self.moved, self.creep = ALONE, False, None, stiff(punch, strip)
+        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, punch.by_load, strip.by_load)
+        self._positions = {0.0: position_of(rigid, punch, strip, field)}
+        self.layers = Layers(len(rigid.pair.weights))
+
+    @cached_property
+    def bulk(self) -> Array:
+        """Displacement of the strip by a bulk strain (q, d), mm: none."""
+        return np.zeros_like(self.strip.by_load)
+
+    def position(self, offset: float | Placement) -> Position:  # noqa: ARG002
+        """Return the one place of the strip."""
+        return self.middle
+
+    def loaded(self, fraction: float | None) -> LoadEffect:  # noqa: ARG002
+        """Return the effect of the loads, a constant."""
+        return self._load
 
 
 @cache

@@ -13,11 +13,11 @@ from fenwear.laws.local_laws import BodyRate, LocalWear
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_final import final_shape, stick_zone
 from fenwear.steps.stick_increment import advance
-from fenwear.steps.stick_interface import OppositeBodies, untouched
+from fenwear.steps.stick_interface import untouched
 from fenwear.steps.stick_jump import first_cycle, jumped
 from fenwear.steps.stick_program import Program, TimeStep
 from fenwear.steps.stick_state import Imposed, StickState
-from fenwear_verify.half_space_stick import Elastic, half_spaces
+from fenwear_verify.half_space_stick import Elastic, OppositeBodies, half_spaces
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, verification
 
 YOUNG, RADIUS, LOAD, FRICTION = 210_000.0, 10.0, 100.0, 0.5  # MPa, mm, N

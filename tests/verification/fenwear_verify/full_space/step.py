@@ -23,7 +23,6 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.common.parallel import on_root
 from fenwear.steps.stick_equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement, derivative
-from fenwear.steps.stick_interface import meshed
 from fenwear_verify.full_space.bodies import WholeBodies, whole_bodies
 
 
@@ -36,7 +35,7 @@ class FullStep(Step):
         Raises:
             ConvergenceError: its equations are singular.
         """
-        bodies = meshed(self.interface)
+        bodies = self.interface
         whole = whole_bodies(bodies.bodies, self.position, moves=bodies.moves)
         return on_root(bodies.bodies.comm, lambda: self._solve(whole, status))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,8 @@ from fenwear.case import Case
 from fenwear.checks.uncertain_values import Values, values_of
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError
-from fenwear.steps import Block, Span, follow_program
+from fenwear.steps import Block, follow_program
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.run_state import RunState
 from fenwear.system import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
@@ -68,29 +69,26 @@ class Again:
         Raises:
             ConvergenceError: a half-cycle did not converge.
         """
-        blocks = follow_program(self.system, self._integrate, self.until)
+        blocks = follow_program(self.system, self._integrate, RunLimits(self.until))
         first = last = before = next(blocks)
         while last.end.half_cycle < self.until and (block := next(blocks, None)) is not None:
             before, last = last, block
         return first, last, before
 
-    def _integrate(
-        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
-    ) -> Iterator[Block]:
+    def _integrate(self, system: Tribosystem, limits: RunLimits, start: RunState | None) -> Iterator[Block]:
         run = self.case.run
-        limits = span.limits(None, leave=leave)
         if run.integration != "jump":
-            yield from march_within(system, limits, implicit=run.integration == "implicit", start=start)
+            yield from march_within(system, limits, start, implicit=run.integration == "implicit")
             return
         state, left = start, False
         reduced, tolerance = with_reduced_heat(system), run.jump_tolerance
         stops = frozenset({self.until - system.motion.half_cycles})
-        jumped = jump_within(reduced, replace(limits, stops=stops), tolerance=tolerance, start=start, finer=True)
+        jumped = jump_within(reduced, replace(limits, stops=stops), start, tolerance=tolerance, finer=True)
         for block in jumped:
             yield block
-            state, left = block.end, leave(block.end)
-        if not left and (0 if state is None else state.half_cycle) < span.until:  # a cycle that is not whole
-            yield from march_within(system, limits, implicit=True, start=state)
+            state, left = block.end, limits.leave(block.end)
+        if not left and (0 if state is None else state.half_cycle) < limits.half_cycles:  # a cycle that is not whole
+            yield from march_within(system, limits, state, implicit=True)
 
 
 @dataclass(frozen=True)

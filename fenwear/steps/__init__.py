@@ -12,7 +12,7 @@ states and records are in `stick_state`, many cycles in `stick_jump`, the end in
 from fenwear.steps.block import Block
 from fenwear.steps.evolve import evolve, integrate, jump, march
 from fenwear.steps.monotonic import Monotonic, monotonic
-from fenwear.steps.program_stages import Span, at_step, follow_program, held
+from fenwear.steps.program_stages import at_step, follow_program, held
 from fenwear.steps.slow_changes import Renewal, follow
 from fenwear.steps.stability import (
     critical_speed,
@@ -30,7 +30,6 @@ __all__ = [
     "Monotonic",
     "Renewal",
     "RunningIn",
-    "Span",
     "SteadyState",
     "at_step",
     "critical_speed",

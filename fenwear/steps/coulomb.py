@@ -22,11 +22,12 @@ from fenwear.laws.wear import WornDepths
 from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.steps.driver import Loading, Watch
 from fenwear.steps.gross_sliding import LAW as SLIDING
-from fenwear.steps.run_state import SUMS, RunState, Totals, approach, with_worn
+from fenwear.steps.run_state import RunState, Totals, approach, counted_back, with_worn
 from fenwear.steps.stick_cycle import PartialSlipProblem, on_other_grid
 from fenwear.steps.stick_final import FinalShape, final_shape
 from fenwear.steps.stick_interface import StickInterface
 from fenwear.steps.stick_jump import first_cycle, jumped
+from fenwear.steps.stick_program import TimeStep
 from fenwear.steps.stick_setup import (
     Ends,
     Fineness,
@@ -65,17 +66,17 @@ class Memory:
 
     Attributes:
         at: Where the time steps are; its depths and temperature are those of the run.
+        stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
+        made_of: Identity of the bodies and loads that it belongs to.
         cycle: The last one, on the shape of the run, from which jumps continue; None where there is none.
         warm: Temperatures at the end of that cycle, where there is one with heat; else none.
-        stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
-        made_of: Identity of the bodies and loads that the cycle belongs to.
     """
 
     at: PartialSlipState
+    stuck: Array
+    made_of: float
     cycle: FrettingCycle | None = None
     warm: tuple[HeatState, ...] = ()
-    stuck: Array | None = None
-    made_of: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -200,12 +201,11 @@ class Coulomb:
 
     def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
         """Return the memory of a run on another contact grid; collective. Jumps continue from a cycle made there."""
-        (nodes, _), stuck = node_maps(before, after), memory.stuck
+        nodes, _ = node_maps(before, after)
         problems = before.law_state.problem, after.law_state.problem
         worn = carried(memory.at.worn, before, after)
         at = problems[1].led(partial(on_other_grid, memory.at, *problems, nodes, worn))
-        stuck = None if stuck is None else on_nodes(stuck, nodes, np.zeros(len(nodes)))
-        return Memory(at, stuck=stuck, made_of=memory.made_of)
+        return Memory(at, on_nodes(memory.stuck, nodes, np.zeros(len(nodes))), memory.made_of)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle; implicitly, of one cycle."""
@@ -290,8 +290,7 @@ class _Run:
 
     def temperature(self, state: RunState) -> Array:
         """Return the temperatures of a state on this system's bases (dim,)."""
-        exchange = self.system.exchange
-        return exchange.own(state.temperature).values
+        return self.system.exchange.own(state.temperature).values
 
     def at(self, state: RunState, load: float) -> PartialSlipState:
         """Return the state of the time steps in a run, with the run's depths, temperatures and load."""
@@ -326,10 +325,11 @@ class _Run:
             adds: Additions of the half-cycle to the totals.
             load: Factor of all loads.
         """
-        records, stroke = steps.records, (number - 1) % self.strokes
-        middle = self.middle(steps)
-        contact = _contact(records, middle)
-        problem, step = self.problem, self.problem.program.steps[steps.first + middle]
+        problem, records, middle = self.problem, steps.records, self.middle(steps)
+        own, stroke = slice(middle, middle + 1), (number - 1) % self.strokes
+        iterations = int(records.iterations[middle])
+        contact = ContactState(records.pressure[own], records.gap[own], records.rigid[own], iterations)
+        step = problem.program.steps[steps.first + middle]
         position = problem.interface.position(step.offset)
         pressed = records.pressure[middle] > 0
         f = np.concatenate([records.pressure[middle], records.traction[middle].T.ravel()])
@@ -366,8 +366,8 @@ class HalfCycles(_Run):
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)
         totals = state.totals + adds
-        stroke, n = state.half_cycle % self.strokes, len(problem.weights)
-        stuck = _known_stuck(state.memory, self.strokes, n)
+        stroke, earlier = state.half_cycle % self.strokes, np.ones((self.strokes, len(problem.weights)))
+        stuck = np.array((earlier if state.memory is None else state.memory.stuck) > 0)
         stuck[stroke] = records.stuck
         ratio = _energy_ratio(records, problem.weights)
         steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, 0.0, first, lost)
@@ -375,11 +375,8 @@ class HalfCycles(_Run):
         contacts = list(state.contacts)
         contacts[stroke] = record.phases[0].contact
         warm = self.system.exchange.at(at.temperature) if self.system.exchange.conducts else None
-        memory = Memory(
-            replace(at, worn=worn, held=None, temperature=NO_HEAT),
-            stuck=stuck.astype(float),
-            made_of=self.setup.made_of,
-        )
+        kept = replace(at, worn=worn, held=None, temperature=NO_HEAT)
+        memory = Memory(kept, stuck.astype(float), self.setup.made_of)
         return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
 
 
@@ -415,34 +412,29 @@ class Jumps(_Run):
         cycles, number = then.number - now.number, round(then.number) * strokes
         totals = state.totals + self._adds(now, then, cycles)
         parts, old = _in_order(problem, then), _in_order(problem, now)
-        stuck = np.array([part[1].stuck for part in parts])
-        at_all = np.asarray(stuck.all(axis=0))
-        made, contacts = [], []
-        depths, sums = [then.worn], [totals]
+        stuck = np.array([records.stuck for _, records, _ in parts])
         lost = [problem.worn(then.records, then.begin, which) for *_, which in parts]
         adds = [self.meter(records, first, own) for (first, records, _), own in zip(parts, lost, strict=True)]
-        for k in reversed(range(1, strokes)):
-            depths.insert(0, depths[0] - lost[k])
-            sums.insert(0, sums[0] - adds[k])
+        depths, sums, made = counted_back(then.worn, lost), counted_back(totals, adds), []
         for k, ((first, records, _), (_, earlier, _)) in enumerate(zip(parts, old, strict=True)):
             before = records.pressure - (records.pressure - earlier.pressure) / cycles
-            steps = Steps(records, before, at_all, _energy_ratio(records, problem.weights), then.error, first, lost[k])
-            record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
-            contacts.append(record.phases[0].contact)
-            made.append(record)
-        warm = state.temperature
-        after: tuple[HeatState, ...] = ()
+            ratio, at_all = _energy_ratio(records, problem.weights), np.asarray(stuck.all(axis=0))
+            steps = Steps(records, before, at_all, ratio, then.error, first, lost[k])
+            ends = depths[k], sums[k]
+            made.append(self.half_cycle(number - strokes + 1 + k, steps, ends, adds[k], then.end.load))
+        contacts = tuple(record.phases[0].contact for record in made)
+        warm, after = state.temperature, tuple[HeatState, ...]()
         if exchange.conducts:
             warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
         kept = replace(then, end=replace(then.end, temperature=NO_HEAT), warm=NO_HEAT, finer=None)
-        memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.made_of)
-        done = RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory)
+        memory = Memory(kept.end, stuck.astype(float), self.setup.made_of, kept, after)
+        done = RunState(number, then.worn, contacts, warm, totals, then.length, memory=memory)
         return (done if then.finer is None else replace(done, finer=self._finer(done, then, until))), made
 
     def _finer(self, done: RunState, then: FrettingCycle, until: int) -> RunState:
         """Return the state on the depths to which shorter jumps would have led; at the end with the cycle on them."""
         assert then.finer is not None
-        off = self.meter.with_wear(done.totals.times(0.0), then.worn - then.finer)
+        off = with_worn(self.system, done.totals.times(0.0), then.worn - then.finer)
         memory: Memory | None = done.memory
         if done.half_cycle == until and memory is not None:
             cycle = first_cycle(self.problem, then.end, then.finer, then.number, then.warm)
@@ -475,19 +467,7 @@ class Jumps(_Run):
         """Return the additions of a jump: by the trapezoidal rule, but for the wear, which follows from its depths."""
         adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
         found = (adds[0] + adds[1]).times(cycles / 2)
-        return self.meter.with_wear(found, then.worn - now.worn)
-
-
-def _contact(records: TimeStepRecords, step: int) -> ContactState:
-    own = slice(step, step + 1)
-    return ContactState(records.pressure[own], records.gap[own], records.rigid[own], int(records.iterations[step]))
-
-
-def _known_stuck(memory: Memory | None, strokes: int, nodes: int) -> Mask:
-    """Return which nodes stuck in each half-cycle before (strokes, n): all where nothing is known."""
-    if memory is None or memory.stuck is None:
-        return np.ones((strokes, nodes), dtype=bool)
-    return memory.stuck > 0
+        return with_worn(self.system, found, then.worn - now.worn)
 
 
 def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
@@ -520,30 +500,22 @@ class Meter:
 
     def __call__(self, records: TimeStepRecords, first: int, worn: WornDepths) -> Totals:
         """Return the additions of time steps; the first has this number in the cycle, and all wear these depths."""
-        problem, thick = self.problem, self.thickness
-        slid, pressure = records.slip_magnitude, records.pressure
-        forces = pressure @ problem.weights
-        carried = np.where(forces > 0, forces, 1.0)
-        distance = (pressure * slid) @ problem.weights / carried
-        sums = dict.fromkeys(SUMS, 0.0)
-        sums["distance"] = float(distance.sum())
-        sums["load_path"] = thick * float(((pressure * slid) @ problem.weights).sum())
-        program = problem.program.steps
-        steps = [program[(first + k) % len(program)] for k in range(len(distance))]
-        for k, (step, way) in enumerate(zip(steps, distance, strict=True)):
-            position = problem.interface.position(step.offset)
-            f = np.concatenate([pressure[k], records.traction[k].T.ravel()])
-            force = thick * position.in_space(f * position.weights)
-            normal = thick * (pressure[k] * position.pair.weights)[:, None] * position.pair.normal
-            sums["load_distance"] += float((force * approach(position.rigid)).sum()) * float(way)
-            sums["drag_distance"] += float(np.linalg.norm((force - normal).sum(axis=0))) * float(way)
-        sums["work"] = thick * records.energy(problem.weights)
-        energy = records.dissipated.sum(axis=0)
+        weights, pressure = self.problem.weights, records.pressure
+        path, forces = (pressure * records.slip_magnitude) @ weights, pressure @ weights
+        distance = path / np.where(forces > 0, forces, 1.0)
+        steps = self.problem.program.following(first, len(records))
+        loads, drags = np.transpose([self._carried(records, k, step) for k, step in enumerate(steps)])
+        work = self.thickness * records.energy(weights)
+        sums = [distance.sum(), self.thickness * path.sum(), loads @ distance, drags @ distance, work, *np.zeros(4)]
         of = np.array([step.half_cycle for step in steps])
         share = records.duration / np.bincount(of, records.duration)[of]  # of its half-cycle: there may be several
-        found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
-        return self.with_wear(found, worn)
+        found = Totals(np.array(sums), records.dissipated.sum(axis=0), share @ pressure)
+        return with_worn(self.system, found, worn)
 
-    def with_wear(self, totals: Totals, worn: WornDepths) -> Totals:
-        """Return the totals with the volumes and masses of these depths."""
-        return with_worn(self.system, totals, worn)
+    def _carried(self, records: TimeStepRecords, k: int, step: TimeStep) -> tuple[float, float]:
+        """Return the force of a time step along the approach of the bodies, and the resultant of its friction, N."""
+        position, pressure = self.problem.interface.position(step.offset), records.pressure[k]
+        f = np.concatenate([pressure, records.traction[k].T.ravel()])
+        force = self.thickness * position.in_space(f * position.weights)
+        normal = self.thickness * (pressure * position.pair.weights)[:, None] * position.pair.normal
+        return float((force * approach(position.rigid)).sum()), float(np.linalg.norm((force - normal).sum(axis=0)))

@@ -12,7 +12,7 @@ D. Skeel, BIT 26, 1986): how fast errors fade is found by the jumps themselves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from math import ceil
@@ -23,7 +23,7 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, ConvergenceError, InputError
 from fenwear.steps.block import Block, HalfCycle
 from fenwear.steps.driver import Jumps, RunLimits, Watching, run_steps
-from fenwear.steps.program_stages import Span, follow_program
+from fenwear.steps.program_stages import follow_program
 from fenwear.steps.run_state import RunState, all_phases, beginning, on_exchange
 from fenwear.steps.uniqueness import NO_JUMPS, heat_gain
 from fenwear.system import Tribosystem, with_reduced_heat
@@ -52,19 +52,19 @@ def jump(
         CaseError: `start` lies within a cycle, or the maps of the heat do not fit into the memory.
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
     """
-    return jump_within(system, RunLimits(half_cycles, periodic_within), tolerance=tolerance, start=start)
+    return jump_within(system, RunLimits(half_cycles, periodic_within), start, tolerance=tolerance)
 
 
 def jump_within(
-    system: Tribosystem, limits: RunLimits, *, tolerance: float, start: RunState | None = None, finer: bool = False
+    system: Tribosystem, limits: RunLimits, start: RunState | None = None, *, tolerance: float, finer: bool = False
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, as `jump`, within limits; collective.
 
     Args:
         system: The assembled problem.
         limits: End, loads and stops.
-        tolerance: As of `jump`.
         start: As of `jump`.
+        tolerance: As of `jump`.
         finer: Whether to follow where jumps of next to no length would lead; from a start that has it, it is followed.
     """
     strokes = system.motion.half_cycles
@@ -118,11 +118,11 @@ def march(
     Raises:
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
     """
-    return march_within(system, RunLimits(half_cycles, periodic_within), implicit=implicit, start=start)
+    return march_within(system, RunLimits(half_cycles, periodic_within), start, implicit=implicit)
 
 
 def march_within(
-    system: Tribosystem, limits: RunLimits, *, implicit: bool = False, start: RunState | None = None
+    system: Tribosystem, limits: RunLimits, start: RunState | None = None, *, implicit: bool = False
 ) -> Iterator[Block]:
     """Yield all half-cycles, as `march`, within limits; collective."""
     state = on_exchange(start or beginning(system), system.exchange)  # before rank 0 leads
@@ -132,20 +132,20 @@ def march_within(
 
 
 def integrate(
-    system: Tribosystem, how: str, limits: RunLimits, tolerance: float, start: RunState | None = None
+    system: Tribosystem, limits: RunLimits, start: RunState | None = None, *, how: str, tolerance: float
 ) -> Iterator[Block]:
     """Yield the blocks within limits in the way that `run.integration` of a case names; collective.
 
     Args:
         system: The assembled problem.
-        how: "explicit", "implicit" or "jump".
         limits: End, loads and stops.
-        tolerance: Of jumps.
         start: The state to resume from; by default the beginning.
+        how: "explicit", "implicit" or "jump".
+        tolerance: Of jumps.
     """
     if how == "jump":
-        return _told_of_heat(system, jump_within(system, limits, tolerance=tolerance, start=start))
-    return march_within(system, limits, implicit=how == "implicit", start=start)
+        return _told_of_heat(system, jump_within(system, limits, start, tolerance=tolerance))
+    return march_within(system, limits, start, implicit=how == "implicit")
 
 
 def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
@@ -192,18 +192,12 @@ def evolve(
     """
     run = system.case.run
     last, how = half_cycles or run.half_cycles, integration or run.integration
-
-    def over(
-        own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span
-    ) -> Iterator[Block]:
-        limits = span.limits(run.periodic_within, leave=leave)
-        return integrate(own, how, limits, tolerance or run.jump_tolerance, state)
-
     if how == "jump":
         system = with_reduced_heat(system)
         strokes = system.motion.half_cycles
         last = last // strokes * strokes
-    for block in follow_program(system, over, last, start):
+    way = partial(integrate, how=how, tolerance=tolerance or run.jump_tolerance)
+    for block in follow_program(system, way, RunLimits(last, run.periodic_within), start):
         yield block
         if block.end.half_cycle >= last:
             return

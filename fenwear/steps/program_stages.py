@@ -6,8 +6,8 @@ A stage begins with the depths and temperatures that the stage before it has lef
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from fenwear.case import Case, Cycle
@@ -22,35 +22,15 @@ from fenwear.system import Clock, ContactLaw, ContactSetup, Tribosystem, grows, 
 MOST_RECURRING = 16  # systems of stages that are held at once, each with its steps of heat
 
 
-@dataclass(frozen=True)
-class Span:
-    """Latest end of an integration, the factor of all loads on the way, and whether it is the last one.
-
-    The last one may end before, where its cycles repeat.
-    """
-
-    until: int
-    loading: Loading = as_given
-    last: bool = True
-
-    def limits(self, periodic_within: float | None, **more: Any) -> RunLimits:
-        """Return the limits of its integration, with what a case asks for of cycles that repeat, and further ones."""
-        return RunLimits(self.until, periodic_within if self.last else None, loading=self.loading, **more)
-
-
-# Runs a system from a state over a span, and leaves at the first state for which it is told to.
-IntegrateSpan = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool], Span], Iterator[Block]]
-
-
 def follow_program(
-    system: Tribosystem, integrate: IntegrateSpan, half_cycles: int, start: RunState | None = None
+    system: Tribosystem, integrate: Integrate, limits: RunLimits, start: RunState | None = None
 ) -> Iterator[Block]:
     """Yield the blocks of a run over the program of its case, whose meshes follow large wear; collective.
 
     Args:
         system: The assembled problem, of the case as it stands without its program.
-        integrate: Yields the blocks of a span on one system, such as `march` or `jump`.
-        half_cycles: The last one at most.
+        integrate: Yields the blocks on one system within limits, such as `march_within`.
+        limits: Of all stages. Only the last one may end before, where its cycles repeat.
         start: State to continue from; by default the beginning.
 
     Raises:
@@ -60,16 +40,18 @@ def follow_program(
     """
     stages = stages_of(system.case)
     if not stages:
-        yield from follow(system, _over(Span(half_cycles), integrate), start)
+        yield from follow(system, integrate, limits, start)
         return
     base, state, again = system, start, Recurring(stages)
     for stage in stages:
         done = 0 if state is None else state.half_cycle
         if stage.end <= done:
             continue
-        if stage.begin >= half_cycles:
+        if stage.begin >= limits.half_cycles:
             return
-        span = Span(min(stage.end, half_cycles), loading_of(base, stage), stage is stages[-1])
+        until, loading = min(stage.end, limits.half_cycles), loading_of(base, stage)
+        repeats = limits.periodic_within if stage is stages[-1] else None
+        within = replace(limits, half_cycles=until, periodic_within=repeats, loading=loading)
 
         def adapt(moved: Tribosystem, stage: Stage = stage) -> Tribosystem:
             nonlocal base
@@ -77,21 +59,16 @@ def follow_program(
             again.forget()
             return again.at_stage(base, stage)
 
-        larger, state = _with_larger_grid(base, stage, state, span.loading(max(done, stage.begin)))
+        larger, state = _with_larger_grid(base, stage, state, loading(max(done, stage.begin)))
         if larger is not base:
             base = larger
             again.forget()
         own = again.at_stage(base, stage)
-        for block in follow(own, _over(span, integrate), with_phases(state, len(own.motion.phases)), adapt):
+        for block in follow(own, integrate, within, with_phases(state, len(own.motion.phases)), adapt):
             yield block
             state = block.end
-            if state.half_cycle >= span.until:  # what it asks for by now the next stage has
+            if state.half_cycle >= until:  # what it asks for by now the next stage has
                 break
-
-
-def _over(span: Span, integrate: IntegrateSpan) -> Integrate:
-    """Return the function that integrates over a span."""
-    return lambda system, state, leave: integrate(system, state, leave, span)
 
 
 def _with_larger_grid(

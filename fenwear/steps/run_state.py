@@ -27,7 +27,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import accumulate
+from operator import sub
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,6 +43,7 @@ from fenwear.surfaces import RigidEquilibrium
 from fenwear.surfaces.placement import in_model
 from fenwear.system import ContactSetup, Tribosystem, carried, node_maps, on_nodes
 
+T = TypeVar("T")
 SUMS = (
     "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
     "mass_strip",
@@ -195,6 +198,11 @@ def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[Con
 def stacked(totals: Sequence[Totals]) -> Totals:
     """Return k totals as one of k rows."""
     return Totals(*(np.array([getattr(t, name) for t in totals]) for name in ("sums", "energy", "pressure")))
+
+
+def counted_back(end: T, added: Sequence[T]) -> list[T]:
+    """Return depths or totals at the ends of half-cycles, from the last end and the additions of each half-cycle."""
+    return list(accumulate(reversed(added[1:]), sub, initial=end))[::-1]
 
 
 def opposite_densities(system: ContactSetup, phase: int) -> tuple[Array | None, Array | None]:

@@ -35,6 +35,7 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.heat.temperature import HeatState
 from fenwear.steps.block import Block
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.run_state import RunState, carried_by, on_other_grid
 from fenwear.system import (
     Tribosystem,
@@ -48,8 +49,8 @@ from fenwear.system import (
     warming_key,
 )
 
-# Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
-Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
+# Yields the blocks of a system within limits from a state, or the beginning.
+Integrate = Callable[[Tribosystem, RunLimits, RunState | None], Iterator[Block]]
 
 
 class Renewal(Enum):
@@ -63,6 +64,7 @@ class Renewal(Enum):
 def follow(
     system: Tribosystem,
     integrate: Integrate,
+    limits: RunLimits,
     start: RunState | None = None,
     adapt: Callable[[Tribosystem], Tribosystem] = lambda system: system,
     *,
@@ -74,7 +76,8 @@ def follow(
 
     Args:
         system: The assembled problem.
-        integrate: Yields the blocks on one system, such as `march` with its arguments.
+        integrate: Yields the blocks on one system within limits, such as `march_within`.
+        limits: Of the run; it also ends where parts are to be updated.
         start: State to continue from; by default the beginning.
         adapt: Change of the system of the case on moved meshes, such as another motion; collective.
         given: Half-cycles after which parts are updated, and at no other; by default where it is large.
@@ -93,7 +96,7 @@ def follow(
             system, state = _renewed(system, state, renewal, adapt)
             given = None if given is None else {k: one for k, one in given.items() if k > state.half_cycle}
             leave = _Leaving(system, given)
-        for block in integrate(system, state, leave):
+        for block in integrate(system, replace(limits, leave=leave), state):
             yield block
             state = block.end
         if state is None or not leave(state):

@@ -385,9 +385,8 @@ class PartialSlipProblem:
 
     def pairs(self, records: TimeStepRecords, before: PartialSlipState) -> list[ContactPair]:
         """Return the surfaces opposite each other in steps that begin at a state."""
-        steps = self.program.steps
-        places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(records))]
-        return [self.interface.position(place).pair for place in places]
+        steps = self.program.following(before.next_step, len(records))
+        return [self.interface.position(step.offset).pair for step in steps]
 
     def worn(self, records: TimeStepRecords, begin: PartialSlipState, which: slice = ALL) -> WornDepths:
         """Return the depths after time steps, with the changes of the layers' states; arguments as of `passing`."""

@@ -188,8 +188,8 @@ class Frozen:
 
 def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Position], Groups, ContactState]:
     """Return the places of contacts, which time steps share them, and the contacts: means of the steps."""
-    interface, steps, records = problem.interface, problem.program.steps, cycle.records
-    own = [steps[(cycle.first_step + k) % len(steps)] for k in range(len(records))]
+    interface, records = problem.interface, cycle.records
+    own = problem.program.following(cycle.first_step, len(records))
     keys = [
         (step.offset if interface.moves else 0.0, id(interface.loaded(step.fraction)), None if step.way is None else k)
         for k, step in enumerate(own)

@@ -70,6 +70,10 @@ class Program:
         """Return whether another cycle has the start and the lead-in of this one."""
         return self._way == other._way
 
+    def following(self, first: int, count: int) -> list[TimeStep]:
+        """Return so many time steps from this number on, cycle after cycle."""
+        return [self.steps[(first + k) % len(self.steps)] for k in range(count)]
+
     def with_force(self, factor: float) -> Program:
         """Return the program with imposed tangential forces times a factor."""
         way, steps = (

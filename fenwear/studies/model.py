@@ -205,23 +205,17 @@ class Model:
         ends = frozenset(strokes * end for end in course.ends or stops)
         renewals: list[tuple[int, Renewal]] = []
 
-        def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-            start = reached
+        def integrate(on: Tribosystem, limits: RunLimits, start: RunState | None) -> Iterator[Block]:
             if course.given:
-                start = start or beginning(on)
-                start = replace(start, jump_length=ONE_STEP)
-            return jump_within(
-                on,
-                RunLimits(strokes * cycles, block=strokes, stops=ends, leave=leave),
-                tolerance=tolerance,
-                start=start,
-            )
+                start = replace(start or beginning(on), jump_length=ONE_STEP)
+            return jump_within(on, limits, start, tolerance=tolerance)
 
         # The elements' heights are the base's wherever the geometry is: no need to measure them anew.
         base = self._base(tuple(settings))
         blocks = follow(
             system,
             integrate,
+            RunLimits(strokes * cycles, block=strokes, stops=ends),
             given=course.renewals if course.given else None,
             heights_of=base if base.case.geometry == case.geometry else system,
             on_renewal=lambda half_cycle, renewal: renewals.append((half_cycle, renewal)),

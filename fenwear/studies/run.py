@@ -55,13 +55,13 @@ from fenwear.results.quantity import degrees_of
 from fenwear.results.summary import HOTTEST, HOTTEST_AT, summarise
 from fenwear.steps import (
     Block,
-    Span,
     explicit_growth,
     follow_program,
     integrate,
     stability_number,
     stationary_growth,
 )
+from fenwear.steps.driver import RunLimits
 from fenwear.steps.program_stages import at_loads
 from fenwear.steps.run_state import RunState, all_phases, beginning, on_other_grid
 from fenwear.surfaces.motion import DEFAULT_POSITIONS
@@ -315,7 +315,9 @@ class _Run:
         start, last = self.start, self._last
         while last:
             last, end = 0, last
-            for block in follow_program(self.system, self._integrate, end, start):
+            within = self.case.run.periodic_within
+            limits = RunLimits(end, within, stops=self._fields_at, watch=self._watch)
+            for block in follow_program(self.system, self._integrate, limits, start):
                 at = self.comm.bcast(self._level.see(block))
                 reached = int(block.end.half_cycle)
                 if 0 < at < reached:  # a jump went beyond the level: made again, up to it
@@ -334,14 +336,11 @@ class _Run:
         strokes = self.system.motion.half_cycles if self.case.run.integration == "jump" else 1
         return self.case.run.half_cycles // strokes * strokes
 
-    def _integrate(
-        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
-    ) -> Iterator[Block]:
+    def _integrate(self, system: Tribosystem, limits: RunLimits, start: RunState | None) -> Iterator[Block]:
         run = self.case.run
-        limits = span.limits(run.periodic_within, leave=leave, stops=self._fields_at, watch=self._watch)
         if run.until:
             limits = replace(limits, block=system.motion.half_cycles)
-        return integrate(system, run.integration, limits, run.jump_tolerance, start)
+        return integrate(system, limits, start, how=run.integration, tolerance=run.jump_tolerance)
 
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:

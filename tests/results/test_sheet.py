@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -112,12 +113,8 @@ def test_both_bodies_after_their_meshes_have_followed(assembled: Assemble, how: 
     system = assembled("fretting", *FRETTING)
     count = 400 if how == "march" else 800
 
-    def integrate(on: Tribosystem, start: Any, leave: Any) -> Any:
-        if how == "march":
-            return march_within(on, RunLimits(count, leave=leave), implicit=True, start=start)
-        return jump_within(on, RunLimits(count, leave=leave), tolerance=0.2, start=start)
-
-    blocks = list(follow(system, integrate))
+    way = partial(march_within, implicit=True) if how == "march" else partial(jump_within, tolerance=0.2)
+    blocks = list(follow(system, way, RunLimits(count)))
     assert blocks[-1].system is not system
     found, block = last(blocks), blocks[-1]
     path = float(block.totals.of("load_path")[-1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, read_history, run_case, steady
+from fenwear import Case, assemble, load_case, make_case, march, read_history, run_case, steady
 from fenwear.case.program import cycle_of, read_program, stages_of
 from fenwear.checks import Seen
 from fenwear.common.errors import CaseError
-from fenwear.steps import Block, Span, at_step, evolve, follow_program
+from fenwear.steps import Block, at_step, evolve, follow_program
 from fenwear.steps import program_stages as program
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within, march_within
@@ -27,14 +27,8 @@ SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "g
 K = 1.25 * np.pi * 1e-8  # of the examples, 1/MPa
 
 
-def marched(system: Tribosystem, state: Any, leave: Any, span: Span) -> Iterator[Block]:
-    return march_within(system, RunLimits(span.until, leave=leave, loading=span.loading), start=state, implicit=True)
-
-
-def jumped(system: Tribosystem, state: Any, leave: Any, span: Span, tolerance: float = 3e-3) -> Iterator[Block]:
-    return jump_within(
-        system, RunLimits(span.until, leave=leave, loading=span.loading), start=state, tolerance=tolerance
-    )
+marched = partial(march_within, implicit=True)
+jumped = partial(jump_within, tolerance=3e-3)
 
 
 def steps_of(steps: list[dict[str, Any]], **more: Any) -> Callable[[dict[str, Any]], object]:
@@ -95,7 +89,7 @@ def test_load_steps_wear_what_load_and_distance_say(edited: Edited) -> None:
     system = assemble(case)
     path = 6.0 * (5e3 * 20 + 10e3 * 20 + 20e3 * 20 + 20e3 * 10)  # a cycle slides 4 u0
     for way in (marched, jumped):
-        blocks = list(follow_program(system, way, case.run.half_cycles))
+        blocks = list(follow_program(system, way, RunLimits(case.run.half_cycles)))
         worn = float(system.pair.weights @ blocks[-1].wear[-1])
         assert worn == pytest.approx(K * path / system.bodies.punch.thickness, rel=1e-10), way
         assert of(blocks, "equilibrium_error").max() < 1e-9
@@ -126,10 +120,10 @@ def test_jumps_meet_the_march_in_a_ramp(edited: Edited) -> None:
     steps = [{"cycles": 150, "load": ["4 kN", "12 kN"]}, {"cycles": 50, "load": "6 kN"}]
     case = edited("example1", steps_of(steps), *SMALL, "wear.punch.coefficient=4e-6 1/MPa")
     system = assemble(case)
-    exact = list(follow_program(system, marched, case.run.half_cycles))[-1]
+    exact = list(follow_program(system, marched, RunLimits(case.run.half_cycles)))[-1]
     errors = []
     for tolerance in (3e-2, 1e-3):
-        found = list(follow_program(system, partial(jumped, tolerance=tolerance), case.run.half_cycles))[-1]
+        found = list(follow_program(system, partial(jumped, tolerance=tolerance), RunLimits(case.run.half_cycles)))[-1]
         errors.append(np.abs(found.wear[-1] - exact.wear[-1]).max() / exact.wear[-1].max())
     assert errors[1] < 3e-3
     assert errors[1] < errors[0]
@@ -149,7 +143,7 @@ def test_stop_braking_slides_and_heats_as_much_as_it_stops(edited: Edited) -> No
     system = assemble(case)
     stages = stages_of(case)
     assert [stage.begin for stage in stages] == [0, *range(4, 24, 2)]
-    blocks = list(follow_program(system, marched, case.run.half_cycles))
+    blocks = list(follow_program(system, marched, RunLimits(case.run.half_cycles)))
     terms = np.concatenate([block.heat.terms for block in blocks])
     distance = 100 * 0.4 + 100 * 2 / 2
     assert terms[:, 0].sum() == pytest.approx(0.25 * 10e3 * distance, rel=1e-9)
@@ -171,7 +165,7 @@ def test_amplitude_and_period(edited: Edited) -> None:
     ]
     case = edited("example1", steps_of(steps, levels=8), *SMALL)
     system = assemble(case)
-    blocks = list(follow_program(system, jumped, case.run.half_cycles))
+    blocks = list(follow_program(system, jumped, RunLimits(case.run.half_cycles)))
     worn = float(system.pair.weights @ blocks[-1].wear[-1])
     assert worn == pytest.approx(K * 1000 * (3 * 4 * 1.0 + 40 * 4 * 1.5), rel=1e-10)
     assert of(blocks, "time")[-1] == pytest.approx(3 * 0.5 + 40)
@@ -187,7 +181,7 @@ def test_stages_that_come_again_are_set_up_once(edited: Edited, monkeypatch: pyt
         state = each.end
     set_up = program._varied
     monkeypatch.setattr(program, "_varied", lambda *given: (made.append(given), set_up(*given))[1])
-    *_, last = follow_program(system, marched, case.run.half_cycles)
+    *_, last = follow_program(system, marched, RunLimits(case.run.half_cycles))
     assert len(made) == 2
     for name in ("pressure", "wear"):
         np.testing.assert_array_equal(getattr(last, name), getattr(each, name), err_msg=name)
@@ -207,7 +201,7 @@ def test_ambient(edited: Edited) -> None:
         tables["motion"] = {"kind": "reciprocating", "amplitude": 1.5, "period": 100}
 
     case = edited("example1-heat", warm, *SMALL, "heat.reduction_tolerance=1e-3")
-    blocks = list(follow_program(assemble(case), marched, case.run.half_cycles))
+    blocks = list(follow_program(assemble(case), marched, RunLimits(case.run.half_cycles)))
     assert abs(blocks[0].heat.temperature_punch[5]).max() < 1e-9
     assert blocks[-1].heat.temperature_punch[-1] == pytest.approx(40, abs=0.1)
     assert (of(blocks, "ambient")[[0, -1]] == [0, 40]).all()
@@ -218,10 +212,10 @@ def test_goes_on_from_any_half_cycle(edited: Edited) -> None:
     steps = [{"cycles": 6, "load": ["5 kN", "10 kN"]}, {"cycles": 4, "amplitude": "2 mm"}]
     case = edited("example1", steps_of(steps), *SMALL)
     system = assemble(case)
-    whole = list(follow_program(system, marched, 20))[-1]
-    *_, part = follow_program(system, marched, 7)
+    whole = list(follow_program(system, marched, RunLimits(20)))[-1]
+    *_, part = follow_program(system, marched, RunLimits(7))
     assert part.half_cycle[-1] == 7
-    rest = list(follow_program(system, marched, 20, part.end))[-1]
+    rest = list(follow_program(system, marched, RunLimits(20), part.end))[-1]
     np.testing.assert_allclose(rest.wear[-1], whole.wear[-1], rtol=1e-12)
 
 
@@ -391,7 +385,7 @@ def test_each_load_has_factors_of_its_own(jumps: bool, tmp_path: Path) -> None:
     case = make_case(tables)
     assert tomllib.loads(case.to_toml())["program"]["steps"][1]["load_factors"] == {"punch_right": 0.5}
     system = assemble(case)
-    last = list(follow_program(system, jumped if jumps else marched, case.run.half_cycles))[-1]
+    last = list(follow_program(system, jumped if jumps else marched, RunLimits(case.run.half_cycles)))[-1]
     law = case.wear.punch
     assert law is not None
     _, distance, _ = cycle_of(case)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -15,17 +15,13 @@ from fenwear.laws.wear import WornDepths
 from fenwear.steps import Block, follow
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import LATE, jump_within, march_within
-from fenwear.steps.run_state import RunState
 from fenwear.steps.slow_changes import _in_place
 
 SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=0.4")
 
 
 def run(system: Tribosystem, half_cycles: int, tolerance: float = 0.1) -> list[Block]:
-    def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump_within(now, RunLimits(half_cycles, leave=leave), tolerance=tolerance, start=start)
-
-    return list(follow(system, integrate))
+    return list(follow(system, partial(jump_within, tolerance=tolerance), RunLimits(half_cycles)))
 
 
 def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:
@@ -119,10 +115,7 @@ def test_a_run_with_heat_goes_on(assembled: Callable[..., Tribosystem]) -> None:
     moving = assembled("example1-heat", *settings, "geometry.follow_wear=1e-7")
     *_, expected = march(plain, 6)
 
-    def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return march_within(now, RunLimits(6, leave=leave), start=start)
-
-    blocks = list(follow(moving, integrate))
+    blocks = list(follow(moving, march_within, RunLimits(6)))
     assert blocks[-1].system is not moving
     assert expected.heat is not None
     assert blocks[-1].heat is not None

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -67,10 +68,7 @@ def growing(k0: float) -> dict[str, str]:
 
 
 def marched(system: Tribosystem, half_cycles: int, start: RunState | None = None) -> list[Block]:
-    def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return march_within(own, RunLimits(half_cycles, leave=leave), start=state)
-
-    return list(follow(system, integrate, start))
+    return list(follow(system, march_within, RunLimits(half_cycles), start))
 
 
 def by_kirchhoff() -> float:
@@ -289,11 +287,11 @@ def test_jumps_follow_as_marches(edited: Edited) -> None:
     """Jumped and marched, the properties follow alike, to what they lag behind by."""
     case = edited("example1-heat", softening, *SMALL, "run.half_cycles=16", "heat.steps=2")
 
-    def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump_within(own, RunLimits(16, leave=leave), tolerance=1e-3, start=state)
-
     system = assemble(case, heat="reduced")
-    jumped, last = list(follow(system, integrate))[-1], marched(system, 16)[-1]
+    jumped, last = (
+        list(follow(system, partial(jump_within, tolerance=1e-3), RunLimits(16)))[-1],
+        marched(system, 16)[-1],
+    )
     for block in (jumped, last):
         assert block.system.bodies.warmed is not None
         assert block.heat is not None

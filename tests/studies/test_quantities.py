@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, Tribosystem, assemble, load_case, make_case
-from fenwear.steps import Block, critical_speed, follow
+from fenwear import Case, CaseError, assemble, load_case, make_case
+from fenwear.steps import critical_speed, follow
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within
-from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity
 from fenwear.studies.model import cycle_of
 from fenwear.studies.quantities import of_case
@@ -147,11 +147,8 @@ def test_a_grid_that_grows() -> None:
     ])  # fmt: skip
     system, cycles = assemble(case, MPI.COMM_SELF), 300
 
-    def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        last = cycles * on.motion.half_cycles
-        return jump_within(on, RunLimits(last, leave=leave), tolerance=case.run.jump_tolerance, start=start)
-
-    *_, last = follow(system, integrate)
+    limits = RunLimits(cycles * system.motion.half_cycles)
+    *_, last = follow(system, partial(jump_within, tolerance=case.run.jump_tolerance), limits)
     *_, found = Model(case).run({}, cycles)
     assert len(found.end.wear[-1]) == len(last.system.pair.weights) > len(system.pair.weights)
     assert found.end.wear[-1] == pytest.approx(last.end.worn.punch, rel=1e-12)

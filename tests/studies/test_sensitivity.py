@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 from typing import cast
 
@@ -11,11 +12,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, Tribosystem, assemble, load_case
-from fenwear.steps import Block, follow
+from fenwear import Case, CaseError, assemble, load_case
+from fenwear.steps import follow
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within
-from fenwear.steps.run_state import RunState
 from fenwear.studies import Model, evaluate, parse_quantity, sensitivity
 from fenwear.studies.model import Snapshot, edge_moved
 from fenwear.studies.quantities import Path
@@ -201,10 +201,8 @@ def test_properties_that_are_taken_anew(small: Callable[..., Case]) -> None:
     case = small("example1-heat", conducting, "run.jump_tolerance=0.03", "heat.property_tolerance=0.2")
     cycles, quantity = 200, parse_quantity("temperature after 200 cycles")
 
-    def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        return jump_within(on, RunLimits(2 * cycles, leave=leave), tolerance=0.03, start=start)
-
-    *_, last = follow(assemble(case, MPI.COMM_SELF, heat="reduced"), integrate)
+    system = assemble(case, MPI.COMM_SELF, heat="reduced")
+    *_, last = follow(system, partial(jump_within, tolerance=0.03), RunLimits(2 * cycles))
     model = Model(case)
     run = list(model.run({}, cycles))
     assert sum(len(one.renewals) for one in run) > 1

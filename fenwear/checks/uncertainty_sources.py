@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.case import Case
+from fenwear.case import Case, OneWay, Rotation
 from fenwear.checks.other_discretisations import (
     LESS,
     Again,
@@ -33,7 +33,7 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, ConvergenceError
 from fenwear.results.quantity import KELVIN, degrees_of
 from fenwear.results.registry import known
-from fenwear.steps import Block, SteadyState, steady
+from fenwear.steps import Block, SteadyState, heat_gain, steady
 from fenwear.steps.run_state import RunState, all_phases, pressure_scale
 from fenwear.system import Tribosystem, with_reduced_heat
 
@@ -98,6 +98,8 @@ def _felt(last: Block, share: float) -> tuple[float, float]:
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
 AT_EDGE, INSIDE, OF_VOLUME = 1.0, 1.5, 2.0  # orders in the distance of nodes, see `order_of`
 NOTICED = 0.1  # of the wear from which on meshes follow: before, what it would do is not asked for
+FED = 0.1  # of a change of pressure, by its heat of a half-cycle: less is followed by half-cycles
+FROM_COLD = 1 / (1 - np.sqrt(0.5))  # of the change by half-cycles half as long: bodies warm with the root of time
 LATE = 0.5  # of a cycle: within it temperatures of jumps, which see whole cycles, may be any
 ROUNDING = 1e-12
 NOTHING_BELOW = "no elements of a lower degree than 1 exist to compare with. Set geometry.degree = 2"
@@ -219,6 +221,11 @@ def _steps(
         yield "wear_steps", of_jumps
     else:
         yield "wear_steps", _of_half_cycles(before, first, last)
+    if isinstance(case.motion, OneWay | Rotation) and case.program is None and (heat_gain(last.system) or 0.0) > FED:
+        # Their duration is a time step, in which the pressure stays and its heat does not.
+        shorter = replace(again.otherwise(motion={"duration": case.motion.duration / 2}), until=2 * again.until)
+        other = shorter.values()
+        yield "half_cycles", {quantity: FROM_COLD * value.apart(other[quantity]) for quantity, value in before.items()}
     if last.system.sticks:
         fineness = last.system.law_state.fineness
         if fineness is not None:
@@ -421,6 +428,7 @@ def _remedy(system: Tribosystem, source: str) -> str:
         "wear_steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
         if jumps
         else 'run.integration = "jump"',
+        "half_cycles": "a shorter motion.duration",
         "slip_steps": f"stick.step_tolerance = {case.stick.step_tolerance / 2:.2g}",
         "positions": f"motion.positions = {2 * positions - positions % 2}",
         "following": f"geometry.follow_wear = {follow / 2:.2g}",

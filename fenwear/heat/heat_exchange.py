@@ -43,7 +43,8 @@ LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 SLOPE = 1e-4  # of the pressure: half the step of differences
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
-OVERSHOOT, DRIFT = 0.1, 1e-3
+# Elements longer than what passes in a half-cycle take in a third through a held end that a warm front comes to.
+OVERSHOOT, DRIFT = 0.5, 1e-3
 
 
 # The heat of a half-cycle: done by friction, carried off by debris, gained by both bodies, lost to the

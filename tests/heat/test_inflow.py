@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from fenwear import Tribosystem, assemble, make_case, march, steady, vary
+from fenwear import Tribosystem, assemble, make_case, march, steady, to_dataset, vary
 from fenwear.case.program import stages_of
 from fenwear.common.errors import HeatError
 from fenwear.heat.temperature import ReducedField
@@ -182,6 +182,19 @@ def test_heat_out_of_bounds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     system.exchange._forget()
     with pytest.raises(HeatError, match=r"half-cycle \d+: the heat has failed, not the contact"):
         list(march(system, 200, implicit=True))
+
+
+def test_a_warm_front_at_a_held_end_of_long_elements_is_no_failure(assembled: Callable[..., Tribosystem]) -> None:
+    """Elements longer than what passes in a half-cycle take heat in there; the contact is that with a free end."""
+    motion = "motion={kind='one-way', direction='leftward', speed='400 mm/s', duration='0.2 s'}"
+    coarse = ("geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5", "geometry.degree=1")
+    case = ("example2-heat", *coarse, motion, "contact.friction=0.05")
+    held, free = (
+        to_dataset(list(march(assembled(*case, *ends), 6, implicit=True)))
+        for ends in ((), ("strip.temperatures=[{on='strip_bottom', temperature='0 K'}]",))
+    )
+    assert held.heat_stored.max() > 1.2 * (held.heat_friction - held.heat_debris).max()
+    np.testing.assert_allclose(held.wear, free.wear, rtol=0, atol=1e-5 * float(free.wear.max()))
 
 
 @pytest.mark.parametrize("operator", ["full", "reduced"])

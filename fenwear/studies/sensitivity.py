@@ -39,7 +39,7 @@ from fenwear.studies.quantities import NO_PATH, Path, Quantity, evaluate, of_cas
 from fenwear.studies.study import Progress, Run, Study, StudyOptions, Values, case_text, named
 
 WINDOWS = (0.6, 0.3, 0.1)  # T, tried until all of the window is possible
-SAMPLES = 13
+SAMPLES = 9
 SURE = 0.975  # two-sided: 95 %
 
 

@@ -16,7 +16,7 @@ from fenwear.files.cad import entities, entities_text, read_shapes
 from fenwear.files.deck import read_deck
 from fenwear.files.groups import MEASURES
 from fenwear.files.height_maps import MAPS, read_heights
-from fenwear.files.mesh_file import ENTITIES, KINDS, MeshFile, sound
+from fenwear.files.mesh_file import ENTITIES, KINDS, MeshFile, read_as, sound
 
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
@@ -52,7 +52,9 @@ def read_mesh(path: Path) -> MeshFile:
     if path.suffix.lower() not in READERS:
         message = f"expected a name that ends in {', '.join((*MESHES, *CAD))}. Convert it to .msh."
         raise CaseError(InputError(path.name, message))
-    return sound(READERS[path.suffix.lower()][1](path))
+    kind, read = READERS[path.suffix.lower()]
+    with read_as(path, kind):
+        return sound(read(path))
 
 
 TABLES = (".csv", ".txt", ".dat", ".tsv")

@@ -5,12 +5,8 @@ Of VTU and XDMF the values of a whole-numbered array of cells become sets.
 
 from __future__ import annotations
 
-import base64
-import lzma
 import re
-import zlib
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.files.mesh_file import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, known_nodes, read_as
+from fenwear.files.mesh_file import KINDS, ORDERS, Block, Ints, MeshFile, MeshSet, in_space, known_nodes
 
 MED_KINDS = {"PO1": 15, "SE2": 1, "SE3": 8, "TR3": 2, "TR6": 9, "QU4": 3, "QU8": 16, "QU9": 10, "TE4": 4, "T10": 11,
              "HE8": 5, "H20": 17, "PE6": 6, "PY5": 7}  # fmt: skip
@@ -42,11 +38,11 @@ def read_med(path: Path) -> MeshFile:
     """Return the mesh of a MED file with the groups of Salome; the first of several meshes.
 
     Raises:
-        CaseError: it cannot be read.
+        Exception: it cannot be read.
     """
     import h5py
 
-    with read_as(path, "MED"), h5py.File(path) as file:
+    with h5py.File(path) as file:
         return _med(path.name, file)
 
 
@@ -103,21 +99,20 @@ def read_exodus(path: Path) -> MeshFile:
     """Return the mesh of an Exodus file with its blocks, side sets and node sets.
 
     Raises:
-        CaseError: it cannot be read.
+        Exception: it cannot be read.
     """
-    with read_as(path, "Exodus"):
-        if path.read_bytes()[:3] == b"CDF":
-            from scipy.io import netcdf_file
+    if path.read_bytes()[:3] == b"CDF":
+        from scipy.io import netcdf_file
 
-            with netcdf_file(path, mmap=False) as file:
-                variables = file.variables
-                return _exodus(path.name, lambda name: variables[name][:] if name in variables else None,
-                               lambda name: getattr(variables[name], "elem_type", b""))  # fmt: skip
-        import h5py
+        with netcdf_file(path, mmap=False) as file:
+            variables = file.variables
+            return _exodus(path.name, lambda name: variables[name][:] if name in variables else None,
+                           lambda name: getattr(variables[name], "elem_type", b""))  # fmt: skip
+    import h5py
 
-        with h5py.File(path) as data:
-            return _exodus(path.name, lambda name: data[name][()] if name in data else None,
-                           lambda name: data[name].attrs.get("elem_type", b""))  # fmt: skip
+    with h5py.File(path) as data:
+        return _exodus(path.name, lambda name: data[name][()] if name in data else None,
+                       lambda name: data[name].attrs.get("elem_type", b""))  # fmt: skip
 
 
 def _exodus(name: str, get: Callable[[str], Any], kind_of: Callable[[str], Any]) -> MeshFile:
@@ -207,116 +202,30 @@ def read_vtu(path: Path) -> MeshFile:
     """Return the mesh of a VTU file; "material 1" is the set of the cells whose array "material" is 1.
 
     Raises:
-        CaseError: it cannot be read.
+        Exception: it cannot be read.
     """
-    with read_as(path, "VTU"):
-        return _Vtu(path).mesh()
-
-
-def read_xdmf(path: Path) -> MeshFile:
-    """Return the mesh of the first grid of an XDMF file, with sets by its cell arrays as of `read_vtu`.
-
-    Raises:
-        CaseError: it cannot be read.
-    """
-    with read_as(path, "XDMF"):
-        return _xdmf(path)
-
-
-class _Vtu:
-    """The arrays of a VTU file: as text, in base64, or appended; packed by zlib or lzma, or not."""
-
-    def __init__(self, path: Path) -> None:
-        raw = path.read_bytes()
-        head, mark, tail = raw.partition(b"<AppendedData")
-        self.appended, self.raw = b"", False
-        if mark:
-            attributes, _, rest = tail.partition(b">")
-            self.raw = b"raw" in attributes
-            self.appended = rest[rest.index(b"_") + 1 :]
-            raw = head + b"</VTKFile>"
-        self.root = ElementTree.fromstring(raw)
-        if self.root.get("type") != "UnstructuredGrid":
-            raise ValueError(f"holds a {self.root.get('type')}; expected an UnstructuredGrid")
-        self.order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
-        self.header = self.order + TYPES[self.root.get("header_type", "UInt32")]
-        packer = self.root.get("compressor", "")
-        known = {"": None, "vtkZLibDataCompressor": zlib.decompress, "vtkLZMADataCompressor": lzma.decompress}
-        if packer not in known:
-            raise ValueError(f"is packed by {packer}; expected zlib, lzma or none")
-        self.unpack, self.path = known[packer], path
-
-    def mesh(self) -> MeshFile:
-        points, blocks, arrays, notes = [], [], dict[str, list[Any]](), set[str]()
-        start = 0
-        for piece in self.root.iter("Piece"):
-            part = self.array(piece.find("Points/DataArray"))
-            named = {array.get("Name"): self.array(array) for array in piece.iterfind("Cells/DataArray")}
-            data = {a.get("Name", ""): self.array(a) for a in piece.iterfind("CellData/DataArray")}
-            ends, kinds = named["offsets"].astype(np.int64), named["types"].astype(np.int64)
-            nodes = named["connectivity"].astype(np.int64)
-            kept = []
-            for kind in np.unique(kinds):
-                selected = np.flatnonzero(kinds == kind)
-                if int(kind) not in VTK_KINDS:
-                    notes.add(f"{len(selected):,} cells of VTK's type {kind} are left out")
-                    continue
-                number = VTK_KINDS[int(kind)]
-                count = KINDS[number].nodes
-                table = nodes[ends[selected][:, None] - count + np.arange(count)]
-                known_nodes(table, len(part) // 3, f"type {kind} of cells")
-                blocks.append(Block.of(number, start + table[:, ORDERS.get(number, slice(None))]))
-                kept.append(selected)
-            cells = np.concatenate(kept) if kept else np.zeros(0, np.int64)
-            for name, values in data.items():
-                if len(values) == len(kinds):
-                    arrays.setdefault(name, []).append(values[cells])
-            points.append(part.reshape(-1, 3).astype(np.float64))
-            start += len(points[-1])
-        total = sum(len(block.nodes) for block in blocks)
-        joined = {name: np.concatenate(parts) for name, parts in arrays.items()}
-        sets = _sets({name: values for name, values in joined.items() if len(values) == total})
-        return MeshFile(self.path.name, np.concatenate(points), tuple(blocks), tuple(sets), tuple(sorted(notes)))
-
-    def array(self, element: ElementTree.Element | None) -> NDArray[Any]:
-        """Return the numbers of an element."""
-        if element is None:
-            raise ValueError("has no points")
-        kind = np.dtype(self.order + TYPES[element.get("type", "Float64")])
-        way, text = element.get("format", "ascii"), (element.text or "").strip()
-        if way == "ascii":
-            return np.array(text.split(), dtype=kind)
-        if way == "appended" and self.raw:
-            return np.frombuffer(self.plain(self.appended[int(element.get("offset", 0)) :]), kind)
-        coded = self.appended[int(element.get("offset", 0)) :] if way == "appended" else text.encode()
-        return np.frombuffer(self.decoded(coded), kind)
-
-    def plain(self, raw: bytes) -> bytes:
-        """Return the bytes of an array that begins with its header."""
-        width = np.dtype(self.header).itemsize
-        first = int(np.frombuffer(raw, self.header, 1)[0])
-        if self.unpack is None:
-            return raw[width : width + first]
-        sizes = np.frombuffer(raw, self.header, 3 + first)[3:].astype(np.int64)
-        ends = (3 + first) * width + np.concatenate([[0], np.cumsum(sizes)])
-        return b"".join(self.unpack(raw[a:b]) for a, b in pairwise(ends))
-
-    def decoded(self, text: bytes) -> bytes:
-        """Return the bytes of an array in base64, whose header is coded by itself where it is packed."""
-        width = np.dtype(self.header).itemsize
-        if self.unpack is None:
-            size = int(np.frombuffer(_unbase(text, width), self.header, 1)[0])
-            return self.plain(_unbase(text, width + size))
-        count = int(np.frombuffer(_unbase(text, width), self.header, 1)[0])
-        head = _unbase(text, (3 + count) * width)
-        sizes = np.frombuffer(head, self.header, 3 + count)[3:]
-        rest = text[4 * -(-len(head) // 3) :]
-        return self.plain(head + _unbase(rest, int(sizes.sum())))
-
-
-def _unbase(text: bytes, count: int) -> bytes:
-    """Return the first bytes that a text in base64 stands for."""
-    return base64.b64decode(text[: 4 * -(-count // 3)])[:count]
+    try:
+        import pyvista
+    except ImportError:
+        raise ValueError("VTU files need `pip install pyvista`") from None
+    grid = pyvista.UnstructuredGrid(path)
+    ends, kinds, nodes = grid.offset[1:], grid.celltypes, np.asarray(grid.cell_connectivity, dtype=np.int64)
+    blocks, kept, notes = [], [np.zeros(0, dtype=np.int64)], []
+    for kind in np.unique(kinds).tolist():
+        own = np.flatnonzero(kinds == kind)
+        if kind not in VTK_KINDS:
+            notes.append(f"{len(own):,} cells of VTK's type {kind} are left out")
+            continue
+        number = VTK_KINDS[kind]
+        count = KINDS[number].nodes
+        table = known_nodes(
+            nodes[ends[own][:, None] - count + np.arange(count)], grid.n_points, f"type {kind} of cells"
+        )
+        blocks.append(Block.of(number, table[:, ORDERS.get(number, slice(None))]))
+        kept.append(own)
+    cells = np.concatenate(kept)
+    sets = _sets({name: np.asarray(values)[cells] for name, values in grid.cell_data.items()})
+    return MeshFile(path.name, np.asarray(grid.points, dtype=np.float64), tuple(blocks), tuple(sets), tuple(notes))
 
 
 def _sets(arrays: Mapping[str, NDArray[Any]]) -> Iterator[MeshSet]:
@@ -328,7 +237,12 @@ def _sets(arrays: Mapping[str, NDArray[Any]]) -> Iterator[MeshSet]:
                 yield MeshSet(f"{name} {int(value)}", "elements", np.flatnonzero(values == value))
 
 
-def _xdmf(path: Path) -> MeshFile:
+def read_xdmf(path: Path) -> MeshFile:
+    """Return the mesh of the first grid of an XDMF file, with sets by its cell arrays as of `read_vtu`.
+
+    Raises:
+        Exception: it cannot be read.
+    """
     root = ElementTree.parse(path).getroot()
     grid = next(grid for grid in root.iter("Grid") if grid.find("Topology") is not None)
     geometry, topology = grid.find("Geometry"), grid.find("Topology")

@@ -85,7 +85,7 @@ def _felt(last: Block, share: float) -> tuple[float, float]:
     """Return the relative change of the largest pressure by a share more of the thermal gap, and that gap's range."""
     system, exchange, temperature = last.system, last.system.exchange, last.end.temperature
     phase = (int(last.half_cycle[-1]) * system.motion.positions - 1) % len(system.motion.phases)
-    thermal = exchange.gap(exchange.own(temperature), phase)
+    thermal = exchange.gap(exchange.on_bases(temperature), phase)
     gap: Array = system.gap(phase, last.end.worn) + thermal
     contact = system.phase_contact((phase,))
     try:
@@ -352,7 +352,7 @@ def _with_heat(last: Block, finer: RunState) -> Block:
     exchange, heat = last.system.exchange, last.heat
     if heat is None:
         return last
-    coarse, other = (exchange.contact_temperatures(exchange.own(state.temperature)) for state in (last.end, finer))
+    coarse, other = (exchange.contact_temperatures(exchange.on_bases(state.temperature)) for state in (last.end, finer))
     punch, strip = coarse[0] - other[0], coarse[1] - other[1]
     heat = replace(
         heat,

@@ -273,9 +273,9 @@ class CondensedContact:
         n = self.shape[1]
         if not self._by_mu.size:
             self.slide([bare + along])
-            whole = self._dense[0, :, :n].copy()
+            full = self._dense[0, :, :n].copy()
             self.slide([bare])
-            self._by_mu = whole - self._dense[0, :, :n]
+            self._by_mu = full - self._dense[0, :, :n]
         elif self._ratios[0] is not bare:
             self.slide([bare])
         self._mu = mu
@@ -299,10 +299,10 @@ class CondensedContact:
         f = self._linear.multiply(x)
         f += self._offset.reshape(-1)
         if self._mu is not None:
-            own = x[: self.shape[1]]
-            pressure = np.maximum(own, NONE)
+            trial = x[: self.shape[1]]
+            pressure = np.maximum(trial, NONE)
             pressure *= self._scales[0]
-            f += self._by_mu @ (self._mu(pressure) * own)
+            f += self._by_mu @ (self._mu(pressure) * trial)
         if self._wearing is not None:
             m, n = self.shape
             opened = self._wearing.opening(x.reshape(m, -1)[:, :n] * self._scales[0])
@@ -324,7 +324,7 @@ class CondensedContact:
     @cached_property
     def _grid(self) -> PhasesGrid:
         """The grid of the phases."""
-        of = [one for one in self._on_grid if one is not None]
+        of = [operator for operator in self._on_grid if operator is not None]
         return PhasesGrid(of, list(self._modes), list(self._balances), [phase.interface.pair for phase in self.phases])
 
     def _as_phases(
@@ -333,7 +333,7 @@ class CondensedContact:
         """Return the derivative by matrices of all nodes."""
         blocks = self._blocks
         if self.gridded:
-            matrices = [self._matrix(one.matrix(), k) for k, one in enumerate(self._grid.of)]
+            matrices = [self._matrix(operator.matrix(), k) for k, operator in enumerate(self._grid.of)]
             blocks = Blocks(np.array(matrices), self.shape[1])
         if layer is not None:
             blocks = blocks.added(layer)
@@ -364,7 +364,7 @@ class CondensedContact:
         """Return the derivative with the wear at a pressure (m, n), on a grid."""
         assert self._wearing is not None
         parts = *self._wearing.by_body(pressure), self._wearing.layer(pressure)
-        slopes = [0.0 if one is None else scale * one for one in parts]
+        slopes = [0.0 if slope is None else scale * slope for slope in parts]
         if self._changed(slopes):
             self._operator = GriddedPhases(self._grid, Opened(*slopes))
         return self._operator
@@ -408,11 +408,11 @@ class CondensedContact:
         opened = np.zeros(self.shape) if start is None else self._opened_beside(start.pressure)
         enough = max(self.inequality.close, SETTLED) * self._gap_scale
         for _ in range(ROUNDS):
-            found = self._solved(gap + opened, start, wearing, coupling)
-            before, start = opened, found
-            opened = self._opened_beside(found.pressure)
+            contact = self._solved(gap + opened, start, wearing, coupling)
+            before, start = opened, contact
+            opened = self._opened_beside(contact.pressure)
             if np.abs(opened - before).max() <= enough:
-                return found
+                return contact
         raise ConvergenceError(
             f"{self.inequality.name} did not converge: friction differs much from node to node. Reduce contact.friction"
         )
@@ -493,13 +493,13 @@ class CondensedContact:
         begin = np.zeros_like(self._offset)
         begin[:, :n] = 1.0
         failure: ConvergenceError | None = None
-        for remedy, found in (
+        for remedy, attempt in (
             (FULL_START if start is not None else "", inequality.solve),
             (INTERIOR, self._from_inside),
             (SOFTER_START, self._from_softer_bodies),
         ):
             try:
-                x = found(begin.ravel())
+                x = attempt(begin.ravel())
             except ConvergenceError as error:
                 failure = failure or error  # the first says most
                 continue
@@ -538,7 +538,7 @@ class CondensedContact:
                 near = x.copy()
                 near[:, n:] *= known / softer
                 try:
-                    found = self.inequality.solve(near.ravel())
+                    solution = self.inequality.solve(near.ravel())
                 except ConvergenceError:
                     stiffer = np.sqrt(stiffer)
                     if softer == known or stiffer < LEAST:
@@ -546,8 +546,8 @@ class CondensedContact:
                     softer = max(known / stiffer, 1.0)
                     continue
                 if softer == 1.0:
-                    return found
-                x, known = found.reshape(x.shape).copy(), softer
+                    return solution
+                x, known = solution.reshape(x.shape).copy(), softer
                 softer = max(softer / stiffer, 1.0)
         finally:
             self._offset[:, :n] = gaps

@@ -71,8 +71,8 @@ class EndlessGrid:
         symbol = _rows(waves).real * of.largest + float(of.local[0].mean())
         self._symbol = np.maximum(symbol, LEAST * np.median(np.abs(symbol)))
         if passing:
-            self._read = _short([self._transfer(one.read, -one.read_at) for one in passing])
-            self._put = _short([self._transfer(one.put, one.put_at) for one in passing])
+            self._read = _short([self._transfer(weights.read, -weights.read_at) for weights in passing])
+            self._put = _short([self._transfer(weights.put, weights.put_at) for weights in passing])
         self.take(np.zeros(1), np.zeros(1), 0.0)
 
     def _transfer(self, numbers: Array, at: NDArray[np.int64]) -> Waves:
@@ -81,7 +81,7 @@ class EndlessGrid:
         np.add.at(wrapped, tuple((at % np.array(self.period)).T), numbers)
         return _rows(scipy.fft.rfftn(wrapped))
 
-    def take(self, common: Array, strip: Array, own: float) -> None:
+    def take(self, common: Array, strip: Array, local: float) -> None:
         """Take what unit pressures open besides the bodies, on average.
 
         Args:
@@ -89,7 +89,7 @@ class EndlessGrid:
             strip: Worn off the strip (m,).
             own: In their own phase alone.
         """
-        symbol = self._symbol + own
+        symbol = self._symbol + local
         pairs: list[tuple[Waves, Waves]] = []  # of U (i, j, m) and V
         if common.any():
             pairs.append((np.ones((1, 1, len(common)), dtype=complex), common[None, None].astype(complex)))
@@ -114,20 +114,20 @@ class EndlessGrid:
     def forward(self, fields: Array) -> Waves:
         """Return the waves of fields in the box (m, ...)."""
         i, _, j = self.inverse.shape
-        found = np.empty((i, len(fields), j), dtype=np.complex128)
-        for some in in_cache(len(fields), found[:, :1].nbytes):
-            found[:, some] = forward(fields[some], self.period).reshape(-1, i, j).swapaxes(0, 1)
-        return found
+        waves = np.empty((i, len(fields), j), dtype=np.complex128)
+        for some in in_cache(len(fields), waves[:, :1].nbytes):
+            waves[:, some] = forward(fields[some], self.period).reshape(-1, i, j).swapaxes(0, 1)
+        return waves
 
     def back(self, waves: Waves) -> Array:
         """Return the fields in the box of waves."""
         i, m, j = waves.shape
-        found: Array = np.empty((m, *self.box.counts))
+        fields: Array = np.empty((m, *self.box.counts))
         shape = (-1, i, j) if len(self.period) == 2 else (-1, i)
         for some in in_cache(m, waves[:, :1].nbytes):
             image = np.ascontiguousarray(waves[:, some].swapaxes(0, 1)).reshape(shape)
-            found[some] = back(image, self.period, self.box.counts)
-        return found
+            fields[some] = back(image, self.period, self.box.counts)
+        return fields
 
     def solve(self, waves: Waves) -> Waves:
         """Return A^-1 of the waves of all phases."""
@@ -143,16 +143,16 @@ class EndlessGrid:
     def between(self, held: Waves, moved: Waves) -> Array:
         """Return the sums, held in each phase, of A^-1 times waves in a single phase (m, m)."""
         divided = held * self.inverse
-        found = np.diag(np.einsum("imj,imj->m", divided, moved).real)
+        sums = np.diag(np.einsum("imj,imj->m", divided, moved).real)
         if self._worn is None:
-            return found
+            return sums
         by, to, small = self._worn
         if by.ndim == 3:
             by, to = by[..., None], to[..., None]
         m = moved.shape[1]
         columns = _through(small[:, :, :, None], by * moved[:, None])  # (i, pairs, m, j)
         rows = (to * divided[:, :, None]).transpose(1, 0, 2, 3)  # (m, i, pairs, j)
-        return found - (rows.reshape(m, -1) @ columns.transpose(0, 1, 3, 2).reshape(-1, m)).real
+        return sums - (rows.reshape(m, -1) @ columns.transpose(0, 1, 3, 2).reshape(-1, m)).real
 
     def measure(self, waves: Waves) -> Waves:
         """Return the factors of other fields' waves in the sums over the box of their products with these fields."""
@@ -185,7 +185,7 @@ class Patch:
         else:
             held = [endless.measure(endless.forward(balance[:, s])) for s in range(r)]
         # Real parts of their products with waves are products of numbers twice as many.
-        self._held = [np.conj(one).view(np.float64) for one in held]
+        self._held = [np.conj(mode).view(np.float64) for mode in held]
         schur = np.zeros((m, r, m, r))
         for s in range(r):
             for t in range(r):
@@ -197,8 +197,8 @@ class Patch:
 
     def _forces(self, waves: Waves) -> Array:
         """Return E of pressures (m, r)."""
-        found = [np.einsum("imj,imj->m", held, waves.view(np.float64)) for held in self._held]
-        return np.stack(found, axis=1) if found else np.zeros((self._m, 0))
+        forces = [np.einsum("imj,imj->m", held, waves.view(np.float64)) for held in self._held]
+        return np.stack(forces, axis=1) if forces else np.zeros((self._m, 0))
 
     def solve(self, gaps: Array, forces: Array) -> tuple[Array, Array]:
         """Return pressures (m, ...) and rigid motions (m, r) for gaps, zero beside the contact, and forces."""
@@ -214,10 +214,10 @@ class Patch:
 
 def _through(small: Waves, waves: Waves) -> Waves:
     """Return products of each wave's matrix of pairs (i, pairs, pairs, ...) with numbers of it (i, pairs, ...)."""
-    found = small[:, :, 0] * waves[:, :1]
+    products = small[:, :, 0] * waves[:, :1]
     for pair in range(1, waves.shape[1]):
-        found += small[:, :, pair] * waves[:, pair, None]
-    return found
+        products += small[:, :, pair] * waves[:, pair, None]
+    return products
 
 
 def _rows(waves: Waves) -> Waves:
@@ -227,6 +227,6 @@ def _rows(waves: Waves) -> Waves:
 
 def _short(symbols: Sequence[Waves]) -> Waves:
     """Return symbols (i, j, m), with one number where they do not change along j."""
-    found = np.stack(symbols, axis=2)
-    first = found[:, :1]
-    return first if np.abs(found - first).max() < SAME else found
+    stacked = np.stack(symbols, axis=2)
+    first = stacked[:, :1]
+    return first if np.abs(stacked - first).max() < SAME else stacked

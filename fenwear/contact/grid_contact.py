@@ -48,7 +48,7 @@ class Opened(NamedTuple):
 
     common: Array | float = 0.0
     strip: Array | float = 0.0
-    own: Array | float = 0.0
+    local: Array | float = 0.0
 
 
 NOTHING = Opened()
@@ -85,12 +85,12 @@ class PhasesGrid:
         axes = [axis for axis in range(punch.dim) if axis != int(np.abs(punch.outward[middle]).argmax())]
         spacing = (punch.x[far] - punch.x[middle])[axes] / apart
         places = np.rint((strip.x - punch.x[middle])[:, axes] / spacing).astype(np.int64)
-        found = []
+        weights = []
         for pair in self.pairs:
             read = csr_array(pair.wear_interpolation[[middle]])
             put = csr_array(csr_array(pair.wear_projection)[:, [middle]].T)
-            found.append(Passing(read.data, places[read.indices], put.data, places[put.indices]))
-        return found
+            weights.append(Passing(read.data, places[read.indices], put.data, places[put.indices]))
+        return weights
 
 
 class PhasesBox:
@@ -141,15 +141,15 @@ class PhasesBox:
 
     def opened(self, by: Opened, p: Array) -> Array:
         """Return the openings by pressures in the box (m, ...) besides the bodies, by slopes there."""
-        found = by.own * p + (by.common * p).sum(axis=0)
+        openings = by.local * p + (by.common * p).sum(axis=0)
         if np.any(by.strip):
             to, back = self._strip
-            found += (back @ (to @ (by.strip * p).ravel())).reshape(p.shape)
-        return found
+            openings += (back @ (to @ (by.strip * p).ravel())).reshape(p.shape)
+        return openings
 
     def slopes(self, by: Opened) -> Opened:
         """Return slopes of all nodes in the box."""
-        return Opened(*(self.box.spread(one) if isinstance(one, np.ndarray) else one for one in by))
+        return Opened(*(self.box.spread(slope) if isinstance(slope, np.ndarray) else slope for slope in by))
 
 
 class GriddedPhases:
@@ -191,13 +191,13 @@ class GriddedPhases:
         def solve(b: Array) -> Array:
             right = np.zeros(self.m * self.size)
             right[kept] = b
-            whole = right.reshape(self.m, -1)
-            p, a, *_, rest = closed.solve(on.box.spread(whole[:, : self.n]), whole[:, self.n :], ACCURACY)
+            rights = right.reshape(self.m, -1)
+            p, a, *_, rest = closed.solve(on.box.spread(rights[:, : self.n]), rights[:, self.n :], ACCURACY)
             if not rest <= FAR:
                 raise np.linalg.LinAlgError("singular matrix")
-            found = np.zeros((self.m, self.size))
-            found[:, on.box.nodes], found[:, self.n :] = on.box.values(p), a
-            return np.asarray(found.ravel()[kept])
+            unknowns = np.zeros((self.m, self.size))
+            unknowns[:, on.box.nodes], unknowns[:, self.n :] = on.box.values(p), a
+            return np.asarray(unknowns.ravel()[kept])
 
         return solve
 
@@ -215,7 +215,7 @@ class GriddedPhases:
         Raises:
             LinAlgError: nothing touches, or the loads are not balanced by what does.
         """
-        n, (parts, rest) = self.n, (one.reshape(self.m, -1) for one in (x, f))
+        n, (parts, rest) = self.n, (vector.reshape(self.m, -1) for vector in (x, f))
         touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -below)).any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
@@ -223,11 +223,11 @@ class GriddedPhases:
         slopes = on.slopes(self.opened)
         change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
         p, a, touches = change.solve(enough, below)
-        found = parts.copy()
-        changed = found[:, on.box.nodes] + on.box.values(p)
-        found[:, on.box.nodes] = np.where(on.box.values(touches.astype(np.float64)) > 0, np.maximum(changed, 0.0), 0.0)
-        found[:, n:] += a
-        return found.ravel()
+        better = parts.copy()
+        changed = better[:, on.box.nodes] + on.box.values(p)
+        better[:, on.box.nodes] = np.where(on.box.values(touches.astype(np.float64)) > 0, np.maximum(changed, 0.0), 0.0)
+        better[:, n:] += a
+        return better.ravel()
 
     def balanced(self, x: Array, f: Array) -> Array:
         """Return unknowns with pressures scaled to balance the loads, by factors that vary as the rigid motions.
@@ -237,12 +237,14 @@ class GriddedPhases:
             f: Their residual, small in the balances.
         """
         parts, forces = x.reshape(self.m, -1).copy(), f.reshape(self.m, -1)[:, self.n :]
-        for own, modes, balance, rest in zip(parts, self.grid.modes, self.grid.balances, forces, strict=True):
-            pressure = own[: self.n]
+        for phase_unknowns, modes, balance, rest in zip(
+            parts, self.grid.modes, self.grid.balances, forces, strict=True
+        ):
+            pressure = phase_unknowns[: self.n]
             by_share = balance @ (pressure[:, None] * modes)
             share = modes @ np.linalg.lstsq(by_share, -rest)[0]
             if np.abs(share).max(initial=0.0) < SLIGHT:
-                own[: self.n] = pressure * (1 + share)
+                phase_unknowns[: self.n] = pressure * (1 + share)
         return np.asarray(parts.ravel())
 
 
@@ -282,8 +284,8 @@ class _Change:
             p, a, gaps, forces = p + by_p, a + by_a, gaps + by[0], forces + by[1]
             if (p < least).any():
                 p = np.maximum(p, least)
-                whole = self.on.multiply(p, a, self.slopes)
-                gaps, forces = self.gaps + whole[0], self.forces + whole[1]
+                products = self.on.multiply(p, a, self.slopes)
+                gaps, forces = self.gaps + products[0], self.forces + products[1]
             now = (p > least) | (~closed & (gaps < -below))
             changed, closed = (now != closed).sum(), now
         return p, a, p > least
@@ -326,8 +328,8 @@ class _Closed:
         inner = tuple(range(1, self.closed.ndim))
         count = np.maximum(self.closed.sum(axis=inner), 1.0)
 
-        common, strip, own = (np.asarray((values * self.closed).sum(axis=inner) / count) for values in slopes)
-        self.on.endless.take(common, strip, float(own.mean()))
+        common, strip, local = (np.asarray((values * self.closed).sum(axis=inner) / count) for values in slopes)
+        self.on.endless.take(common, strip, float(local.mean()))
 
     def _parts(self, x: Array) -> tuple[Array, Array]:
         """Return pressures (m, ...) and rigid motions (m, r) of a vector."""

@@ -72,7 +72,7 @@ def configure(snes: PETSc.SNES, prefix: str) -> None:
     snes.ksp.pc.setType("lu")
 
 
-def check(snes: PETSc.SNES, what: str) -> None:
+def check(snes: PETSc.SNES, problem: str) -> None:
     """Raise if the last solve did not converge.
 
     Raises:
@@ -81,7 +81,7 @@ def check(snes: PETSc.SNES, what: str) -> None:
     reason = snes.getConvergedReason()
     if reason <= 0:
         raise ConvergenceError(
-            f"{what} did not converge: {REASONS.get(reason, reason)} after {snes.getIterationNumber()} iterations, "
+            f"{problem} did not converge: {REASONS.get(reason, reason)} after {snes.getIterationNumber()} iterations, "
             f"residual {snes.getFunctionNorm():.3g} (options: -{snes.getOptionsPrefix()}snes_monitor, ..snes_max_it)"
         )
 
@@ -130,17 +130,17 @@ class Inequality:
     def _make(self) -> PETSc.SNES:
         comm, size = PETSc.COMM_SELF, len(self._lower)
         snes = PETSc.SNES().create(comm)
-        own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
+        proxy = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
 
         def residual(_snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            f.array_w[:] = own._function(x.array_r)
+            f.array_w[:] = proxy._function(x.array_r)
 
         def update(_snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, _P: PETSc.Mat) -> None:
-            own._operator = own._jacobian(x.array_r)
+            proxy._operator = proxy._jacobian(x.array_r)
             J.assemble()
 
         snes.setFunction(residual, PETSc.Vec().createSeq(size, comm=comm))
-        snes.setJacobian(update, _shell(size, _Matrix(own)))
+        snes.setJacobian(update, _shell(size, _Matrix(proxy)))
         configure(snes, self._prefix)
         bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (self._lower, self._upper)]
         snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in bounds))
@@ -206,9 +206,9 @@ class Inequality:
             if not isinstance(operator, Dense | Phases):
                 break
             x = complementary(operator.matrix, self._function(x) - operator.multiply(x), free)
-            found = self._by_sets(x)
-            if found is not None:
-                return found
+            solution = self._by_sets(x)
+            if solution is not None:
+                return solution
         raise ConvergenceError(f"{self.name} did not converge from inside its bounds")
 
     def _by_sets(self, start: Array) -> Array | None:

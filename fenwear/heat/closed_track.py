@@ -178,10 +178,10 @@ def _carried_over(places: Array, modes: Array, to: Array) -> Array:
         x, at = places[:, spread][:, 0], to[:, spread][:, 0]
         order = x.argsort()
         return np.column_stack([np.interp(at, x[order], mode[order]) for mode in modes.T])
-    found = np.asarray(LinearNDInterpolator(places / wide, modes)(to / wide))
-    beyond = np.isnan(found).any(axis=1)
-    found[beyond] = NearestNDInterpolator(places / wide, modes)(to[beyond] / wide)
-    return found
+    carried = np.asarray(LinearNDInterpolator(places / wide, modes)(to / wide))
+    beyond = np.isnan(carried).any(axis=1)
+    carried[beyond] = NearestNDInterpolator(places / wide, modes)(to[beyond] / wide)
+    return carried
 
 
 CELLS = 8  # of a track
@@ -245,9 +245,9 @@ class TrackField:
         self._couplings: list[_Coupling] = []
         self._kept: list[Array] = []  # of what enters, where temperatures are held: it warms nothing (m + 1,), in steps
         self.responses: Sequence[Array] = []
-        found = []
+        responses = []
         for step, velocity, answers in zip(steps, speeds, inner.responses, strict=True):
-            speed, stays, own = abs(velocity), self.capacity / CELLS / duration, answers[:, : -self._inlets]
+            speed, stays, mesh_answers = abs(velocity), self.capacity / CELLS / duration, answers[:, : -self._inlets]
             carried = total(comm, np.append(step.carried @ columns, step.carried @ lift))
             flow = float(total(comm, np.array(step.entering.sum())))
             held = step.is_held
@@ -261,18 +261,18 @@ class TrackField:
             takes = np.diag(np.tile(stays + each, CELLS)) - flow * np.eye(len(constant), k=-self._inlets)
             takes[: self._inlets, -self._inlets :] -= leaves @ enters
             self._couplings.append(_Coupling(enters, leaves, constant, stays, np.asarray(scipy.linalg.inv(takes))))
-            warms = self._couplings[-1].takes[:, : self._inlets] @ (leaves @ own)
-            found.append(np.vstack([own + enters @ warms[-self._inlets :], warms]))
-        self.responses = found
+            warms = self._couplings[-1].takes[:, : self._inlets] @ (leaves @ mesh_answers)
+            responses.append(np.vstack([mesh_answers + enters @ warms[-self._inlets :], warms]))
+        self.responses = responses
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Apply the step to the mesh and to what comes back."""
-        one, mesh = self._couplings[step], len(coordinates) - CELLS * self._inlets
+        coupling, mesh = self._couplings[step], len(coordinates) - CELLS * self._inlets
         free = self.inner.advance(step, coordinates[:mesh], sources=sources)
-        gained = one.stays * coordinates[mesh:]
-        gained[: self._inlets] += one.leaves @ free
-        track = one.takes @ (gained + one.constant if sources else gained)
-        return np.concatenate([free + one.enters @ track[-self._inlets :], track])
+        gained = coupling.stays * coordinates[mesh:]
+        gained[: self._inlets] += coupling.leaves @ free
+        track = coupling.takes @ (gained + coupling.constant if sources else gained)
+        return np.concatenate([free + coupling.enters @ track[-self._inlets :], track])
 
     def propagation(self, step: int) -> Propagation:
         """Return the step as one matrix."""

@@ -140,13 +140,13 @@ class HeatBody:
         marker = np.zeros(domain.topology.index_map(dim).size_local + domain.topology.index_map(dim).num_ghosts)
         marker[facets] = CONVECTING
         for number, group in enumerate(description.insulated):
-            tag = self._own_group(group, f"{body.name}.insulated.{number}", "it cannot be insulated")
+            tag = self._group_tag(group, f"{body.name}.insulated.{number}", "it cannot be insulated")
             marker[body.facet_tags.find(tag)] = INSULATED
         marker[body.facet_tags.find(contact_tag(body))] = CONTACT
         held = fem.Function(self.space)
         held.x.array[:] = np.nan
         for number, prescribed in enumerate(description.temperatures):
-            tag = self._own_group(prescribed.on, f"{body.name}.temperatures.{number}.on", "it cannot be held")
+            tag = self._group_tag(prescribed.on, f"{body.name}.temperatures.{number}.on", "it cannot be held")
             chosen = body.facet_tags.find(tag)
             marker[chosen] = HELD
             held.x.array[fem.locate_dofs_topological(self.space, dim, chosen)] = prescribed.temperature
@@ -158,7 +158,7 @@ class HeatBody:
         self.held = np.flatnonzero(~np.isnan(held.x.array[: self.owned])).astype(np.int32)
         self.held_values = held.x.array[self.held]
 
-    def _own_group(self, group: str, key: str, cannot: str) -> int:
+    def _group_tag(self, group: str, key: str, cannot: str) -> int:
         """Return the tag of a group of the boundary.
 
         Raises:
@@ -257,8 +257,8 @@ class HeatBody:
         Returns:
             h, N/(mm s K).
         """
-        one = fem.Constant(self.body.mesh, PETSc.ScalarType(1))
-        area = fem.assemble_scalar(compiled(self._ds(one, CONVECTING) + self._dx(self._faces * one)))
+        unit = fem.Constant(self.body.mesh, PETSc.ScalarType(1))
+        area = fem.assemble_scalar(compiled(self._ds(unit, CONVECTING) + self._dx(self._faces * unit)))
         return power / (WARMER * self.body.mesh.comm.allreduce(float(area)))
 
     def extremes(self, surroundings: Surroundings) -> tuple[float, float]:
@@ -346,7 +346,7 @@ class _Flow:
         """
         body, v = self.body, self.velocity
         flows = self.entering(v), self.entering(-v), ufl.sqrt(ufl.dot(v, v))
-        into, out, along = (fem.assemble_scalar(compiled(body._ds(one, FREE))) for one in flows)
+        into, out, along = (fem.assemble_scalar(compiled(body._ds(flow, FREE))) for flow in flows)
         return bool(body.body.mesh.comm.allreduce(into + out - 1e-9 * along) > 0)
 
     @cached_property
@@ -356,7 +356,7 @@ class _Flow:
         through, slant = ufl.dot(v, ufl.FacetNormal(body.body.mesh)), fem.Function(self._constants)
         size = ufl.sqrt(ufl.dot(v, v))
         crossed = ufl.conditional(ufl.gt(abs(through), CROSSED * size), size, 0.0)
-        flow, along = (assembled_vector(body._ds(one * w, FREE)) for one in (through, crossed))
+        flow, along = (assembled_vector(body._ds(crossing * w, FREE)) for crossing in (through, crossed))
         slant.x.array[: len(flow)] = np.divide(flow, along, out=np.zeros_like(flow), where=along > 0)
         slant.x.scatter_forward()
         return slant

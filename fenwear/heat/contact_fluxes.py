@@ -84,40 +84,40 @@ class Exchanged:
     def rows(self, nodes: NDArray[np.int64]) -> Array:
         """Return the rows of both bodies' nodes in the matrix of the system for (q_1, q_2) (2 k, 2 n)."""
         (t1, t2), k, n = self.responses, len(nodes), len(self.conductance)
-        conducts, own, jump = (a[nodes] for a in self.row_factors())
+        conducts, diagonal, jump = (a[nodes] for a in self.row_factors())
         loss, every = self.loss[nodes], np.arange(k)
         rows: Array = np.empty((2 * k, 2 * n))
         rows[:k, :n] = (jump + loss)[:, None] * t1[nodes]
         rows[:k, n:] = -jump[:, None] * t2[nodes]
         rows[k:, :n] = 0.0
         rows[k:, n:] = loss[:, None] * t2[nodes]
-        rows[every, nodes] += own
+        rows[every, nodes] += diagonal
         rows[k + every, nodes] += conducts
         rows[k + every, n + nodes] += 1.0
         return rows
 
     def right(self, bare: Array, heat: Array, ambient: float) -> Array:
         """Return the right-hand side of the system, see `Fluxes.of`."""
-        conducts, own, jump = self.row_factors()
+        conducts, diagonal, jump = self.row_factors()
         n, loss, down = len(conducts), self.loss, _down(bare.ndim)
         first, second = bare[:n], bare[n:]
         right = np.concatenate(
             [down(jump) * (second - first) - down(loss) * (first - ambient), -down(loss) * (second - ambient)]
         )
         kept = down(conducts * (1 - self.debris)) * heat
-        right[:n] += down(own * self.partition) * kept
+        right[:n] += down(diagonal * self.partition) * kept
         right[n:] += kept
         return right
 
     def sources(self, rows: Array) -> Sources:
         """Return rows (r, 2 n) of the right-hand side as rows of its sources."""
-        conducts, own, jump = self.row_factors()
+        conducts, diagonal, jump = self.row_factors()
         first, second = np.hsplit(rows, 2)
         loss, kept = self.loss, conducts * (1 - self.debris)
         return Sources(
             -first * (jump + loss),
             first * jump - second * loss,
-            (first * (own * self.partition) + second) * kept,
+            (first * (diagonal * self.partition) + second) * kept,
             (first + second) @ loss,
         )
 
@@ -148,14 +148,14 @@ class FluxFactor:
     def __init__(self, step: Exchanged) -> None:
         """Factor the system of a step."""
         self.step = step
-        conducts, own, self._jump = step.row_factors()
+        conducts, diagonal, self._jump = step.row_factors()
         self._open, self._conducts = np.flatnonzero(~conducts), conducts
         t1, t2 = step.responses
         n, apart = len(conducts), self._open
         matrix: Array = np.empty((n + len(apart), n + len(apart)))
         matrix[:n, :n] = t1 * (self._jump + step.loss)[:, None]
         matrix[:n, :n] += t2 * np.outer(self._jump, conducts)
-        matrix[np.arange(n), np.arange(n)] += own
+        matrix[np.arange(n), np.arange(n)] += diagonal
         matrix[:n, n:] = -t2[:, apart] * self._jump[:, None]
         matrix[n:, :n] = t2[apart] * (-step.convection * conducts)
         matrix[n:, n:] = np.eye(len(apart)) + step.convection * t2[np.ix_(apart, apart)]
@@ -179,10 +179,10 @@ class FluxFactor:
             met = step.responses[1] @ entering
             reduced[:n] += down(self._jump) * met
             reduced[n:] -= step.convection * met[apart]
-        found = scipy.linalg.lu_solve(self._factor, reduced, overwrite_b=True, check_finite=False)
-        other: Array = entering - down(self._conducts) * found[:n]
-        other[apart] = found[n:]
-        return np.concatenate([found[:n], other])
+        fluxes = scipy.linalg.lu_solve(self._factor, reduced, overwrite_b=True, check_finite=False)
+        other: Array = entering - down(self._conducts) * fluxes[:n]
+        other[apart] = fluxes[n:]
+        return np.concatenate([fluxes[:n], other])
 
     def solve_rows(self, rows: Array) -> Array:
         """Return rows (r, 2 n) times M^-1."""
@@ -237,11 +237,11 @@ class FluxUpdate:
         self.base, self.changed = base, np.concatenate([nodes, nodes + len(step.conductance)])
         picked: Array = np.zeros_like(rows)
         picked[np.arange(len(rows)), self.changed] = 1.0
-        own, others = step.sources(picked), base.step.sources(rows)
+        sources, others = step.sources(picked), base.step.sources(rows)
         factor = scipy.linalg.lu_factor(rows[:, self.changed])
         self.added = Sources(
             *(
-                scipy.linalg.lu_solve(factor, getattr(own, name) - getattr(others, name))
+                scipy.linalg.lu_solve(factor, getattr(sources, name) - getattr(others, name))
                 for name in ("first", "second", "heat", "ambient")
             )
         )

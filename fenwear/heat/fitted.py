@@ -77,22 +77,22 @@ def certificate(
     body, last = step.body, trial.entering[-STEPS:]
     dim, m = len(small.basis), last[0].shape[1]
     compare = _Comparison(body, small, trial)
-    whole, reduced = np.zeros((body.owned, m)), np.zeros((dim, m))
+    full, reduced = np.zeros((body.owned, m)), np.zeros((dim, m))
     for flux in last:
         heated, answer = step.respond(trial.inflow @ flux), small.responses[0] @ flux
         for counts in (EARLIER, 1.0):
-            whole = whole + counts * (step.advance(whole, sources=False) + heated - whole)
+            full = full + counts * (step.advance(full, sources=False) + heated - full)
             reduced = reduced + counts * (small.advance(0, reduced, sources=False) + answer - reduced)
-    found = compare.apart(whole, reduced, last[-1])
+    largest = compare.apart(full, reduced, last[-1])
     if body.loses_heat(velocity, surroundings):
         mean = np.mean(trial.entering, axis=0)
         steady = body.step(velocity, np.inf, surroundings)
-        whole = steady.respond(trial.inflow @ mean)
+        full = steady.respond(trial.inflow @ mean)
         steady.free()
         changes = np.eye(dim) - small.advance(0, np.eye(dim), sources=False)
         fixed = scipy.linalg.solve(changes, small.responses[0] @ mean)
-        found = max(found, compare.apart(whole, fixed, mean))
-    return found
+        largest = max(largest, compare.apart(full, fixed, mean))
+    return largest
 
 
 def pressures(x: Array) -> Array:
@@ -120,7 +120,7 @@ class _Comparison:
             exact = exact if trial.through is None else np.asarray(trial.through @ exact)
             self._beyond = exact - self._contact.of_changes(small.responses[0])
 
-    def apart(self, whole: Array, reduced: Array, flux: Array) -> float:
+    def apart(self, full: Array, reduced: Array, flux: Array) -> float:
         """Return the largest difference of readings over their largest; collective.
 
         Args:
@@ -128,14 +128,14 @@ class _Comparison:
             reduced: Coordinates (dim, m).
             flux: Of the last step (q, m).
         """
-        exact = total(self._comm, np.asarray(self._trial.contact @ whole))
+        exact = total(self._comm, np.asarray(self._trial.contact @ full))
         contact = self._contact.of_changes(reduced)
         if self._beyond is not None:
             contact = contact + self._beyond @ flux
-        both = self._trial.opened(np.hstack([whole, self._columns @ reduced - whole]))
+        both = self._trial.opened(np.hstack([full, self._columns @ reduced - full]))
         (gap, missing), rigid = np.hsplit(both, 2), self._trial.rigid
         size = np.abs(gap).max(axis=0)
-        gap, missing = (one - rigid @ (rigid.T @ one) for one in (gap, missing))
+        gap, missing = (opening - rigid @ (rigid.T @ opening) for opening in (gap, missing))
         return max(
             _relative(contact - exact, np.abs(exact).max(axis=0)),
             _relative(missing, np.maximum(np.abs(gap).max(axis=0), FLAT * size)),
@@ -158,16 +158,16 @@ def contact_responses(steps: Sequence[HeatStep], inflow: csc_array, contact_rows
     comm = body.body.mesh.comm
     free: Array = np.ones(body.owned)
     free[body.held] = 0.0
-    loads = [csr_array(one) for one in comm.allgather(csr_array(inflow * free[:, None]))]
+    loads = [csr_array(load) for load in comm.allgather(csr_array(inflow * free[:, None]))]
     rows = comm.allgather(csr_array(contact_rows))
     whole_loads, whole_rows = csr_array(vstack(loads)), csc_array(hstack(rows))
     surface = np.union1d(whole_loads.nonzero()[0], whole_rows.nonzero()[1])
     small = len(surface) ** 2 <= entries(whole_loads.shape[0], body.body.mesh.topology.dim)
-    found = []
+    responses = []
     for step in steps:
         factor = _surface_factor(step, surface) if small and available() else None
         if factor is None:
-            found.append(_by_columns(step, inflow, contact_rows))
+            responses.append(_by_columns(step, inflow, contact_rows))
             continue
         response: Array = np.zeros((contact_rows.shape[0], inflow.shape[1]))
         if factor.schur is not None:
@@ -175,8 +175,8 @@ def contact_responses(steps: Sequence[HeatStep], inflow: csc_array, contact_rows
             response = np.asarray(whole_rows[:, surface] @ answers)
         comm.Bcast(response, root=factor.owner)
         factor.free()
-        found.append(response)
-    return found
+        responses.append(response)
+    return responses
 
 
 def _surface_factor(step: HeatStep, surface: NDArray[np.int64]) -> Factor | None:
@@ -281,7 +281,7 @@ class BasisRequest:
 def fitted_field(
     body: HeatBody,
     steps: list[HeatStep],
-    own: Sequence[float],
+    velocities: Sequence[float],
     trial: Trial,
     wish: BasisRequest,
     lasting: csr_array | None = None,
@@ -312,8 +312,8 @@ def fitted_field(
         field = _on(basis, steps, wish, inflow, exact)
         growth, difference = field.spectral_radius(wish.cycle), 0.0
         if growth <= 1 + NEUTRAL:
-            hold = partial(certificate, steps[0], own[0], wish.surroundings, field, trial)
-            comm, key = body.body.mesh.comm, (id(basis), own[0])
+            hold = partial(certificate, steps[0], velocities[0], wish.surroundings, field, trial)
+            comm, key = body.body.mesh.comm, (id(basis), velocities[0])
             difference = once(comm, body.certified, key, hold) if shared else hold()
             if difference <= wish.difference or tries >= TRIES or tolerance <= ROUNDING:
                 break

@@ -129,9 +129,9 @@ def shared(
         return np.where(touching, values, 0.0).ravel()
 
     def multiply(x: Array) -> Array:
-        own = x.reshape(heat.shape)
-        found = first.response.apply(own) + second.response.apply(own) + both * mean_power(own, cell)
-        return inside(found + resistance * own)
+        entering = x.reshape(heat.shape)
+        rise = first.response.apply(entering) + second.response.apply(entering) + both * mean_power(entering, cell)
+        return inside(rise + resistance * entering)
 
     right = second.rise(heat, cell) - first.bulk.base + given * resistance * heat
     x, rest, *_ = flexible(
@@ -235,9 +235,9 @@ def bulk_of(body: HeatBody, elastic: ElasticBody, conductivity: float, spots: Sp
     grid = elastic.surface.grid
     assert grid is not None
     step = body.step(0.0, np.inf)
-    own, load = _half_space(body, conductivity, grid, spots)
+    rises, load = _half_space(body, conductivity, grid, spots)
     lifted = np.zeros(body.owned)
-    lifted[body.held] = -own[body.held]
+    lifted[body.held] = -rises[body.held]
     change = load - step.apply(lifted[:, None])[0][:, 0]
     besides = lifted + step.respond(change[:, None])[:, 0]
     base = step.advance(np.zeros(body.owned))
@@ -267,13 +267,13 @@ def _half_space(body: HeatBody, conductivity: float, grid: RegularGrid, spots: S
     work -= ufl.dot(differs, ufl.grad(v)) * ufl.dx(mesh, metadata=degree)
     form = compiled(work)
     places = body.space.tabulate_dof_coordinates()[: body.owned, :dim]
-    own, load = np.zeros(body.owned), np.zeros(body.owned)
+    rises, load = np.zeros(body.owned), np.zeros(body.owned)
     for place, share in zip(np.insert(spots.places, grid.normal, grid.level, axis=1), spots.shares, strict=True):
         source.value[:] = place
         load += share * assembled_vector(form)
         with np.errstate(divide="ignore"):  # at the points themselves, where nothing is held
-            own += share / (2 * np.pi * conductivity * np.linalg.norm(places - place, axis=1))
-    return own, load
+            rises += share / (2 * np.pi * conductivity * np.linalg.norm(places - place, axis=1))
+    return rises, load
 
 
 def _at_spots(body: HeatBody, elastic: ElasticBody, spots: Spots, fields: Array) -> Array:
@@ -285,5 +285,7 @@ def _at_spots(body: HeatBody, elastic: ElasticBody, spots: Spots, fields: Array)
         low + side * np.arange(count) for low, side, count in zip(grid.corner, grid.spacing, grid.counts, strict=True)
     ]
     read = RegularGridInterpolator(along, values)
-    inside = np.clip(spots.places, [one[0] for one in along], [one[-1] for one in along])
+    inside = np.clip(
+        spots.places, [axis_places[0] for axis_places in along], [axis_places[-1] for axis_places in along]
+    )
     return np.asarray(spots.shares @ read(inside))

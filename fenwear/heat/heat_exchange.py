@@ -92,7 +92,7 @@ class HeatExchange:
         for basis in self.bases:
             self.team.serve(basis)
         # Known before rank 0 leads: where temperatures are reduced, that takes all ranks.
-        self._initial = self.own(HeatState.nodal(*self._unheated())) if self.reduced else None
+        self._initial = self.on_bases(HeatState.nodal(*self._unheated())) if self.reduced else None
 
     @property
     def team(self) -> Team:
@@ -144,9 +144,9 @@ class HeatExchange:
 
     def initial(self) -> HeatState:
         """Return the initial state."""
-        return self._initial or self.own(HeatState.nodal(*self._unheated()))
+        return self._initial or self.on_bases(HeatState.nodal(*self._unheated()))
 
-    def own(self, state: HeatState | None) -> HeatState:
+    def on_bases(self, state: HeatState | None) -> HeatState:
         """Return a state, by default the initial one, on this exchange's bases; collective where it is on others."""
         return self.initial() if state is None else state.on(self.bases)
 
@@ -161,7 +161,7 @@ class HeatExchange:
             state: The temperatures.
             phase: Number of the phase, for the place of the contact; -1 for the last phase, before the first.
         """
-        punch, strip = self._parts(self.own(state).values)
+        punch, strip = self._parts(self.on_bases(state).values)
         return self.sides[0].readings[phase].gap(punch) + self.sides[1].readings[phase].gap(strip)
 
     def gap_change(self, changes: Array, phase: int = -1) -> Array:
@@ -171,7 +171,7 @@ class HeatExchange:
 
     def contact_temperatures(self, state: HeatState, phase: int = -1) -> tuple[Array, Array]:
         """Return the temperatures of the two surfaces at the interface nodes at the end of a phase (n,), K."""
-        state = self.own(state)
+        state = self.on_bases(state)
         if state.surfaces is not None:
             return state.surfaces
         punch, strip = self._parts(state.values)
@@ -222,7 +222,7 @@ class HeatExchange:
 
     def conduct(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
         """Return the state after a part of a half-cycle, within its bounds or not, and the balance."""
-        values, terms, surfaces = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
+        values, terms, surfaces = self._conduct(self.on_bases(state).values, phase, pressure, conductance, sources=True)
         return HeatState(self.bases, values, surfaces=surfaces), terms * self.thickness
 
     def check_bounds(self, before: HeatState, after: HeatState, made: float) -> None:
@@ -241,7 +241,8 @@ class HeatExchange:
         if self._steady or not all(side.bounded for side in self.sides):
             return
         start, end = (
-            sum(one[0] for one in self._balances(self.own(state).values, sources=True)) for state in (before, after)
+            sum(balance[0] for balance in self._balances(self.on_bases(state).values, sources=True))
+            for state in (before, after)
         )
         self._led(partial(self._check_bounds, start, end, made / self.thickness))
 
@@ -290,7 +291,7 @@ class HeatExchange:
                 starts += counts * values
                 reached += counts * ends
                 heated += counts * plan.seconds * heat
-                entered = [one + counts * plan.seconds * q for one, q in zip(entered, fluxes, strict=True)]
+                entered = [amount + counts * plan.seconds * q for amount, q in zip(entered, fluxes, strict=True)]
                 values = values + counts * (ends - values)
             terms += self._kept(plan, starts, reached, sources=sources)
         terms += self._led(partial(self._made, heated, entered[0] + entered[1]))
@@ -335,7 +336,7 @@ class HeatExchange:
     def _prepared_stage(self, plan: StepPlan) -> PreparedStage:
         """Return a stage on small bases, whatever conducts."""
         of_kinds = list(zip(self.sides, (plan.punch, plan.strip), strict=True))
-        motions = [one for side, kind in of_kinds if (one := side.field.propagation(kind)) is not None]
+        motions = [motion for side, kind in of_kinds if (motion := side.field.propagation(kind)) is not None]
         every = np.eye(sum(len(basis) for basis in self.bases))
         none = np.zeros_like(every)
         by_start, by_end = (self._kept(plan, *ends, sources=False) for ends in ((every, none), (none, every)))
@@ -354,8 +355,8 @@ class HeatExchange:
         """Return the temperatures of both contact surfaces at the end of a phase, from the fluxes of its last step."""
         readings = [side.readings[phase] for side in self.sides]
         first, second = (
-            one.contact(part) + (0.0 if one.left_out is None else one.left_out @ q)
-            for one, part, q in zip(readings, self._parts(values), fluxes, strict=True)
+            reading.contact(part) + (0.0 if reading.left_out is None else reading.left_out @ q)
+            for reading, part, q in zip(readings, self._parts(values), fluxes, strict=True)
         )
         return first, second
 
@@ -437,7 +438,7 @@ class HeatExchange:
         Args:
             phase, state, pressure, conductance: As of `half_cycle`.
         """
-        n, values = len(conductance), self.own(state).values
+        n, values = len(conductance), self.on_bases(state).values
         conducts = np.isfinite(conductance)
         changes: Array = np.zeros((len(values), n))
         for plan in self.plans[phase]:
@@ -463,8 +464,11 @@ class HeatExchange:
         counted, constants = sources * sum(self._stages), [side.balance.constant for side in self.sides]
 
         def rows(values: Array) -> list[Array]:
-            found = self._balances(values, sources=False)
-            return [own + counted * _down(own.ndim - 1, one) for own, one in zip(found, constants, strict=True)]
+            balances = self._balances(values, sources=False)
+            return [
+                balance + counted * _down(balance.ndim - 1, constant)
+                for balance, constant in zip(balances, constants, strict=True)
+            ]
 
         before, after = rows(starts), rows(reached)
         return self._led(partial(self._account, plan, before, after, counted))
@@ -518,8 +522,8 @@ class HeatExchange:
             fields = [side.field for side in self.sides]
             contacts = [side.contacts[kind] for side, kind in zip(self.sides, kinds, strict=True)]
             self._prepared[kinds] = PreparedStep(fields, kinds, contacts, self.heat.ambient)
-        one = self._prepared[kinds].map(self._flux_map(kinds, conductance))
-        return one if len(self._stages) == 1 else one.twice(EARLIER)
+        single = self._prepared[kinds].map(self._flux_map(kinds, conductance))
+        return single if len(self._stages) == 1 else single.twice(EARLIER)
 
     def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> FluxFactor | FluxUpdate:
         """Return the map to the fluxes; kept for conductances met before."""
@@ -535,12 +539,12 @@ class HeatExchange:
         if len(conductance) <= FEW:
             return FluxFactor(step)
         last = self._flux_factors.get(kinds)
-        found = None if last is None else last.updated(step)
-        if found is None:
+        factor = None if last is None else last.updated(step)
+        if factor is None:
             self._flux_maps = {key: value for key, value in self._flux_maps.items() if key[:2] != kinds}
             self._flux_factors.pop(kinds, None)
-            found = self._flux_factors[kinds] = FluxFactor(step)
-        return found
+            factor = self._flux_factors[kinds] = FluxFactor(step)
+        return factor
 
     def _exchanged(self, kinds: tuple[int, int], conductance: Array) -> Exchanged:
         first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
@@ -588,7 +592,7 @@ class Isothermal(HeatExchange):
         """Return the exchange itself, as nothing conducts."""
         return self
 
-    def own(self, state: HeatState | None) -> HeatState:  # noqa: ARG002
+    def on_bases(self, state: HeatState | None) -> HeatState:  # noqa: ARG002
         """Return the initial state, which is the only one."""
         return self.initial()
 

@@ -64,25 +64,32 @@ def cell_integrals(
     """
     moves, kind = any(drift), np.result_type(type(decay), np.float64)
     low = tuple(1 - count for count in shape) if moves else (0, 0)
-    own: list[Array] = [
+    places: list[Array] = [
         np.asarray(side * np.arange(first, count)) for side, first, count in zip(sides, low, shape, strict=True)
     ]
-    found = np.zeros(tuple(len(one) for one in own), dtype=kind)
-    more = int(MORE * min(abs(decay) * max(sides), MOST / MORE))
-    _add(found, own, sides, decay, drift, ROUGH + more)
+    integrals = np.zeros(tuple(len(axis_places) for axis_places in places), dtype=kind)
+    extra_points = int(MORE * min(abs(decay) * max(sides), MOST / MORE))
+    _add(integrals, places, sides, decay, drift, ROUGH + extra_points)
     near = tuple(slice(max(-first - NEAR, 0), NEAR + 1 - first) for first in low)
-    inner, close = found[near], [one[part] for one, part in zip(own, near, strict=True)]
+    inner, close = integrals[near], [axis_places[part] for axis_places, part in zip(places, near, strict=True)]
     inner[:] = 0.0
-    _add(inner, close, sides, decay, drift, FINE + more)
-    found[tuple(-first for first in low)] = _own_cell(sides, decay, drift)
+    _add(inner, close, sides, decay, drift, FINE + extra_points)
+    integrals[tuple(-first for first in low)] = _cell_about_source(sides, decay, drift)
     if not moves:
         for axis in range(2):
-            found = np.concatenate([np.flip(found, axis).take(range(found.shape[axis] - 1), axis), found], axis)
-    return found / (2 * np.pi)
+            integrals = np.concatenate(
+                [np.flip(integrals, axis).take(range(integrals.shape[axis] - 1), axis), integrals], axis
+            )
+    return integrals / (2 * np.pi)
 
 
 def _add(
-    found: NDArray[Any], places: list[Array], sides: tuple[float, ...], decay: complex, drift: tuple[float, ...], n: int
+    integrals: NDArray[Any],
+    places: list[Array],
+    sides: tuple[float, ...],
+    decay: complex,
+    drift: tuple[float, ...],
+    n: int,
 ) -> None:
     """Add integrals by Gauss' rule of n by n points."""
     points, weights = np.polynomial.legendre.leggauss(n)
@@ -92,10 +99,10 @@ def _add(
             y = places[1] + sides[1] / 2 * b
             r = np.hypot(x, y)
             with np.errstate(divide="ignore", invalid="ignore"):  # at the source itself, which is found by angles
-                found += wa * wb * sides[0] * sides[1] / 4 * np.exp(drift[0] * x + drift[1] * y - decay * r) / r
+                integrals += wa * wb * sides[0] * sides[1] / 4 * np.exp(drift[0] * x + drift[1] * y - decay * r) / r
 
 
-def _own_cell(sides: tuple[float, ...], decay: complex, drift: tuple[float, ...]) -> Any:
+def _cell_about_source(sides: tuple[float, ...], decay: complex, drift: tuple[float, ...]) -> Any:
     """Return the integral over the cell about the source: along each ray in closed form, then over the angle."""
     points, weights = np.polynomial.legendre.leggauss(ROUND)
     corner = np.arctan2(sides[1], sides[0])
@@ -160,12 +167,13 @@ def history_kernel(
     points, weights = _panels(np.array(edges))
     moved, heat = past(points**2)
     parts = [
-        _spread(own, side, moved[:, k], root * points) for k, (own, side) in enumerate(zip(places, sides, strict=True))
+        _spread(axis_places, side, moved[:, k], root * points)
+        for k, (axis_places, side) in enumerate(zip(places, sides, strict=True))
     ]
     # 1 / (rho c) = kappa / K, and ds / sqrt(pi kappa s) = 2 du / sqrt(pi kappa)
     share = 2 * root / np.sqrt(np.pi) * weights * heat
-    found = (parts[0] * share) @ parts[1].T
-    return np.asarray(found + _before(places, sides, root * end, period, past, fastest))
+    kernel = (parts[0] * share) @ parts[1].T
+    return np.asarray(kernel + _before(places, sides, root * end, period, past, fastest))
 
 
 def _panels(edges: Array) -> tuple[Array, Array]:
@@ -192,11 +200,11 @@ def _before(
     """Return the temperatures by all earlier periods, for heat at each place of the source that is even in time."""
     count = max(PER_PERIOD, int(np.ceil(2 * fastest * period / width)))
     moved, heat = past(period * (np.arange(count) + 0.5) / count)
-    found: Array = np.zeros((len(places[0]), len(places[1])))
+    temperatures: Array = np.zeros((len(places[0]), len(places[1])))
     for x, y, part in zip(*moved.T, heat, strict=True):
         r = np.maximum(np.hypot(places[0][:, None] + x, places[1] + y), 1e-6 * width)
-        found += part / count * erf(r / (2 * width)) / r
-    return np.asarray(found * (sides[0] * sides[1] / (2 * np.pi)), dtype=np.float64)
+        temperatures += part / count * erf(r / (2 * width)) / r
+    return np.asarray(temperatures * (sides[0] * sides[1] / (2 * np.pi)), dtype=np.float64)
 
 
 PLANE = (1, 2)
@@ -232,8 +240,8 @@ class Instants:
     def apply(self, heat: Array) -> Array:
         """Return the temperatures (t, m, n), K."""
         waves = scipy.fft.rfftn(heat, self._size, axes=PLANE)
-        found = scipy.fft.irfftn(waves * self._waves, self._size, axes=PLANE)
-        return np.asarray(found[:, : heat.shape[1], : heat.shape[2]])
+        temperatures = scipy.fft.irfftn(waves * self._waves, self._size, axes=PLANE)
+        return np.asarray(temperatures[:, : heat.shape[1], : heat.shape[2]])
 
 
 @dataclass(frozen=True)
@@ -260,7 +268,7 @@ class Periodic:
     def _reach(self) -> tuple[int, ...]:
         """Nodes of the grid with all of its places."""
         far = np.ceil(np.ptp(self.shifts, axis=0) / self.sides - 1e-9).astype(int)
-        return tuple(int(count + more) for count, more in zip(self.shape, far, strict=True))
+        return tuple(int(count + extra) for count, extra in zip(self.shape, far, strict=True))
 
     @cached_property
     def _size(self) -> tuple[int, ...]:
@@ -270,16 +278,16 @@ class Periodic:
     def _waves(self) -> Complex:
         """Of the kernel of each harmonic (t, ...)."""
         steps = len(self.shifts)
-        found = np.empty((steps, self._size[0], self._size[1] // 2 + 1), dtype=complex)
+        waves = np.empty((steps, self._size[0], self._size[1] // 2 + 1), dtype=complex)
         for n in range(steps // 2 + 1):
             decay = np.sqrt(1j * 2 * np.pi * n / self.period / self.diffusivity)
             kernel = _wrapped(cell_integrals(self._reach, self.sides, decay if n else 0.0), self._size)
             real, other = (
                 scipy.fft.rfftn(np.ascontiguousarray(part), axes=(0, 1)) for part in (kernel.real, kernel.imag)
             )
-            found[n] = real if 2 * n == steps else real + 1j * other
-            found[-n] = real if n == 0 or 2 * n == steps else real - 1j * other
-        return np.asarray(found / self.conductivity, dtype=np.complex128)
+            waves[n] = real if 2 * n == steps else real + 1j * other
+            waves[-n] = real if n == 0 or 2 * n == steps else real - 1j * other
+        return np.asarray(waves / self.conductivity, dtype=np.complex128)
 
     @cached_property
     def _phases(self) -> Complex:
@@ -299,14 +307,14 @@ class Periodic:
         """Return the temperatures (t, m, n), K."""
         waves = scipy.fft.rfftn(heat, self._size, axes=PLANE) * self._phases
         waves = scipy.fft.ifft(scipy.fft.fft(waves, axis=0) * self._waves, axis=0) * self._phases.conj()
-        found = scipy.fft.irfftn(waves, self._size, axes=PLANE)
-        return np.asarray(found[:, : heat.shape[1], : heat.shape[2]])
+        temperatures = scipy.fft.irfftn(waves, self._size, axes=PLANE)
+        return np.asarray(temperatures[:, : heat.shape[1], : heat.shape[2]])
 
 
 def _wrapped(kernel: NDArray[Any], size: tuple[int, ...]) -> NDArray[Any]:
     """Return kernels at all distances (..., 2 m - 1, 2 n - 1) on a grid of this size, distance 0 first."""
     counts = [(count + 1) // 2 for count in kernel.shape[-2:]]
-    found = np.zeros((*kernel.shape[:-2], *size), dtype=kernel.dtype)
-    rows, columns = (np.arange(1 - count, count) % whole for count, whole in zip(counts, size, strict=True))
-    found[..., rows[:, None], columns] = kernel
-    return found
+    wrapped = np.zeros((*kernel.shape[:-2], *size), dtype=kernel.dtype)
+    rows, columns = (np.arange(1 - count, count) % length for count, length in zip(counts, size, strict=True))
+    wrapped[..., rows[:, None], columns] = kernel
+    return wrapped

@@ -84,7 +84,7 @@ class Passage:
         apart = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
         return float(apart[:, ~np.eye(facets.shape[1], dtype=bool)].min())
 
-    def _moved(self, one: Placement, other: Placement) -> float:
+    def _moved(self, first: Placement, other: Placement) -> float:
         """Return the largest distance of the strip's nodes between two places, mm."""
         trace = self.middle.strip.trace
-        return float(np.linalg.norm(other.points(trace) - one.points(trace), axis=1).max())
+        return float(np.linalg.norm(other.points(trace) - first.points(trace), axis=1).max())

@@ -70,17 +70,17 @@ class ReciprocatingField:
         self._loads = [csr_array(transfer.T @ diags_array(weights)) for transfer in transfers]
         self.responses: Sequence[Array] = []
         self._returns: list[Array] = []
-        found, corrected = [], []
+        responses, corrected = [], []
         for contact, load, transfer, kind in zip(self.contacts, self._loads, transfers, kinds, strict=True):
             response = np.asarray(inner.responses[kind] @ load)
             warms = contact.of_changes(response)
             back = np.linalg.inv(np.eye(len(weights)) - convection * warms)
-            found.append(response @ back)
-            self._returns.append(convection * found[-1])
+            responses.append(response @ back)
+            self._returns.append(convection * responses[-1])
             if inner.contact_responses is not None:
                 exact = inner.contact_responses[kind]
                 corrected.append(back @ warms + np.asarray(transfer @ (exact @ load)) - warms)
-        self.responses = found
+        self.responses = responses
         self.contact_responses: Sequence[Array] | None = None if inner.contact_responses is None else corrected
         self.given_back = np.array([convection * (nodes.T @ load.sum(axis=1)) for load in self._loads])
 

@@ -43,8 +43,8 @@ class PhaseMap:
     @cached_property
     def propagator(self) -> Array:
         """From the state at its start (dim, dim)."""
-        alike = [list(own) for _, own in groupby(self.steps, lambda step: id(step[0]))]
-        powers = [np.linalg.matrix_power(own[0][0].propagator, len(own)) for own in alike]
+        alike = [list(group) for _, group in groupby(self.steps, lambda step: id(step[0]))]
+        powers = [np.linalg.matrix_power(group[0][0].propagator, len(group)) for group in alike]
         return np.asarray(reduce(lambda through, power: power @ through, powers))
 
     @cached_property
@@ -56,17 +56,17 @@ class PhaseMap:
     def response(self) -> Array:
         """From its pressure (dim, n): of few nodes, which ask for it; of many `after` costs less."""
         response: Array = np.zeros_like(self.steps[0][0].response)
-        for one, friction in self.steps:
-            response = one.propagator @ response + one.response * friction
+        for step, friction in self.steps:
+            response = step.propagator @ response + step.response * friction
         return response
 
     def after(self, state: Array, pressure: Array) -> Array:
         """Return the state at its end (dim,) from that at its start and its pressure (n,)."""
         heated: dict[int, Array] = {}  # steps there and back are of one kind
-        for one, friction in self.steps:
-            if id(one) not in heated:
-                heated[id(one)] = one.response @ (friction * pressure)
-            state = one.propagator @ state + one.source + heated[id(one)]
+        for step, friction in self.steps:
+            if id(step) not in heated:
+                heated[id(step)] = step.response @ (friction * pressure)
+            state = step.propagator @ state + step.source + heated[id(step)]
         return state
 
 
@@ -91,33 +91,37 @@ class Cycle:
     @cached_property
     def propagator(self) -> Array:
         """State after the cycle from that at its start without sources and pressures (dim, dim)."""
-        return reduce(lambda through, one: one.propagator @ through, self.maps[1:], self.maps[0].propagator)
+        return reduce(lambda through, phase_map: phase_map.propagator @ through, self.maps[1:], self.maps[0].propagator)
 
     @cached_property
     def through(self) -> list[Array]:
         """The map from the start to the end of each phase (m, dim, dim), for few phases and nodes."""
-        return list(accumulate((one.propagator for one in self.maps), lambda through, one: one @ through))
+        return list(
+            accumulate(
+                (phase_map.propagator for phase_map in self.maps), lambda through, propagator: propagator @ through
+            )
+        )
 
     def states(self, state: Array, pressure: Array) -> list[Array]:
         """Return the states after each phase from that at the start (dim,) and the pressures (m, n)."""
-        found = []
-        for phase, one in enumerate(self.maps):
-            state = one.after(state, pressure[phase])
-            found.append(state)
-        return found
+        states = []
+        for phase, phase_map in enumerate(self.maps):
+            state = phase_map.after(state, pressure[phase])
+            states.append(state)
+        return states
 
     @cached_property
     def responses(self) -> list[Array]:
         """State after each phase from the pressures of all phases (dim, m n), m of them."""
         m, (dim, n) = len(self.maps), self.maps[0].response.shape
         responses: Array = np.zeros((dim, m, n))
-        found: list[Array] = []
-        for phase, one in enumerate(self.maps):
+        ends: list[Array] = []
+        for phase, phase_map in enumerate(self.maps):
             for before in range(phase):
-                responses[:, before] = one.propagator @ responses[:, before]
-            responses[:, phase] = one.response
-            found.append(responses.reshape(dim, -1).copy())
-        return found
+                responses[:, before] = phase_map.propagator @ responses[:, before]
+            responses[:, phase] = phase_map.response
+            ends.append(responses.reshape(dim, -1).copy())
+        return ends
 
 
 class JumpEnd:
@@ -129,9 +133,11 @@ class JumpEnd:
     """
 
     def __init__(self, propagator: Array, cycles: float) -> None:
-        self.cycles, one, endless = cycles, np.eye(len(propagator)), np.isinf(cycles)
+        self.cycles, identity, endless = cycles, np.eye(len(propagator)), np.isinf(cycles)
         self._weight = 1.0 if endless else cycles
-        self._factor = scipy.linalg.lu_factor(one - propagator if endless else one + cycles * (one - propagator))
+        self._factor = scipy.linalg.lu_factor(
+            identity - propagator if endless else identity + cycles * (identity - propagator)
+        )
         self._coupling: Array | None = None
 
     def state(self, start: Array, brought: Array) -> Array:
@@ -149,8 +155,8 @@ class JumpEnd:
         if self._coupling is None:
             m, n, responses = len(cycle.maps), len(gap_rows[0]), cycle.responses
             end = scipy.linalg.lu_solve(self._factor, self._weight * responses[-1])
-            found = zip(gap_rows, cycle.through, responses, strict=True)
-            gaps = np.array([rows @ (through @ end + own) for rows, through, own in found])
+            phases = zip(gap_rows, cycle.through, responses, strict=True)
+            gaps = np.array([rows @ (through @ end + response) for rows, through, response in phases])
             self._coupling = gaps.reshape(m, n, m, n)
         return self._coupling
 
@@ -184,8 +190,8 @@ class CycleJump:
     def gaps(self, pressure: Array) -> Array:
         """Return the thermal gap at the end of each phase of the cycle that starts there (m, n), mm, at pressures."""
         states = self._cycle.states(self.state(pressure), pressure)
-        found = zip(self._gap_rows, states, self._gap_constants, strict=True)
-        return np.array([rows @ state + constant for rows, state, constant in found])
+        phases = zip(self._gap_rows, states, self._gap_constants, strict=True)
+        return np.array([rows @ state + constant for rows, state, constant in phases])
 
     @cached_property
     def gap(self) -> Array:

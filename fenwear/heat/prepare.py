@@ -97,16 +97,16 @@ def prepare_exchange(
     if passage is not None:
         plans, of_places = at_places(passage, plans, count)
     sides, differences = [], []
-    for body, inflow, rows, own, by in zip(
+    for body, inflow, rows, phase_stages, by in zip(
         bodies, inflows(bodies, pair), expansions, stages, moved or (None, None), strict=True
     ):
-        velocities = [stage.velocity for stage in own]
+        velocities = [stage.velocity for stage in phase_stages]
         if strip is not None and body is strip.body:
             opened = opened_gap(body, pair, rows, by, strip.passage)
-            side, difference = _passing(heat, strip, of_places, own, plans, rows, opened, reduced=reduced)
+            side, difference = _passing(heat, strip, of_places, phase_stages, plans, rows, opened, reduced=reduced)
         else:
             around = _surroundings(body, pair, sliding, renewed=one_way)
-            steps = [body.step(stage.velocity, stage.duration, around) for stage in own]
+            steps = [body.step(stage.velocity, stage.duration, around) for stage in phase_stages]
             rated = None
             if reduced:
                 cycle = [step.of(body) for row in plans for step in row]
@@ -129,7 +129,7 @@ def _in_place(
     heat: Heat,
     body: HeatBody,
     steps: list[HeatStep],
-    own: Sequence[float],
+    velocities: Sequence[float],
     pair: ContactPair,
     inflow: csc_array,
     rows: Array,
@@ -155,11 +155,11 @@ def _in_place(
     if rated is None:
         field = FullField(body, steps, inflow)
     elif heat.track is not None and body.body.name == "strip":
-        field, difference = _on_track(heat.track, body, steps, own, *rated, thickness)
+        field, difference = _on_track(heat.track, body, steps, velocities, *rated, thickness)
     else:
         lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
-        field, difference = fitted_field(body, steps, own, rated[1], rated[0], lasting)
-    cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
+        field, difference = fitted_field(body, steps, velocities, rated[1], rated[0], lasting)
+    cooled = any(body.loses_heat(velocity, around) for velocity in velocities)  # the same on every rank
     side = _side(field, steps, around, pair, rows, [row[-1].of(body) for row in plans], cooled=cooled)
     for step in steps if rated is not None else ():  # what is left of them is in the small field
         step.free()
@@ -179,8 +179,8 @@ def _passed_fineness(
 
     All stages of a program have the same, chosen for the first.
     """
-    own = np.array(motion.directions) * motion.mean_speeds(1)[:, 0]
-    fastest, duration = max([*own, *others], key=abs), motion.phases[0].duration
+    velocities = np.array(motion.directions) * motion.mean_speeds(1)[:, 0]
+    fastest, duration = max([*velocities, *others], key=abs), motion.phases[0].duration
     if fastest == 0:
         return Fineness(heat.steps or STEPS)
     strip, load = bodies[1], np.asarray(inflows(bodies, pair)[1] @ friction)
@@ -258,9 +258,11 @@ def prepare_steady(
     """
     plans = [[StepPlan(0, k, abs(v), np.inf)] for k, v in enumerate(velocities)]
     sides = []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
+    for body, inflow, rows, body_velocities in zip(
+        bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True
+    ):
         around = _surroundings(body, pair, sliding, renewed=True)
-        steps = [body.step(velocity, np.inf, around) for velocity in own]
+        steps = [body.step(velocity, np.inf, around) for velocity in body_velocities]
         last = [row[-1].of(body) for row in plans]
         sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, last, cooled=True))
     of_phases = np.tile(friction, (len(plans), 1))
@@ -320,7 +322,7 @@ def _on_track(
     track: Track,
     body: HeatBody,
     steps: list[HeatStep],
-    own: Sequence[float],
+    velocities: Sequence[float],
     wish: BasisRequest,
     trial: Trial,
     thickness: float,
@@ -354,16 +356,16 @@ def _on_track(
     kelvins = total(comm, np.abs(loads).sum(axis=0)) / fluxes
     both = csc_array(hstack([inflow, csc_array(loads / kelvins)]))
     tried = [_with_inlets(flux, len(kelvins)) for flux in trial.entering]
-    inner, difference = fitted_field(body, steps, own, replace(trial, inflow=both, entering=tried), wish)
-    return TrackField(inner, steps, own, kelvins, wish.duration, track, section, thickness), difference
+    inner, difference = fitted_field(body, steps, velocities, replace(trial, inflow=both, entering=tried), wish)
+    return TrackField(inner, steps, velocities, kelvins, wish.duration, track, section, thickness), difference
 
 
 def _with_inlets(flux: Array, count: int) -> Array:
     """Return fluxes (n, m) with none that enters by the end of the mesh, and then as much by each mode, (., m + 1)."""
-    found: Array = np.zeros((len(flux) + count, flux.shape[1] + 1))
-    found[: len(flux), :-1] = flux
-    found[len(flux) :, -1] = flux[:, 0].sum()
-    return found
+    extended: Array = np.zeros((len(flux) + count, flux.shape[1] + 1))
+    extended[: len(flux), :-1] = flux
+    extended[len(flux) :, -1] = flux[:, 0].sum()
+    return extended
 
 
 def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:
@@ -445,7 +447,7 @@ def _on_balance(
         returned = float(given_back[0].sum())
     rows, comm = np.array(balance_rows), body.body.mesh.comm
     sums = total(comm, np.array([body.storage.sum(), convected.sum() - returned]))
-    capacity, ambient_loss = (float(one) for one in sums)
+    capacity, ambient_loss = (float(value) for value in sums)
     return Side(
         field,
         contacts,

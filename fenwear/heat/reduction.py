@@ -184,7 +184,7 @@ class _Growing:
         dim, first = self.columns.shape[1], self._first
         if dim == first:
             return
-        added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
+        added = np.hstack([np.pad(block, ((0, dim - len(block)), (0, 0))) for block in self._added])[first:]
         columns = self.columns[:, first:]
         parts, values, _ = np.linalg.svd(added, full_matrices=False)
         self.columns, self._stored = self.columns[:, :first], self._stored[:, :first]

@@ -147,20 +147,20 @@ def step_plans(
         count: Steps of each phase.
         moves: Whether the strip's material moves through its mesh.
     """
-    speeds = [[float(v) for v in own] for own in motion.mean_speeds(count)]
+    speeds = [[float(v) for v in phase_speeds] for phase_speeds in motion.mean_speeds(count)]
     durations = [STAGE * duration / count for duration in motion.durations]
     taken = [
-        [StageKind(duration, d * v if moves else 0.0) for v in own]
-        for own, d, duration in zip(speeds, motion.directions, durations, strict=True)
+        [StageKind(duration, d * v if moves else 0.0) for v in phase_speeds]
+        for phase_speeds, d, duration in zip(speeds, motion.directions, durations, strict=True)
     ]
     of_punch = [StageKind(duration, 0.0) for duration in sorted(set(durations))]
     of_strip = sorted({stage for row in taken for stage in row})
     plans = [
         [
             StepPlan(of_punch.index(StageKind(stage.duration, 0.0)), of_strip.index(stage), v, stage.duration)
-            for stage, v in zip(row, own, strict=True)
+            for stage, v in zip(row, phase_speeds, strict=True)
         ]
-        for row, own in zip(taken, speeds, strict=True)
+        for row, phase_speeds in zip(taken, speeds, strict=True)
     ]
     return plans, of_punch, of_strip
 
@@ -174,9 +174,9 @@ def at_places(
     passed = [
         [
             replace(plan, strip=numbers.setdefault((place, plan.strip), len(numbers)))
-            for plan, place in zip(row, own, strict=True)
+            for plan, place in zip(row, phase_places, strict=True)
         ]
-        for row, own in zip(plans, places, strict=True)
+        for row, phase_places in zip(plans, places, strict=True)
     ]
     return passed, [(transfers[place], stage) for place, stage in numbers]
 

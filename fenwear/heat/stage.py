@@ -65,26 +65,26 @@ class PreparedStage:
     ) -> None:
         self.motions, self._ambient = motions, ambient
         self._split, n = len(motions[0].source), contacts[0].rows.shape[0]
-        self.given_back = np.repeat([one.given_back for one in motions], n)
+        self.given_back = np.repeat([motion.given_back for motion in motions], n)
         self._bare = np.eye(2 * n)  # temperature without q, above theta_a, from theta_c - theta_a
         self._terms_by_flux = ledger.by_flux.copy()
         self._rows, self._constants = [], []  # of theta_c - theta_a, and then of the terms
         ends = np.split(np.arange(len(ledger.by_end[0])), [self._split])
-        for k, (contact, one, own) in enumerate(zip(contacts, motions, ends, strict=True)):
-            nodes, end = np.arange(k * n, (k + 1) * n), ledger.by_end[:, own]
-            decay = np.diag(one.decay) if one.decay.ndim == 1 else one.decay
-            met, above = contact.of_changes(decay), contact(one.source) - ambient
-            returned = ledger.by_flux[:, nodes] * one.given_back  # q is what enters less what is given back
-            terms = ledger.by_start[:, own] + end @ decay - returned @ met
-            constant = end @ one.source - returned @ above + (ledger.constant if k == 0 else 0.0)
+        for k, (contact, propagation, columns) in enumerate(zip(contacts, motions, ends, strict=True)):
+            nodes, end = np.arange(k * n, (k + 1) * n), ledger.by_end[:, columns]
+            decay = np.diag(propagation.decay) if propagation.decay.ndim == 1 else propagation.decay
+            met, above = contact.of_changes(decay), contact(propagation.source) - ambient
+            returned = ledger.by_flux[:, nodes] * propagation.given_back  # q is what enters less what is given back
+            terms = ledger.by_start[:, columns] + end @ decay - returned @ met
+            constant = end @ propagation.source - returned @ above + (ledger.constant if k == 0 else 0.0)
             self._rows.append(np.vstack([met, terms]))
             self._constants.append(np.append(above, constant))
-            self._terms_by_flux[:, nodes] += end @ one.response
-            self._bare[np.ix_(nodes, nodes)] += one.given_back * contact.of_changes(one.response)
+            self._terms_by_flux[:, nodes] += end @ propagation.response
+            self._bare[np.ix_(nodes, nodes)] += propagation.given_back * contact.of_changes(propagation.response)
         self._decay = None
-        if all(one.decay.ndim == 1 for one in motions):
-            self._decay = np.concatenate([one.decay for one in motions])
-        self._source = np.concatenate([one.source for one in motions])
+        if all(motion.decay.ndim == 1 for motion in motions):
+            self._decay = np.concatenate([motion.decay for motion in motions])
+        self._source = np.concatenate([motion.source for motion in motions])
 
     def at(self, fluxes: Fluxes, crossing: Array) -> Stage:
         """Return the stage with these fluxes.
@@ -116,7 +116,7 @@ class PreparedStage:
         n = len(into) // 2
         if self._decay is None:
             parts = zip(self.motions, (values[: self._split], values[self._split :]), strict=True)
-            ends: Array = np.concatenate([one.free(part, sources=sources) for one, part in parts])
+            ends: Array = np.concatenate([field.free(part, sources=sources) for field, part in parts])
         else:
             ends = (self._decay * values.T).T
             if sources:
@@ -154,8 +154,8 @@ class Stage:
             heat: Of friction (n,), or (n, k), mW/mm².
             sources: Whether there is more than changes.
         """
-        found: Array = self.by_heat @ heat
-        return found + self.constant if sources else found
+        flux: Array = self.by_heat @ heat
+        return flux + self.constant if sources else flux
 
     def of(self, values: Array, entering: Array, *, sources: bool) -> tuple[Array, Array]:
         """Return the coordinates of both bodies at the end (dim,), and the heat terms and what crosses, or changes.
@@ -166,8 +166,8 @@ class Stage:
             sources: Whether there is more than changes.
         """
         met, terms = self.prepared.met(values, sources=sources)
-        found = self.by_contact @ met + entering
-        into, crossing = found[: len(met)], found[len(met) :]
+        exchanged = self.by_contact @ met + entering
+        into, crossing = exchanged[: len(met)], exchanged[len(met) :]
         terms += self.prepared.terms(into)
         return self.prepared.ends(values, into, sources=sources), np.concatenate([terms, crossing])
 
@@ -215,8 +215,8 @@ class PreparedStep:
         ]
         sources = [field.advance(kind, np.zeros(len(field.basis))) for field, kind in zip(fields, kinds, strict=True)]
         self._free, self._source = scipy.linalg.block_diag(*free), np.concatenate(sources)
-        self._bare = [contact.of_changes(one) for contact, one in zip(contacts, free, strict=True)]
-        self._bare_source = np.concatenate([contact(one) for contact, one in zip(contacts, sources, strict=True)])
+        self._bare = [contact.of_changes(response) for contact, response in zip(contacts, free, strict=True)]
+        self._bare_source = np.concatenate([contact(source) for contact, source in zip(contacts, sources, strict=True)])
         self._responses = [field.responses[kind] for field, kind in zip(fields, kinds, strict=True)]
         self._known: tuple[FluxFactor, Array, StepMap] | None = None
 

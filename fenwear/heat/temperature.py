@@ -123,13 +123,13 @@ class TrackBasis(ReducedBasis):
 
     def on_track(self, coordinates: Array, track: Array) -> Array:
         """Return coordinates with the heat on its way back: of a track with other modes its temperatures alone."""
-        found: Array = np.zeros((self.cells, self.modes + 1))
-        if track.shape == found.shape:
-            found[:] = track
+        of_track: Array = np.zeros((self.cells, self.modes + 1))
+        if track.shape == of_track.shape:
+            of_track[:] = track
         else:
-            found[:, -1] = track[:, -1].mean()
-        found[:, -1] -= self.reference
-        return np.append(coordinates[: self.columns.shape[1]], found)
+            of_track[:, -1] = track[:, -1].mean()
+        of_track[:, -1] -= self.reference
+        return np.append(coordinates[: self.columns.shape[1]], of_track)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +180,10 @@ class HeatState:
 
     def on(self, bases: tuple[Basis, ...]) -> HeatState:
         """Return the temperatures on other bases, or the nearest there are; collective, or while one leads."""
-        if all(one is other for one, other in zip(self.bases, bases, strict=True)):
+        if all(basis is other for basis, other in zip(self.bases, bases, strict=True)):
             return self
-        own = np.split(self.values, [len(self.bases[0])])
-        parts = [to.translated(old, part) for to, old, part in zip(bases, self.bases, own, strict=True)]
+        coordinates = np.split(self.values, [len(self.bases[0])])
+        parts = [to.translated(old, part) for to, old, part in zip(bases, self.bases, coordinates, strict=True)]
         track = self.track
         if isinstance(bases[1], TrackBasis) and track is not None:
             parts[1] = bases[1].on_track(parts[1], track)
@@ -357,7 +357,7 @@ class ReducedField:
             self._propagators.append(propagator)
             self._sources.append(source)
             self.responses.append(response)
-        self._decays = [np.diag(one).copy() for one in self._propagators] if modal else self._propagators
+        self._decays = [np.diag(propagator).copy() for propagator in self._propagators] if modal else self._propagators
 
     def _projected(self, step: HeatStep, inflow: csc_array) -> tuple[Array, Array, Array]:
         """Return the maps of a step from coordinates, from sources alone, and from unit fluxes; collective."""
@@ -380,12 +380,12 @@ class ReducedField:
         rights[:, dim], sums[dim] = test.T @ alone, free @ alone
         rights[:, dim + 1 :], sums[dim + 1 :] = (inflow.T @ test).T, inflow.T @ free.astype(float)
         rights, sums, matrix = self._sum(rights), self._sum(sums), self._sum(test.T @ ahead)
-        found: Array = scipy.linalg.solve(matrix, rights)
+        solution: Array = scipy.linalg.solve(matrix, rights)
         if self._one_way:
             row = self._sum(free @ ahead)
             way = scipy.linalg.solve(matrix, row)
-            found += np.outer(way / (row @ way), sums - row @ found)
-        return found[:, :dim], found[:, dim], found[:, dim + 1 :]
+            solution += np.outer(way / (row @ way), sums - row @ solution)
+        return solution[:, :dim], solution[:, dim], solution[:, dim + 1 :]
 
     def spectral_radius(self, cycle: Sequence[int]) -> float:
         """Return the factor by which some temperature changes in every cycle of these steps, the largest in size."""

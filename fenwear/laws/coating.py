@@ -41,7 +41,7 @@ class Shares:
 
     def at(self, interpolation: Array) -> Shares:
         """Return the shares at other nodes, by a matrix that interpolates there."""
-        return Shares(*(interpolation @ one for one in (self.coating, self.base, self.by_coating, self.by_base)))
+        return Shares(*(interpolation @ shares for shares in (self.coating, self.base, self.by_coating, self.by_base)))
 
 
 def shares(coating: Array, base: Array, left: Array) -> Shares:

@@ -146,10 +146,10 @@ class SharedClosure:
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa, nearly where the share depends on the pressure."""
         carried = self.law.pressure_of(nearness)
-        found = carried
+        pressure = carried
         for _ in range(ROUNDS):
-            found = carried / np.maximum(self.share(found, self.speed), LEAST)
-        return found
+            pressure = carried / np.maximum(self.share(pressure, self.speed), LEAST)
+        return pressure
 
 
 @dataclass(frozen=True)
@@ -180,8 +180,8 @@ class RoughClosure:
     def pressure_of(self, nearness: Array) -> Array:
         """Return the pressure by it (n,), MPa."""
         known = _asperities()
-        found = self.stiffness * (np.exp(known.logarithm(np.maximum(nearness, NONE))) - known.first)
-        return np.maximum(found, NONE)
+        pressure = self.stiffness * (np.exp(known.logarithm(np.maximum(nearness, NONE))) - known.first)
+        return np.maximum(pressure, NONE)
 
     def _integral(self, pressure: Array) -> Array:
         """Return F (...)."""
@@ -217,14 +217,14 @@ class CoatedClosure:
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
-        found = self.law.closure(pressure)
-        return sum((left * compressed(pressure, modulus) for left, modulus in self.coatings), found)
+        closure = self.law.closure(pressure)
+        return sum((left * compressed(pressure, modulus) for left, modulus in self.coatings), closure)
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa."""
-        found = self.law.slope(pressure)
+        slope = self.law.slope(pressure)
         parts = (left / modulus * (1 - compressed(pressure, modulus)) for left, modulus in self.coatings)
-        return sum(parts, found)
+        return sum(parts, slope)
 
 
 def compressed(pressure: Array, modulus: float) -> Array:

@@ -49,7 +49,7 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
         raise CaseError(InputError("heat.conductance", message))
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None
     modulus = common_modulus(case, regions, pair) if given is None else given
-    resistance = over_materials(case, regions, pair, lambda one: 0.5 / float(one.conductivity or np.nan))
+    resistance = over_materials(case, regions, pair, lambda material: 0.5 / float(material.conductivity or np.nan))
     share = 1 / (resistance * modulus)  # 2 k_1 k_2 / (k_1 + k_2) over E*
 
     def conductance(pressure: Array) -> Array:

@@ -132,10 +132,10 @@ class Debris:
         life, shape = self.life, conditions.shape
         if isinstance(life, Dependence):
             life = life.values(conditions.of("punch"), shape, life.scale("mm"), LIFE, LEAST)
-        found = 1 / life
+        loss = 1 / life
         if self.edge_life < np.inf and conditions.edge is not None:
-            found = found + np.exp(-conditions.edge / self.edge_length) / self.edge_life
-        return found if found.shape == shape else np.broadcast_to(found, shape)
+            loss = loss + np.exp(-conditions.edge / self.edge_length) / self.edge_life
+        return loss if loss.shape == shape else np.broadcast_to(loss, shape)
 
     def over(
         self, slid: Array, conditions: Sequence[ContactConditions] = (), onto: Sequence[csr_array] = ()
@@ -152,11 +152,11 @@ class Debris:
             return NO_CYCLE
         x: Array
         if isinstance(self.life, Dependence) or self.edge_life < np.inf:
-            x = slid * np.array([self.lost(one) for one in conditions])
+            x = slid * np.array([self.lost(phase_conditions) for phase_conditions in conditions])
         else:
             x = slid / self.life
         if onto:
-            x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
+            x = np.array([place @ row for place, row in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept
         kept = -np.expm1(-x) / x
         after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]

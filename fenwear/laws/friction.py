@@ -107,13 +107,13 @@ class Regions:
         here = np.maximum(pressure[self.mixed], FAINT * max(float(pressure.max()), 1e-300))
         sides = {name: near @ pressure for name, near in self.near.items()}
         mean = np.sum([self.shares[name][self.mixed] * side for name, side in sides.items()], axis=0)
-        whole, found = effect(here), {}
-        known = (mean > 0) & (whole > 0)
+        of_node, by_region = effect(here), {}
+        known = (mean > 0) & (of_node > 0)
         for name, side in sides.items():
             of_part = effect(here * np.divide(side, mean, out=np.ones_like(side), where=mean > 0))
-            found[name] = np.ones_like(pressure)
-            found[name][self.mixed] = np.divide(of_part, whole, out=np.ones_like(whole), where=known)
-        return found
+            by_region[name] = np.ones_like(pressure)
+            by_region[name][self.mixed] = np.divide(of_part, of_node, out=np.ones_like(of_node), where=known)
+        return by_region
 
 
 def regions_opposite(
@@ -128,7 +128,7 @@ def regions_opposite(
 def any_split(regions: tuple[Regions, Regions], wear: tuple[WearLaw, WearLaw]) -> bool:
     """Return whether nodes between regions share their pressure among unlike coefficients of wear."""
     both = zip(regions, wear, strict=True)
-    return any(own.split(law.given_coefficient) for own, law in both)
+    return any(body_regions.split(law.given_coefficient) for body_regions, law in both)
 
 
 def asperity_share(
@@ -148,18 +148,22 @@ def asperity_share(
     name, value = lubrication.key, lubrication.coefficient
     key = f"contact.lubrication.{name}"
     if not isinstance(value, Dependence):
-        found = np.full(shape, float(value))
+        values = np.full(shape, float(value))
     else:
         of_film = name == "film"
         factor, least = (value.scale("mm"), 1e-300) if of_film else (1.0, 0.0)
-        found = value.values(state, shape, factor, key, least, checked=checked)
+        values = value.values(state, shape, factor, key, least, checked=checked)
     if name == "film":
-        return np.asarray(np.interp(found / (lubrication.roughness or 1.0), *np.array(lubrication.share_over_lambda).T))
-    if checked and np.maximum.reduce(found) > 1:
-        at = int(found.argmax())
-        state_text = ", ".join(f"{one} = {np.broadcast_to(state[one], shape)[at]:g}" for one in ("p", "v", "T"))
-        raise CaseError(InputError(key, f"expected at most 1, got {found[at]:g} at {state_text}"))
-    return np.asarray(found)
+        return np.asarray(
+            np.interp(values / (lubrication.roughness or 1.0), *np.array(lubrication.share_over_lambda).T)
+        )
+    if checked and np.maximum.reduce(values) > 1:
+        at = int(values.argmax())
+        state_text = ", ".join(
+            f"{variable} = {np.broadcast_to(state[variable], shape)[at]:g}" for variable in ("p", "v", "T")
+        )
+        raise CaseError(InputError(key, f"expected at most 1, got {values[at]:g} at {state_text}"))
+    return np.asarray(values)
 
 
 # Temperature of friction, from those of the punch's and the strip's surface.
@@ -232,11 +236,11 @@ class ContactConditions:
 
     def _but(self, variables: tuple[Mapping[str, Array], Mapping[str, Array]], **changes: object) -> Self:
         """Return the conditions with other attributes, and with these variables, as punch and strip have them."""
-        found = object.__new__(type(self))
-        found.__dict__.update(self.__dict__)
-        found.__dict__.pop("derived", None)
-        found.__dict__.update(changes, _known={}, _changed=(self, *variables))
-        return found
+        conditions = object.__new__(type(self))
+        conditions.__dict__.update(self.__dict__)
+        conditions.__dict__.pop("derived", None)
+        conditions.__dict__.update(changes, _known={}, _changed=(self, *variables))
+        return conditions
 
     def of(self, body: Literal["punch", "strip", "friction"]) -> Mapping[str, Array]:
         """Return the variables of laws, of a body; or of the punch, with the temperature of friction."""
@@ -244,28 +248,28 @@ class ContactConditions:
             return known
         if self._changed is not None:
             before, of_punch, of_strip = self._changed
-            found = self._known[body] = {**before.of(body), **(of_strip if body == "strip" else of_punch)}
-            return found
-        own = 1 if body == "strip" else 0
-        x, y, z = self.places[own].T
+            variables = self._known[body] = {**before.of(body), **(of_strip if body == "strip" else of_punch)}
+            return variables
+        body_index = 1 if body == "strip" else 0
+        x, y, z = self.places[body_index].T
         none = np.zeros(self.shape)
-        found = self._known[body] = {
+        variables = self._known[body] = {
             "T": FRICTION_TEMPERATURES[self.friction_temperature if body == "friction" else body](*self.temperatures),
             "p": self.pressure,
             "v": np.asarray(self.speed),
             "x": x,
             "y": y,
             "z": z,
-            "depth": self.depths[own],
+            "depth": self.depths[body_index],
             "s": self.slid,
             "debris": none + self.debris,
             "edge": none if self.edge is None else self.edge,
-            "cs": none if self.cycle is None else self.cycle.ratio[own],
+            "cs": none if self.cycle is None else self.cycle.ratio[body_index],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
-            **self.regions[own].variables,
-            **self.states[own],
+            **self.regions[body_index].variables,
+            **self.states[body_index],
         }
-        return found
+        return variables
 
     @cached_property
     def _changed(self) -> tuple[ContactConditions, Mapping[str, Array], Mapping[str, Array]] | None:
@@ -338,10 +342,10 @@ class Friction:
         self, state: Mapping[str, Array], conditions: ContactConditions, share: Array | float, *, checked: bool = True
     ) -> Array:
         """Return mu at the nodes (n,) by the variables of laws, a share, and of conditions what coatings are left."""
-        found, lubrication = self.of_asperities(state, conditions, checked=checked), self.contact.lubrication
+        asperities, lubrication = self.of_asperities(state, conditions, checked=checked), self.contact.lubrication
         if lubrication is None:
-            return found
-        return np.asarray(lubrication.fluid_friction + share * (found - lubrication.fluid_friction))
+            return asperities
+        return np.asarray(lubrication.fluid_friction + share * (asperities - lubrication.fluid_friction))
 
     def values(self, conditions: ContactConditions) -> Array:
         """Return mu at the nodes (n,): of asperities and fluid by their shares of the load.
@@ -361,15 +365,15 @@ class Friction:
         """
         mu = self.contact.friction
         if isinstance(mu, Dependence):
-            found = mu.values(state, conditions.shape, 1.0, "contact.friction", checked=checked)
+            ratio = mu.values(state, conditions.shape, 1.0, "contact.friction", checked=checked)
         else:
-            found = np.full(conditions.shape, float(mu))
+            ratio = np.full(conditions.shape, float(mu))
         if self.of_coatings == (None, None):
-            return found
+            return ratio
         for of_coating, share in zip(reversed(self.of_coatings), reversed(conditions.covered), strict=True):
             if of_coating is not None:  # the punch's before the strip's, where both have one
-                found = found + share * (of_coating - found)
-        return found
+                ratio = ratio + share * (of_coating - ratio)
+        return ratio
 
     def ratio(self, direction: int, mu: Array, pair: ContactPair) -> Array:
         """Return tau, the traction of friction on the punch over the pressure, in space (n, 3).

@@ -66,7 +66,7 @@ class Memory:
         Raises:
             CaseError: an initial value is not finite somewhere.
         """
-        found = []
+        beginnings = []
         for states, surface in ((self.contact, pair.punch), (self.strip, pair.strip)):
             place = {axis: np.asarray(x) for axis, x in zip("xyz", in_space(surface.x).T, strict=True)}
             n = len(surface.x)
@@ -76,8 +76,8 @@ class Memory:
                 else np.full(n, float(state.initial))
                 for name, state in states.items()
             ]
-            found.append(np.array(rows).reshape(len(rows), n))
-        return Held(*found)
+            beginnings.append(np.array(rows).reshape(len(rows), n))
+        return Held(*beginnings)
 
     @cached_property
     def fills(self) -> Array:
@@ -134,8 +134,8 @@ class Memory:
 
     def by_name(self, held: Held) -> dict[str, Array]:
         """Return states by their names (n,), those of the strip's material by `NAME_strip` (n_strip,)."""
-        found = {name: np.asarray(row) for name, row in zip(self.contact, held.contact, strict=True)}
-        return found | {f"{name}_strip": np.asarray(row) for name, row in zip(self.strip, held.strip, strict=True)}
+        states = {name: np.asarray(row) for name, row in zip(self.contact, held.contact, strict=True)}
+        return states | {f"{name}_strip": np.asarray(row) for name, row in zip(self.strip, held.strip, strict=True)}
 
     def bounded(self, held: Held) -> Held:
         """Return states within their bounds."""
@@ -154,8 +154,8 @@ class Memory:
     def _bounds(self) -> tuple[Held, Held]:
         """The least and the most of all states (q, 1) and (q_s, 1)."""
         both = self.contact.values(), self.strip.values()
-        least = Held(*(np.array([one.least for one in own], dtype=float)[:, None] for own in both))
-        return least, Held(*(np.array([one.most for one in own], dtype=float)[:, None] for own in both))
+        least = Held(*(np.array([state.least for state in states], dtype=float)[:, None] for states in both))
+        return least, Held(*(np.array([state.most for state in states], dtype=float)[:, None] for states in both))
 
 
 FORGETFUL = Memory({}, {}, frozenset())  # of laws that remember nothing
@@ -182,8 +182,8 @@ class Held(Added):
     def small_against(self, other: Held, share: float) -> bool:
         """Return whether each row is at most this share of the largest of another's."""
         return all(
-            bool((np.abs(own).max(axis=1, initial=0) <= share * np.abs(all_).max(axis=1, initial=1e-300)).all())
-            for own, all_ in ((self.contact, other.contact), (self.strip, other.strip))
+            bool((np.abs(row).max(axis=1, initial=0) <= share * np.abs(all_).max(axis=1, initial=1e-300)).all())
+            for row, all_ in ((self.contact, other.contact), (self.strip, other.strip))
         )
 
 
@@ -255,7 +255,10 @@ class Evolution:
     def at(self, pressure: Array) -> Evolution:
         """Return the evolution at other pressures of the phases (m, n), MPa."""
         pairs = zip(self.conditions, pressure, strict=True)
-        return replace(self, conditions=[replace(one, pressure=np.asarray(own)) for one, own in pairs])
+        return replace(
+            self,
+            conditions=[replace(condition, pressure=np.asarray(phase_pressure)) for condition, phase_pressure in pairs],
+        )
 
     def some(self, phases: Sequence[int]) -> Evolution:
         """Return the evolution over some of the phases, by their places among these."""
@@ -401,7 +404,7 @@ class Evolution:
             "cs": none,
             "pm": none,
             WEAR: none,
-            **{axis: np.asarray(own) for axis, own in zip("xyz", x.T, strict=True)},
+            **{axis: np.asarray(coordinate) for axis, coordinate in zip("xyz", x.T, strict=True)},
             **dict.fromkeys(memory.contact, none),
         }
         rows = {name: row for row, name in enumerate(memory.strip)}
@@ -415,22 +418,22 @@ class Evolution:
         end = start + _increment(first, _phi(tau * slope), tau)
         for halving in range(1, HALVINGS + 1):
             parts = 2**halving
-            dt, now, rate, own = tau / parts, start, first, slope
-            growth = _phi(dt * own)
-            z, middle = dt * own, start
+            dt, now, rate, jacobian = tau / parts, start, first, slope
+            growth = _phi(dt * jacobian)
+            z, middle = dt * jacobian, start
             for part in range(parts):
                 if part:
                     rate = rates(now)
                     if parts > 2:  # else the same, which it is where r is linear
-                        own = rates.slope(now, rate, dt)
-                        growth = _phi(dt * own)
-                    z += dt * own
+                        jacobian = rates.slope(now, rate, dt)
+                        growth = _phi(dt * jacobian)
+                    z += dt * jacobian
                 now = now + _increment(rate, growth, dt)
                 if 2 * (part + 1) == parts:
                     middle = now
             missing, end = now - end, now
-            apart, whole, gone = _most(np.array([missing, end, end - start]))
-            if (apart <= AGREE * (whole + gone)).all():
+            apart, size, gone = _most(np.array([missing, end, end - start]))
+            if (apart <= AGREE * (size + gone)).all():
                 return middle, end + missing / 3, z
         raise ConvergenceError(f"{self._named()} change too fast within a half-cycle. Use smoother rates")
 
@@ -468,40 +471,42 @@ class _Rates:
         worn: Callable[[Array], Array] | None,
     ) -> _Rates:
         """Return rates whose states have these rows and whose variables, of each, are these at nodes."""
-        asked = [frozenset((*one.of, name)) for name, one in states]
+        asked = [frozenset((*state.of, name)) for name, state in states]
         moving = () if worn is None else (WEAR,)
         given = [
             {
                 name: now[name] if now[name].shape == shape else np.full(shape, now[name])
-                for name in own
+                for name in names
                 if name not in at and name not in moving
             }
-            for own, at, now in zip(asked, rows, variables, strict=True)
+            for names, at, now in zip(asked, rows, variables, strict=True)
         ]
-        own_rows = [{name: row for name, row in at.items() if name in own} for own, at in zip(asked, rows, strict=True)]
+        own_rows = [
+            {name: row for name, row in at.items() if name in names} for names, at in zip(asked, rows, strict=True)
+        ]
         return cls(states, given, own_rows, asked, worn)
 
     def known(self, values: Array) -> list[Mapping[str, Array]]:
         """Return the variables of each rate at states (Q, n)."""
         worn = {} if self.worn is None else {WEAR: self.worn(values)}
         pairs = zip(self.given, self.rows, strict=True)
-        return [{**own, **{name: values[row] for name, row in at.items()}, **worn} for own, at in pairs]
+        return [{**variables, **{name: values[row] for name, row in at.items()}, **worn} for variables, at in pairs]
 
     def __call__(self, values: Array) -> Array:
         """Return the rates (Q, n) at states (Q, n)."""
         shape = values.shape[1:]
         rows = [
-            evaluate_of_state(name, one.rate, asked, now, shape)
-            for (name, one), asked, now in zip(self.states, self.asked, self.known(values), strict=True)
+            evaluate_of_state(name, state.rate, asked, now, shape)
+            for (name, state), asked, now in zip(self.states, self.asked, self.known(values), strict=True)
         ]
         return rows[0][None] if len(rows) == 1 else np.array(rows).reshape(values.shape)
 
     def slope(self, values: Array, rate: Array, tau: float) -> Array:
         """Return J (n, Q, Q): as given, else by differences that are small against what states change by in a time."""
         q, n = values.shape
-        found = np.zeros((n, q, q))
+        jacobian = np.zeros((n, q, q))
         for j, (other, state) in enumerate(self.states):
-            asked = [i for i, (name, one) in enumerate(self.states) if _feels(name, one, other)]
+            asked = [i for i, (name, state) in enumerate(self.states) if _feels(name, state, other)]
             if not asked:
                 continue
             size = NUDGE * (np.abs(values[j]) + tau * np.abs(rate[j]))
@@ -515,12 +520,12 @@ class _Rates:
             moved[j] += size
             change = (self(moved) - rate) / (moved[j] - values[j])
             for i in asked:
-                found[:, i, j] = change[i]
+                jacobian[:, i, j] = change[i]
         if any(state.slope is not None for _, state in self.states):
             for i, ((name, state), now) in enumerate(zip(self.states, self.known(values), strict=True)):
                 if state.slope is not None:
-                    found[:, i, i] = evaluate_of_state(name, state.slope, {*state.of, name}, now, (n,))
-        return found
+                    jacobian[:, i, i] = evaluate_of_state(name, state.slope, {*state.of, name}, now, (n,))
+        return jacobian
 
 
 def _feels(name: str, state: State, other: str) -> bool:

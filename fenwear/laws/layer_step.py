@@ -69,10 +69,10 @@ class LayerEvolution:
             lies[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
         if self.layers.hardness < np.inf:
             changes[self.layers.row(PLASTIC)] = flowed
-        found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
+        depths = WornDepths(worn.punch, worn.strip, changes, carried=carried)
         if self.evolution is None or not self.layers.memory.names:
-            return found
-        return self.layers.with_held(found, self._evolved(pressure, before, cycles))
+            return depths
+        return self.layers.with_held(depths, self._evolved(pressure, before, cycles))
 
     def _evolved(self, pressure: Array, before: WornDepths, cycles: float | None) -> Held:
         """Return by how much the states of laws change, as `worn`."""
@@ -96,7 +96,7 @@ class LayerEvolution:
 
         At the contact's nodes (n,) each, or at those of a strip that carries it (n_strip,).
         """
-        taken = self._where_it_lies(self.wear.begun(before, cycles).taken(pressure))
+        taken = self._at_debris(self.wear.begun(before, cycles).taken(pressure))
         thickness = self.layers.lies(before)
         if cycles is None:
             return self.debris.change(thickness, taken)
@@ -104,18 +104,18 @@ class LayerEvolution:
 
     def resting(self, pressure: Array) -> Array:
         """Return the thickness of the debris that such cycles leave in the end (n,), mm."""
-        lies = self.resting_where_it_lies(pressure)
+        lies = self.resting_at_debris(pressure)
         return np.asarray(self.wear.pairs[0].wear_interpolation @ lies) if self.layers.strip_carries else lies
 
-    def resting_where_it_lies(self, pressure: Array) -> Array:
+    def resting_at_debris(self, pressure: Array) -> Array:
         """Return the thickness at rest where debris lies: at contact nodes, or on a strip that carries it."""
-        fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
+        fed = (self.debris.fed * self._at_debris(self.wear.taken(pressure))).sum(axis=0)
         return np.asarray(fed / self.debris.loss)
 
-    def _where_it_lies(self, depths: Array) -> Array:
+    def _at_debris(self, depths: Array) -> Array:
         """Return depths of the phases at the contact's nodes (m, n) where debris lies: there, or on the strip."""
         places = self.layers.places(self.wear.pairs)
-        return np.array([onto @ own for onto, own in zip(places, depths, strict=True)]) if places else depths
+        return np.array([onto @ depth for onto, depth in zip(places, depths, strict=True)]) if places else depths
 
     def step(
         self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
@@ -168,15 +168,15 @@ class LayerStep:
             closed = closed + self._coatings(pressure).closure(pressure)
         if not self.implicit:
             return closed
-        found = self._length * self._worn.opening(pressure)
+        opened = self._length * self._worn.opening(pressure)
         if passing.layers.debris.present:
             added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
             if passing.layers.strip_carries:
                 added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
-            found = found - added
+            opened = opened - added
         if self._fills:
-            found = found - self._length * passing.filled(pressure, self.before, self.cycles)
-        return found + closed
+            opened = opened - self._length * passing.filled(pressure, self.before, self.cycles)
+        return opened + closed
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
@@ -184,12 +184,12 @@ class LayerStep:
             return np.zeros_like(pressure)
         if self.passing.layers.strip_carries:
             return None
-        found = self._worn.local(pressure)
-        if found is None:
+        by_wear = self._worn.local(pressure)
+        if by_wear is None:
             return None
         softens = self.passing.layers.softens
         share = self._felt(pressure)[0].mean(axis=0) if softens else 1.0  # of all phases: a step to the solution
-        return self._length * share * found - self._covered(pressure)
+        return self._length * share * by_wear - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of the openings L_k R_j by pressures in all phases."""
@@ -209,10 +209,10 @@ class LayerStep:
         """Return L of `border`, reduced by the compression of coatings."""
         (punch, strip), n = self._felt(pressure), pressure.shape[1]
         first = n if self._worn.punch.wears else 0
-        found = left.copy()
-        found[:, :, :first] *= punch[:, :, None]
-        found[:, :, first:] *= strip[:, :, None]
-        return found
+        reduced = left.copy()
+        reduced[:, :, :first] *= punch[:, :, None]
+        reduced[:, :, first:] *= strip[:, :, None]
+        return reduced
 
     def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
         """Return both with the debris that the strip carries, as its wear."""
@@ -230,7 +230,7 @@ class LayerStep:
         if self.passing.layers.softens:
             felt = [share.mean(axis=0) for share in self._felt(pressure)]
         both = zip(self._worn.by_body(pressure), felt, strict=True)
-        punch, strip = (None if own is None else self._length * own * share for own, share in both)
+        punch, strip = (None if compliance is None else self._length * compliance * share for compliance, share in both)
         if self.passing.layers.strip_carries:
             return punch, self._carried_below(pressure, strip)
         if not self.passing.layers.lies_here:
@@ -258,8 +258,8 @@ class LayerStep:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
         if not self.curved:
             return None
-        found = self.passing.layers.slope(pressure, capped=self.capped)
-        return found + self._coatings(pressure).slope(pressure) if self.passing.layers.softens else found
+        slope = self.passing.layers.slope(pressure, capped=self.capped)
+        return slope + self._coatings(pressure).slope(pressure) if self.passing.layers.softens else slope
 
     def _depths(self, pressure: Array) -> tuple[Array, Array]:
         """Return the depths of punch and strip for the compliance of coatings: those at the step's end."""
@@ -281,25 +281,25 @@ class LayerStep:
         layers = self.passing.layers
         left = layers.coatings_left(self.passing.wear.pairs, *self._depths(pressure))
         punch, strip = (
-            np.where(own > 0, 1 - compressed(pressure, soft.modulus), 1.0)
-            for own, soft in zip(left, layers.soft, strict=True)
+            np.where(thickness > 0, 1 - compressed(pressure, soft.modulus), 1.0)
+            for thickness, soft in zip(left, layers.soft, strict=True)
         )
         return punch, strip
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
-        passing, found = self.passing, np.zeros_like(pressure)
+        passing, covered = self.passing, np.zeros_like(pressure)
         if passing.layers.lies_here:
-            found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
+            covered = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
         if not self._fills:
-            return found
+            return covered
         filled = passing.filled(pressure, self.before, self.cycles)
         size = NUDGE * max(float(np.abs(pressure).max()), 1e-300)
         for k in range(len(pressure)):
-            more = pressure.copy()
-            more[k] += size
-            found[k, :] += self._length * (passing.filled(more, self.before, self.cycles) - filled) / size
-        return found
+            increased = pressure.copy()
+            increased[k] += size
+            covered[k, :] += self._length * (passing.filled(increased, self.before, self.cycles) - filled) / size
+        return covered
 
     @property
     def _fills(self) -> bool:

@@ -153,7 +153,9 @@ class Layers:
     def coatings_closure(self, pairs: Sequence[ContactPair], punch: Array, strip: Array) -> CoatedClosure:
         """Return the compliant coatings in each phase (m, n) at depths; arguments as of `coatings_left`."""
         left = self.coatings_left(pairs, punch, strip)
-        return CoatedClosure(RIGID, tuple((own, soft.modulus) for own, soft in zip(left, self.soft, strict=True)))
+        return CoatedClosure(
+            RIGID, tuple((thickness, soft.modulus) for thickness, soft in zip(left, self.soft, strict=True))
+        )
 
     def closure_at(self, pair: ContactPair, worn: WornDepths) -> Closure | None:
         """Return the law of closure of all layers where these depths are worn, at one place."""
@@ -168,8 +170,8 @@ class Layers:
         carried = np.zeros((len(DEBRIS), strip)) if self.strip_carries else NOTHING
         if self.debris.present:
             (carried if self.strip_carries else state)[0] = self.debris.initial
-        found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state, carried=carried)
-        return self.with_held(found, self.begun)
+        depths = WornDepths(np.zeros(self.nodes), np.zeros(strip), state, carried=carried)
+        return self.with_held(depths, self.begun)
 
     def held(self, worn: WornDepths) -> Held:
         """Return the states of laws at these depths, or at the start where none are given."""
@@ -250,32 +252,32 @@ class Layers:
 
     def opening(self, pair: ContactPair, worn: WornDepths) -> Array | float:
         """Return the gap that the layers open at one place (n,), mm."""
-        found = self.opened(worn.between)
+        gap = self.opened(worn.between)
         if self.strip_carries and len(worn.carried):
-            found = found - pair.wear_interpolation @ worn.carried[0]
-        return found
+            gap = gap - pair.wear_interpolation @ worn.carried[0]
+        return gap
 
     def opened(self, state: Array) -> Array | float:
         """Return the gap that a state at the contact's nodes opens (n,), mm."""
         if not len(state):
             return 0.0
-        found = -state[0] if self.lies_here else np.zeros(self.nodes)
+        gap = -state[0] if self.lies_here else np.zeros(self.nodes)
         if self.memory.filling:
-            found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
-        return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
+            gap = gap - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
+        return gap + state[self.row(PLASTIC)] if self.hardness < np.inf else gap
 
     def closing(self, pressure: Array, *, capped: bool = False) -> Array:
         """Return the closure by pressures (m, n) in a step of layers that are not linear, mm.
 
         Where pressures are `capped` at the hardness what flows is left out.
         """
-        found = self.gives.closure(pressure)
-        return found if capped or self.hardness == np.inf else found + self.flow(pressure)
+        closure = self.gives.closure(pressure)
+        return closure if capped or self.hardness == np.inf else closure + self.flow(pressure)
 
     def slope(self, pressure: Array, *, capped: bool = False) -> Array:
         """Return the derivative of `closing` (m, n), mm/MPa."""
-        found = self.gives.slope(pressure)
-        return found if capped else found + np.where(pressure > self.hardness, self.softness, 0.0)
+        derivative = self.gives.slope(pressure)
+        return derivative if capped else derivative + np.where(pressure > self.hardness, self.softness, 0.0)
 
     def flowed(self, pressure: Array, gap: Array) -> Array:
         """Return the plastic flow (n,), mm, of surfaces whose pressures were capped at the hardness."""
@@ -296,14 +298,14 @@ class Layers:
             ConvergenceError: phases continue to flow in turn.
         """
         flowed = np.zeros(self.nodes)
-        found = solve(flowed)
+        solution = solve(flowed)
         for _ in range(MOST_FLOWS):
-            pressure = pressure_of(found)
+            pressure = pressure_of(solution)
             if pressure.max() <= (1 + CAPPED) * self.hardness:  # which may be infinite
-                return found, flowed
+                return solution, flowed
             flowed = flowed + self.flow(pressure).max(axis=0)
-            found = solve(flowed)
-        beyond = float(pressure_of(found).max()) / self.hardness - 1
+            solution = solve(flowed)
+        beyond = float(pressure_of(solution).max()) / self.hardness - 1
         raise ConvergenceError(
             f"Plastic flow did not converge: after {MOST_FLOWS} iterations the largest pressure exceeds "
             f"contact.hardness by {100 * beyond:.2g} %. Increase contact.hardness"
@@ -315,14 +317,14 @@ class Layers:
 
     def settled(self, worn: WornDepths) -> WornDepths:
         """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
-        found = self.bounded(worn)
-        rows = found.carried if self.strip_carries else found.between
+        depths = self.bounded(worn)
+        rows = depths.carried if self.strip_carries else depths.between
         if not self.debris.present or not len(rows) or rows[0].min(initial=0.0) >= 0:
-            return found
+            return depths
         rows = rows.copy()
         rows[1] += np.minimum(rows[0], 0.0)
         rows[0] = np.maximum(rows[0], 0.0)
-        return self.with_debris(found, rows)
+        return self.with_debris(depths, rows)
 
 
 def row_of_state(name: str) -> str:
@@ -397,12 +399,17 @@ def memory_of(friction: object, wear: Sequence[WearLaw], temperature: float) -> 
     """
     given = [law.given_coefficient for law in wear]
     punch, strip, both = (
-        dict(one.states) if isinstance(one, Dependence) else {} for one in (given[0], given[1], friction)
+        dict(coefficient.states) if isinstance(coefficient, Dependence) else {}
+        for coefficient in (given[0], given[1], friction)
     )
-    own = {name: state for name, state in strip.items() if not state.fills}
+    on_strip = {name: state for name, state in strip.items() if not state.fills}
     filling = {name: state for name, state in strip.items() if state.fills}
-    contact = {**punch, **filling, **{name: state for name, state in both.items() if name not in own or name in punch}}
-    return Memory(contact, own, frozenset(punch), temperature)
+    contact = {
+        **punch,
+        **filling,
+        **{name: state for name, state in both.items() if name not in on_strip or name in punch},
+    }
+    return Memory(contact, on_strip, frozenset(punch), temperature)
 
 
 def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[str, Array], n: int) -> list[Array]:
@@ -416,8 +423,8 @@ def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> 
     Raises:
         CaseError: it depends on a speed or temperature that changes, which a layer does not follow.
     """
-    asked = [one for one in ("v", "T") if depends_on(lubrication.coefficient, one)]
-    changing = [one for one in asked if one not in known]
+    asked = [variable for variable in ("v", "T") if depends_on(lubrication.coefficient, variable)]
+    changing = [variable for variable in asked if variable not in known]
     if changing:
         message = (
             f"contact.lubrication.{lubrication.key} depends on {changing[0]}, which changes during the cycle. A layer "
@@ -444,19 +451,19 @@ def common_modulus(case: Case, regions: Regions, pair: ContactPair) -> float | A
         regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
         pair: The surfaces opposite each other.
     """
-    return 1 / over_materials(case, regions, pair, lambda one: (1 - one.poisson**2) / float(one.young))
+    return 1 / over_materials(case, regions, pair, lambda material: (1 - material.poisson**2) / float(material.young))
 
 
 def over_materials(
     case: Case, regions: Regions, pair: ContactPair, value: Callable[[Material], float]
 ) -> float | Array:
     """Return the sum over both bodies of a value of their materials; at the nodes (n,) where a body has several."""
-    materials, found, onto = case.initial_materials, 0.0, (None, pair.wear_interpolation)
+    materials, total, onto = case.initial_materials, 0.0, (None, pair.wear_interpolation)
     for shares, body, reads in zip(regions, (case.punch, case.strip), onto, strict=True):
-        own = body.materials_at(shares)
-        if len(own) == 1:
-            found = found + value(materials[own.pop()])
+        body_materials = body.materials_at(shares)
+        if len(body_materials) == 1:
+            total = total + value(materials[body_materials.pop()])
             continue
         at = np.sum([share * value(materials[body.regions[name]]) for name, share in shares.items()], axis=0)
-        found = found + (at if reads is None else reads @ at)
-    return found
+        total = total + (at if reads is None else reads @ at)
+    return total

@@ -171,13 +171,13 @@ class LocalLaws:
         Raises:
             CaseError: a coefficient is negative or not finite there.
         """
-        found, own = [], eye_array(len(conditions.pressure))
-        onto = own, pair.wear_projection
+        coatings, identity = [], eye_array(len(conditions.pressure))
+        onto = identity, pair.wear_projection
         for thickness, laws, put in zip(self.coatings, self.wear_at(conditions).layers, onto, strict=True):
             coating, base = (put @ law.rate for law in laws)
             ratio = np.divide(base, coating, out=np.ones_like(thickness), where=coating > 0)
-            found.append(CoatedBody(thickness, ratio))
-        return found[0], found[1]
+            coatings.append(CoatedBody(thickness, ratio))
+        return coatings[0], coatings[1]
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Wear:
         """
         chosen = list(range(len(self.pairs)) if which is None else which)
         punch, strip = (slid[chosen] for slid in self.sliding)
-        wears = [self.laws.wear_at(one) for one in conditions]
+        wears = [self.laws.wear_at(condition) for condition in conditions]
         return phases_wear(wears, (punch, strip), [self.pairs[k] for k in chosen], self.laws.coatings)
 
 
@@ -226,14 +226,16 @@ def phases_wear(
         pairs: The surfaces in each.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm.
     """
-    found: list[BodyWear] = []
+    body_wears: list[BodyWear] = []
     by_body = zip(*(wear.layers for wear in wears), strict=True)
-    for laws, own, thickness, surfaces in zip(by_body, slid, coatings, ((), pairs), strict=True):
+    for laws, distance, thickness, surfaces in zip(by_body, slid, coatings, ((), pairs), strict=True):
         coating, base = (
-            BodyWear(np.array([law.rate for law in one]) * own, one[0].law, surfaces, one[0].wears)
-            for one in zip(*laws, strict=True)
+            BodyWear(
+                np.array([law.rate for law in phase_laws]) * distance, phase_laws[0].law, surfaces, phase_laws[0].wears
+            )
+            for phase_laws in zip(*laws, strict=True)
         )
         if thickness.any():
             base = CoatedWear(base.rate, base.law, surfaces, coating=coating, thickness=thickness)
-        found.append(base)
-    return PhasesWear(found[0], found[1], pairs)
+        body_wears.append(base)
+    return PhasesWear(body_wears[0], body_wears[1], pairs)

@@ -112,11 +112,13 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
         tips = [k for k in punch[1:] if not balanced([*punch[:1], k])] or punch[1:]
     how = " and to ".join(motion_words(rigid.mode_names[k]) for k in tips)
     parts = ", ".join("_".join(rigid.mode_names[k].split("_")[2:]) for k in lifted)
-    what = f"the punch tips over, free to {how}" if tips else "the punch lifts off" + (f" ({parts})" if parts else "")
+    failure = (
+        f"the punch tips over, free to {how}" if tips else "the punch lifts off" + (f" ({parts})" if parts else "")
+    )
     raise CaseError(
         InputError(
             key,
-            f"{beginning}{what}. Press it between the contact's edges, friction included"
+            f"{beginning}{failure}. Press it between the contact's edges, friction included"
             + (", or add supports against tilting (or no_turning_about)" if tips else ""),
         )
     )
@@ -274,8 +276,8 @@ def _newton(
 
 def _pressure(law: WearRates, rate: Array, ramp: float) -> Array:
     """Return the pressures (n,) of wear rates (n,), which rise to the threshold over a ramp, 0 below."""
-    found = law.pressure(np.maximum(rate, 0.0))
-    return found - law.threshold * (1 - np.clip(rate / ramp, 0.0, 1.0))
+    pressure = law.pressure(np.maximum(rate, 0.0))
+    return pressure - law.threshold * (1 - np.clip(rate / ramp, 0.0, 1.0))
 
 
 def _slope(law: WearRates, rate: Array, ramp: float) -> Array:
@@ -287,8 +289,8 @@ def _slope(law: WearRates, rate: Array, ramp: float) -> Array:
 
 def _balanced_below(rows: Array, resultant: Array, pressure: float) -> bool:
     """Return whether pressures of no more than this one balance the loads."""
-    found = scipy.optimize.linprog(np.zeros(rows.shape[1]), A_eq=rows, b_eq=-resultant, bounds=(0, pressure))
-    return bool(found.status == 0)
+    solution = scipy.optimize.linprog(np.zeros(rows.shape[1]), A_eq=rows, b_eq=-resultant, bounds=(0, pressure))
+    return bool(solution.status == 0)
 
 
 def optimum_on_track(
@@ -321,10 +323,10 @@ def optimum_on_track(
         before, felt = pressure, law.value(pressure)
         worn = punch.at(pressure) + recession(pressure)
         rate = np.divide(worn, felt, out=rate.copy(), where=felt > 0)
-        found = optimum(rigid, friction_ratio, WearRates((rate,), (law,)), zone)
-        pressure = found.pressure
+        optimal = optimum(rigid, friction_ratio, WearRates((rate,), (law,)), zone)
+        pressure = optimal.pressure
         if np.abs(pressure - before).max() <= AT_REST * pressure.max():
-            return found
+            return optimal
     raise ConvergenceError("the optimum on a closed track did not converge: the strip wears much more than the punch")
 
 

@@ -47,12 +47,12 @@ class SlidingTensor:
     @property
     def ratio(self) -> Array:
         """The cross-shear ratio (n,) in [0, 1/2]; 0 where nothing slides."""
-        whole = self.work
+        work = self.work
         squares = np.einsum("iab,iab->i", self.values, self.values)
         # l_1 - l_2 of a tensor with nothing across the surface.
-        apart = np.sqrt(np.maximum(2 * squares - whole**2, 0.0))
-        slides = whole > 0
-        return np.where(slides, np.clip(0.5 * (1 - apart / np.where(slides, whole, 1.0)), 0.0, 0.5), 0.0)
+        apart = np.sqrt(np.maximum(2 * squares - work**2, 0.0))
+        slides = work > 0
+        return np.where(slides, np.clip(0.5 * (1 - apart / np.where(slides, work, 1.0)), 0.0, 0.5), 0.0)
 
     @property
     def direction(self) -> Array:
@@ -140,9 +140,9 @@ class SlidingWays:
     def _known(self, pressure: Array) -> CycleShear | None:
         if not self.asked:
             return None
-        found, ways, slid = self.tensor(pressure), self.tensor(), self.lengths.sum(axis=0)
-        ratio = np.where(found.work > 0, found.ratio, ways.ratio)
-        mean = np.where(slid > 0, found.work / np.where(slid > 0, slid, 1.0), pressure.mean(axis=0))
+        tensor, ways, slid = self.tensor(pressure), self.tensor(), self.lengths.sum(axis=0)
+        ratio = np.where(tensor.work > 0, tensor.ratio, ways.ratio)
+        mean = np.where(slid > 0, tensor.work / np.where(slid > 0, slid, 1.0), pressure.mean(axis=0))
         return CycleShear((ratio, self._of_strip(pressure)), mean)
 
     def _of_strip(self, pressure: Array | None) -> Array:

@@ -107,7 +107,7 @@ class BodyWear:
 
     def _put(self, depths: Array) -> list[Array]:
         """Return depths at the interface nodes (m, n) at the body's own ones, of each phase."""
-        return [pair.wear_projection @ own for pair, own in zip(self.pairs, depths, strict=True)]
+        return [pair.wear_projection @ depth for pair, depth in zip(self.pairs, depths, strict=True)]
 
 
 OF_BASE = Shares(*map(np.asarray, (0.0, 1.0, 0.0, 1.0)))
@@ -154,10 +154,10 @@ class CoatedWear(BodyWear):
     def at(self, pressure: Array) -> BodyWear:
         """Return the wear at pressures (m, n)."""
         both = (self.coating.depth(pressure), super().depth(pressure))
-        coating, base = (np.sum(self._put(own) if self.pairs else own, axis=0) for own in both)
-        found = shares(self.cycles * coating, self.cycles * base, self.left)
-        here = found.at(self.pairs[0].wear_interpolation) if self.pairs else found
-        return replace(self, shares=found, here=here)
+        coating, base = (np.sum(self._put(depths) if self.pairs else depths, axis=0) for depths in both)
+        phase_shares = shares(self.cycles * coating, self.cycles * base, self.left)
+        here = phase_shares.at(self.pairs[0].wear_interpolation) if self.pairs else phase_shares
+        return replace(self, shares=phase_shares, here=here)
 
     def depth(self, pressure: Array) -> Array:
         """Return the depths at the interface nodes (m, n), mm."""
@@ -171,11 +171,11 @@ class CoatedWear(BodyWear):
     def on_material(self, pressure: Array) -> list[Array]:
         """Return the depths at the body's own nodes, of each phase (n_own,), mm."""
         both = zip(self._put(self.coating.depth(pressure)), self._put(super().depth(pressure)), strict=True)
-        return [self.shares.of(*own) for own in both]
+        return [self.shares.of(*depths) for depths in both]
 
     def slopes_on_material(self, pressure: Array) -> list[csr_array]:
         """Return the derivatives of these depths to the pressures of each phase (n_own, n), mm/MPa."""
-        by_coating, by_base = (diags_array(one) for one in (self.shares.by_coating, self.shares.by_base))
+        by_coating, by_base = (diags_array(share) for share in (self.shares.by_coating, self.shares.by_base))
         both = zip(self.pairs, self.coating.slope(pressure), super().slope(pressure), strict=True)
         return [
             csr_array(by_coating @ pair.wear_projection @ diags_array(coating))
@@ -268,7 +268,7 @@ class PhasesWear:
             nodes = np.arange(n)
             right[:, nodes, nodes] = self.punch.at(pressure).slope(pressure)
         if self.strip.wears:
-            right[:, strip:] = [one.toarray() for one in self.strip.at(pressure).slopes_on_material(pressure)]
+            right[:, strip:] = [slope.toarray() for slope in self.strip.at(pressure).slopes_on_material(pressure)]
         return self._left, right
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
@@ -284,12 +284,12 @@ class PhasesWear:
 
     def slopes(self, pressure: Array) -> list[csr_array]:
         """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
-        found = [csr_array(diags_array(slope)) for slope in self.punch.at(pressure).slope(pressure)]
+        opened = [csr_array(diags_array(slope)) for slope in self.punch.at(pressure).slope(pressure)]
         if self.strip.wears:
             material = self.pairs[0].wear_interpolation
             below = self.strip.at(pressure).slopes_on_material(pressure)
-            found = [csr_array(one + material @ slope) for one, slope in zip(found, below, strict=True)]
-        return found
+            opened = [csr_array(above + material @ slope) for above, slope in zip(opened, below, strict=True)]
+        return opened
 
     @cached_property
     def _left(self) -> Array:
@@ -304,9 +304,12 @@ class PhasesWear:
 
 def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
     """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
-    laws = [one for law in wear for one in (law, law.of_coating) if one is not None]
+    laws = [layer_law for law in wear for layer_law in (law, law.of_coating) if layer_law is not None]
     of_friction = any(law.energy is not None for law in laws)
-    dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
+    dependent = any(
+        isinstance(coefficient, Dependence) and coefficient.varies
+        for coefficient in (law.given_coefficient for law in laws)
+    )
     dependent = dependent or any(map(friction.contact.splits_pressure, laws))
     return not dependent and not friction.mixed and (friction.constant or not of_friction)
 
@@ -321,16 +324,16 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
     Raises:
         CaseError: it is negative or not finite; `key` is the law's key.
     """
-    found = _of_asperities(law, friction, conditions, key)
+    beta = _of_asperities(law, friction, conditions, key)
     if friction.contact.lubrication is not None:
         share = friction.share(conditions)
         if friction.contact.splits_pressure(law):
             part = PressureLaw.of(law).value(share * conditions.pressure)
-            whole = PressureLaw.of(law, None).value(conditions.pressure)
-            found = found * np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0)
+            of_node = PressureLaw.of(law, None).value(conditions.pressure)
+            beta = beta * np.divide(part, of_node, out=np.zeros_like(of_node), where=of_node > 0)
         else:
-            found = found * (share if law.pressure_exponent == 1 else share**law.pressure_exponent)
-    return found if isinstance(found, np.ndarray) else np.full(conditions.shape, found)
+            beta = beta * (share if law.pressure_exponent == 1 else share**law.pressure_exponent)
+    return beta if isinstance(beta, np.ndarray) else np.full(conditions.shape, beta)
 
 
 def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array | float:

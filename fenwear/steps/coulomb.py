@@ -52,8 +52,8 @@ from fenwear.system import (
     joined,
     node_maps,
     on_nodes,
+    on_sufficient_grid,
     place_at_rest,
-    with_what_grows,
 )
 from fenwear.system.tribosystem import Condensed
 
@@ -192,7 +192,7 @@ class Coulomb:
                 "no unique final shape exists with a pressure_threshold: the pressure below it that slipping nodes "
                 "keep depends on the run before. Follow the wear by `run`"
             )
-        system, found = with_what_grows(
+        system, found = on_sufficient_grid(
             system,
             lambda own: final_shape(own.law_state.problem),
             lambda found: np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)),
@@ -290,7 +290,7 @@ class _Run:
 
     def temperature(self, state: RunState) -> Array:
         """Return the temperatures of a state on this system's bases (dim,)."""
-        return self.system.exchange.own(state.temperature).values
+        return self.system.exchange.on_bases(state.temperature).values
 
     def at(self, state: RunState, load: float) -> PartialSlipState:
         """Return the state of the time steps in a run, with the run's depths, temperatures and load."""
@@ -460,7 +460,7 @@ class Jumps(_Run):
         if not exchange.conducts:
             return cycle
         (after,) = memory.warm
-        end = replace(cycle.end, temperature=exchange.own(after).values)
+        end = replace(cycle.end, temperature=exchange.on_bases(after).values)
         return replace(cycle, end=end, warm=self.temperature(state))
 
     def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: float) -> Totals:

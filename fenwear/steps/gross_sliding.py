@@ -42,12 +42,12 @@ from fenwear.system import (
     joined,
     make_sliding,
     on_first_contact,
+    on_sufficient_grid,
     place_case_bodies,
     preparation,
     property_change,
     with_exchange,
     with_reduced_heat,
-    with_what_grows,
 )
 from fenwear.system.contact_laws import GROSS
 from fenwear.system.tribosystem import answers_for, condense_bodies
@@ -333,7 +333,7 @@ class GrossSliding:
     def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
         find = partial(steady_state, properties_within=properties_within)
-        return with_what_grows(system, find, lambda found: np.asarray((found.phase_pressure > 0).any(axis=0)))[1]
+        return on_sufficient_grid(system, find, lambda found: np.asarray((found.phase_pressure > 0).any(axis=0)))[1]
 
     def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:  # noqa: ARG002
         """Return the memory of the steps, which does not depend on the grid."""

@@ -170,7 +170,7 @@ class Stepper(JumpLaw[JumpMoment]):
     def _heat_difference(self, made: Attempt[JumpMoment]) -> float:
         """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
         exchange = self.system.exchange
-        states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.own(None))
+        states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.on_bases(None))
         first, second, initial = (np.array(exchange.contact_temperatures(state)) for state in states)
         weights = self.system.pair.weights
         apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
@@ -213,7 +213,7 @@ class Stepper(JumpLaw[JumpMoment]):
 
     def moment(self, state: RunState) -> JumpMoment:
         """Return the moment of a state of a run."""
-        temperature = self.coupled.heat.exchange.own(state.temperature).values
+        temperature = self.coupled.heat.exchange.on_bases(state.temperature).values
         return JumpMoment(state.worn, all_phases(state.contacts), 0.0, temperature, state.totals)
 
     def _temperature(self, values: Array) -> HeatState | None:

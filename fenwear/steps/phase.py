@@ -377,7 +377,7 @@ class PhaseStep:
         if before.solved:
             start = before if self._onwards is None else self._onwards.start(before)
         pressure = self._even if start is None else start.pressure[0]
-        at = _Begin(self.system.exchange.own(temperature), worn, before, start, pressure, half_cycles, cycle)
+        at = _Begin(self.system.exchange.on_bases(temperature), worn, before, start, pressure, half_cycles, cycle)
         if self._at_begin is None:
             return self._end_of(at)
         # Surfaces flow as soon as they are pressed, before anything wears.

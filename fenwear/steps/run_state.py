@@ -261,7 +261,7 @@ def beginning(system: Tribosystem, temperature: HeatState | None = None) -> RunS
 def on_exchange(state: RunState, exchange: HeatExchange) -> RunState:
     """Return the state with its temperatures on the bases of an exchange; collective."""
     finer = None if state.finer is None else on_exchange(state.finer, exchange)
-    return replace(state, temperature=exchange.own(state.temperature) if exchange.conducts else None, finer=finer)
+    return replace(state, temperature=exchange.on_bases(state.temperature) if exchange.conducts else None, finer=finer)
 
 
 def carried_by(state: RunState) -> Mask:

@@ -271,7 +271,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
         pairs = zip(conditions, system.pairs, strict=True)
         now = [replace(one, debris=layers.facing(pair, lying)) for one, pair in pairs]
         passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
-        thickness = passing.resting_where_it_lies(pressure)
+        thickness = passing.resting_at_debris(pressure)
         if not layers.varies and not system.asks("debris"):
             break
         if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):

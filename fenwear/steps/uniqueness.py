@@ -72,7 +72,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
 def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: HeatState | None) -> Array:
     """Return the largest d(mu p)/dp of each node from no pressure to the largest one (n,)."""
     exchange, friction = system.exchange, system.friction
-    surfaces = exchange.contact_temperatures(exchange.own(state), phase - 1)
+    surfaces = exchange.contact_temperatures(exchange.on_bases(state), phase - 1)
     conditions = system.conditions(phase, pressure, surfaces)
     if not friction.asks("p", "pm"):
         return friction.values(conditions)

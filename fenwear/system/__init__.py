@@ -23,12 +23,12 @@ from fenwear.system.growing_grids import (
     node_maps,
     on_first_contact,
     on_nodes,
+    on_sufficient_grid,
     outgrown,
     placed_on,
     regridded,
     relaid,
     with_room,
-    with_what_grows,
 )
 from fenwear.system.memory_estimate import Resources, setup_resources
 from fenwear.system.placing import place, place_at_rest, place_case_bodies
@@ -98,6 +98,7 @@ __all__ = [
     "node_maps",
     "on_first_contact",
     "on_nodes",
+    "on_sufficient_grid",
     "outgrown",
     "place",
     "place_at_rest",
@@ -123,5 +124,4 @@ __all__ = [
     "with_exchange",
     "with_reduced_heat",
     "with_room",
-    "with_what_grows",
 ]

@@ -59,9 +59,9 @@ def _height(elastic: ElasticBody) -> float:
     size = float(np.linalg.norm(normal))
     along = x @ (normal / size)[:, None] if size > ALL_WAYS else x
     sides = [
-        mesh.comm.allreduce(float(one.max(initial=-np.inf)), MPI.MAX)
-        - mesh.comm.allreduce(float(one.min(initial=np.inf)), MPI.MIN)
-        for one in along.T
+        mesh.comm.allreduce(float(coordinate.max(initial=-np.inf)), MPI.MAX)
+        - mesh.comm.allreduce(float(coordinate.min(initial=np.inf)), MPI.MIN)
+        for coordinate in along.T
     ]
     return max(sides)
 
@@ -318,7 +318,7 @@ def edges_of(bodies: Bodies, surface: ContactSurface) -> Edges:
     planes = []
     for axis, place in bodies.punch.mirrors:
         shared = any(axis == other and abs(place - there) < FLAT * size for other, there in bodies.strip.mirrors)
-        ends = [(float(one.trace[:, axis].min()), float(one.trace[:, axis].max())) for one in surfaces]
+        ends = [(float(surface.trace[:, axis].min()), float(surface.trace[:, axis].max())) for surface in surfaces]
         if shared and any(all(abs(end[side] - place) < FLAT * size for end in ends) for side in (0, 1)):
             planes.append((axis, place))
     return Edges(surface, rings=bodies.punch.law.kind == "axisymmetric", planes=planes)

@@ -61,9 +61,9 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
     if axis != other or side == opposite:
         raise CaseError(InputError("grid", "expected contact surfaces that face each other along one axis"))
     level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
-    own = _grid(case.grid, punch.surface, axis, level)
-    _check_memory(punch.body.mesh.comm, own, sliding)
-    for body, grid in ((punch, own), (strip, _reached(case, own, sliding))):
+    punch_grid = _grid(case.grid, punch.surface, axis, level)
+    _check_memory(punch.body.mesh.comm, punch_grid, sliding)
+    for body, grid in ((punch, punch_grid), (strip, _reached(case, punch_grid, sliding))):
         if body.decides:
             body.operator = AUTO
         surface, reading = _laid(case, body, grid)
@@ -91,8 +91,8 @@ def _check_memory(comm: MPI.Comm, grid: RegularGrid, sliding: Sliding) -> None:
     """
     nodes, positions = math.prod(grid.counts), len({phase.offset for phase in sliding.motion.phases})
     counts = " by ".join(f"{count:,}" for count in grid.counts)
-    what = f"a contact of {counts} nodes in {positions} positions of the strip"
-    check_memory(comm, PER_NODE * nodes * positions, "grid.nodes", what, "Use fewer, or fewer `motion.positions`.")
+    subject = f"a contact of {counts} nodes in {positions} positions of the strip"
+    check_memory(comm, PER_NODE * nodes * positions, "grid.nodes", subject, "Use fewer, or fewer `motion.positions`.")
 
 
 def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> None:
@@ -115,7 +115,7 @@ def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> Non
     if punch.operator != CONDENSED or strip.operator != CONDENSED:
         return
     forces = [csr_array(punch.reading.T @ pair.punch.spread), csr_array(strip.reading.T @ pair.transfer.T)]
-    felt = csc_array(sum(one.T @ one for one in forces))
+    felt = csc_array(sum(matrix.T @ matrix for matrix in forces))
     shift = SHIFT * float(felt.diagonal().max())
     (felt_least,), least = eigsh(felt, 1, sigma=-shift, v0=np.random.default_rng(0).standard_normal(len(pair.weights)))
     if felt_least > UNFELT * shift / SHIFT:
@@ -127,7 +127,7 @@ def check_felt(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> Non
         "would not be resolved. Use fewer grid nodes, a smaller grid.size, smaller elements there, or "
         "punch.operator or strip.operator = 'fine'"
     )
-    reasons = [one.taken for one in (punch, strip) if one.taken]
+    reasons = [body.taken for body in (punch, strip) if body.taken]
     raise CaseError(InputError("grid.nodes", message + (f" ({'; '.join(reasons)})" if reasons else "")))
 
 
@@ -183,8 +183,8 @@ def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> Reg
         if value is not None and len(value) != len(low):
             raise CaseError(InputError(f"grid.{key}", f"expected {len(low)} length(s), got {len(value)}"))
     nodes = REACH if wanted.nodes is None else wanted.nodes
-    whole = (high - low) * (nodes - 1) / (nodes + 1)  # the strip's goes on by whole spacings
-    sides = whole if wanted.size is None else np.array(wanted.size)
+    length = (high - low) * (nodes - 1) / (nodes + 1)  # the strip's goes on by whole spacings
+    sides = length if wanted.size is None else np.array(wanted.size)
     middle = (low + high) / 2 if wanted.middle is None else np.array(wanted.middle)
     spacing = sides.max() / (nodes - 1)
     counts = np.maximum(np.floor(sides / spacing + MARGIN * nodes), 1).astype(np.int64) + 1
@@ -202,12 +202,12 @@ def _reached(case: Case, grid: RegularGrid, sliding: Sliding) -> RegularGrid:
     if motions:
         motions.add(case.motion)
         slides = [make_sliding(case.model_copy(update={"motion": motion})) for motion in motions]
-    for there in {own.field.placement(phase.offset) for own in slides for phase in own.motion.phases}:
+    for there in {slide.field.placement(phase.offset) for slide in slides for phase in slide.motion.phases}:
         moved = (there.points_back(corners) - corners)[:, along]
         before, after = np.maximum(before, -moved.min(axis=0)), np.maximum(after, moved.max(axis=0))
-    more = np.array([np.ceil(one / steps - 1e-6).astype(np.int64) for one in (before, after)])
-    corner = np.array(grid.corner) - more[0] * steps
-    return replace(grid, corner=tuple(corner), counts=tuple(int(k) for k in grid.counts + more.sum(axis=0)))
+    extra = np.array([np.ceil(reach / steps - 1e-6).astype(np.int64) for reach in (before, after)])
+    corner = np.array(grid.corner) - extra[0] * steps
+    return replace(grid, corner=tuple(corner), counts=tuple(int(k) for k in grid.counts + extra.sum(axis=0)))
 
 
 def _mortar(body: ElasticBody, grid: RegularGrid) -> csr_array:
@@ -244,8 +244,8 @@ def _reading(body: ElasticBody, surface: ContactSurface, grid: RegularGrid) -> c
     first, last, spacing = np.array(grid.corner), np.array(grid.corner) + grid.sides, np.array(grid.spacing)
     low, high = charted.s.min(axis=0), charted.s.max(axis=0)
     far = (first < low - spacing).any() or (last > high + spacing).any()  # where its nodes might not fit the memory
-    found = None if far else reading_at(charted, grid.flat)
-    if found is None:
+    reading = None if far else reading_at(charted, grid.flat)
+    if reading is None:
         spans: Sequence[str] = [
             " by ".join(f"{at:.4g} to {end:.4g}" for at, end in zip(*ends, strict=True))
             for ends in ((first, last), (low, high))
@@ -254,4 +254,4 @@ def _reading(body: ElasticBody, surface: ContactSurface, grid: RegularGrid) -> c
         beyond = bool((first < low).any() or (last > high).any())
         text += " only" if beyond else ", but is no rectangle: corners of the grid lie off it"
         raise CaseError(InputError("grid.size", f"{text}: expected a grid within it"))
-    return found
+    return reading

@@ -27,12 +27,12 @@ LAWS: dict[str, Any] = {GROSS: "fenwear.steps.gross_sliding", "coulomb": "fenwea
 
 def law_named(name: str) -> Any:
     """Return a law of contact, a `ContactLaw`, by its name in cases; `auto` gives gross sliding."""
-    found = LAWS[GROSS if name == AUTO else name]
-    return _own(found) if isinstance(found, str) else found
+    law = LAWS[GROSS if name == AUTO else name]
+    return _law_of(law) if isinstance(law, str) else law
 
 
 @cache
-def _own(module: str) -> Any:
+def _law_of(module: str) -> Any:
     return import_module(module).LAW
 
 
@@ -46,8 +46,8 @@ def register_contact_law(name: str, law: Any) -> None:
     Raises:
         CaseError: the name is no word, or that of a law of fenwear's own.
     """
-    own = isinstance(LAWS.get(name), str) or name == AUTO
-    if not name.replace("-", "_").isidentifier() or own:
+    built_in = isinstance(LAWS.get(name), str) or name == AUTO
+    if not name.replace("-", "_").isidentifier() or built_in:
         raise CaseError(InputError("contact.law", f"expected a name that no built-in law has, got {name!r}"))
     LAWS[name] = law
     CONTACT_LAWS.add(name)

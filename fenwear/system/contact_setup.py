@@ -203,8 +203,8 @@ class ContactSetup:
         """Unit vectors of the sliding of each phase in space (m, n, 3), d e_v, or zero."""
         return np.array(
             [
-                phase.direction * self.field_of(k).direction(own.opposite, own.normal)
-                for k, (phase, own) in enumerate(zip(self.motion.phases, self.pairs, strict=True))
+                phase.direction * self.field_of(k).direction(pair.opposite, pair.normal)
+                for k, (phase, pair) in enumerate(zip(self.motion.phases, self.pairs, strict=True))
             ]
         )
 
@@ -279,21 +279,21 @@ class ContactSetup:
         initial, mean = self.initial_temperature, self.rigid.mean_pressure
         contact = self.friction.contact
         carries = self.strip_carries and self.passes  # else it lies where it is on either body
-        found = layers_of(
+        layers = layers_of(
             contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries, alike=self._alike
         )
-        if found.hardness <= mean:
+        if layers.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa, which no softer surface carries"
             raise CaseError(InputError("contact.hardness", message))
-        return found
+        return layers
 
     @property
     def _alike(self) -> dict[str, Array]:
         """Variables of laws that are the same in all cycles: the speed of the phases, without heat the temperature."""
         speeds = np.array([np.broadcast_to(self._speeds[k], self._none.shape) for k in range(len(self.motion.phases))])
-        found = {} if self.heat is not None else {"T": self._initial}
+        variables = {} if self.heat is not None else {"T": self._initial}
         same = np.abs(speeds - speeds[0]).max() <= ROUNDING * np.abs(speeds).max()
-        return {**found, "v": speeds[0] if same else speeds}
+        return {**variables, "v": speeds[0] if same else speeds}
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
         """Return h_c by the pressures (n,), where the layer gives it (`fenwear.laws.contact_conductance`)."""
@@ -336,8 +336,8 @@ class ContactSetup:
         durations = np.array([self.motion.phases[k].duration for k in chosen])
 
         def wearing(k: int, at: ContactConditions) -> Array:
-            own = self.wear.phases([at], [chosen[k]]).begun(self.unworn() if worn is None else worn)
-            taken = own.taken(at.pressure[None])[0]
+            phase_wear = self.wear.phases([at], [chosen[k]]).begun(self.unworn() if worn is None else worn)
+            taken = phase_wear.taken(at.pressure[None])[0]
             return np.asarray(taken / durations[k])
 
         depth = np.zeros(len(self.pair.strip.weights)) if worn is None else worn.strip
@@ -424,7 +424,7 @@ class ContactSetup:
         followed, heights = self.bodies.followed, self.element_heights
         rest = worn if followed is None else worn - followed
         pairs = ((rest.punch, heights.punch), (rest.strip, heights.strip))
-        return max(float((np.abs(own) / (limit * height)).max(initial=0.0)) for own, height in pairs)
+        return max(float((np.abs(wear) / (limit * height)).max(initial=0.0)) for wear, height in pairs)
 
     @cached_property
     def element_heights(self) -> WornDepths:
@@ -435,9 +435,11 @@ class ContactSetup:
     def _speeds(self) -> tuple[Array, ...]:
         """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
         motion, pair = self.motion, self.pair
-        found = [np.asarray(phase.speed * own) for phase, own in zip(motion.phases, self.sliding_ratio, strict=True)]
+        speeds = [
+            np.asarray(phase.speed * ratio) for phase, ratio in zip(motion.phases, self.sliding_ratio, strict=True)
+        ]
         mean = motion.mean_speed * node_rates(self.sliding.field, pair)
-        return (*found, self.path.sum(axis=0) / motion.period if motion.steps else mean)
+        return (*speeds, self.path.sum(axis=0) / motion.period if motion.steps else mean)
 
     @cached_property
     def _none(self) -> Array:
@@ -548,14 +550,15 @@ class ContactSetup:
         if self.sticks:
             message = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
             raise CaseError(InputError("contact.law", message))
-        sliding = [one.sum(axis=0) / one.max() for one in self.wear.sliding if one.max() > 0]  # none slide in a rest
-        if not all((one > ROUNDING).all() for one in sliding):
+        # none slide in a rest
+        sliding = [distance.sum(axis=0) / distance.max() for distance in self.wear.sliding if distance.max() > 0]
+        if not all((ratio > ROUNDING).all() for ratio in sliding):
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
-        found = self._optimum(direction, zone, None)
-        for _ in range(OF_SIDES if any(len(one.mixed) for one in self.laws.regions) else 0):
-            found = self._optimum(direction, zone, found.pressure)
-        return found
+        optimal = self._optimum(direction, zone, None)
+        for _ in range(OF_SIDES if any(len(regions.mixed) for regions in self.laws.regions) else 0):
+            optimal = self._optimum(direction, zone, optimal.pressure)
+        return optimal
 
     def _optimum(self, direction: int, zone: Mask | None, pressure: Array | None) -> Optimum:
         """Return the optimum at the coefficients of a pressure (n,), MPa; by default of the mean."""

@@ -110,21 +110,21 @@ class CreepingBody:
     @cached_property
     def _loaded(self) -> list[Array]:
         """Displacement by the loads of each phase (size,), mm."""
-        found = []
+        displacements = []
         for phase in range(len(self.faces)):
             operator = self._operator(phase)
-            found.append(np.einsum("qd,qda->qa", operator.by_load - self.moved, operator.directions).ravel())
-        return found
+            displacements.append(np.einsum("qd,qda->qa", operator.by_load - self.moved, operator.directions).ravel())
+        return displacements
 
     def displacement(self, phase: int, pressure: Array, ratio: Array, load: float) -> Array:
         """Return v (size,), mm."""
         face = self.faces[phase]
         if face.in_memory:
-            found = self.matrix(phase, ratio) @ pressure
+            displacement = self.matrix(phase, ratio) @ pressure
         else:
             traction = (face.pair.normal + ratio) * (face.pair.weights * pressure)[:, None]
-            found = self._answer(face, traction)
-        return np.asarray(found + load * self._by_load(phase))
+            displacement = self._answer(face, traction)
+        return np.asarray(displacement + load * self._by_load(phase))
 
     def matrix(self, phase: int, ratio: Array) -> Array:
         """Return v by unit pressures with their friction (size, n), mm/MPa."""
@@ -146,10 +146,10 @@ class CreepingBody:
 
     def opened(self, phase: int, values: Array) -> Array:
         """Return the gap (n, ...) that displacements open in a phase."""
-        own = values.reshape(*self._shape, *values.shape[1:])
+        displacements = values.reshape(*self._shape, *values.shape[1:])
         face = self.faces[phase]
         parts = [np.zeros((*body.directions.shape[::2], *values.shape[1:])) for body in both(face)]
-        parts[self.which] = own
+        parts[self.which] = displacements
         return face.opened(*parts)[:, 0]
 
     def from_other(self, _other: Member, states: Array, _nodes: NDArray[np.int64]) -> Array:
@@ -201,8 +201,8 @@ class CreepingForces(CreepingBody):
         assert isinstance(other, CreepingForces)
         forces, by_loads = np.split(states, [-len(other._loaded[0])], axis=1)
         shares, (q, d) = self._grid.sharing(other._grid), other._forces
-        here = [(shares @ one.reshape(q, d)).ravel() for one in forces]
-        there, loads = (np.stack(own._loaded, axis=1) for own in (other, self))
+        here = [(shares @ force.reshape(q, d)).ravel() for force in forces]
+        there, loads = (np.stack(member._loaded, axis=1) for member in (other, self))
         factors = np.linalg.lstsq(there, by_loads.T, rcond=None)[0]
         return np.concatenate([np.array(here), (loads @ factors).T], axis=1)
 

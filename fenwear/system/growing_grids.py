@@ -132,7 +132,7 @@ def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
     return _part(grid, largest, *wider, 2 if coarser else 1)
 
 
-def with_what_grows(
+def on_sufficient_grid(
     system: Tribosystem, find: Callable[[Tribosystem], T], touched: Callable[[T], Mask]
 ) -> tuple[Tribosystem, T]:
     """Return a system on a grid with room for an end that is found on it, and this end; collective.
@@ -142,11 +142,11 @@ def with_what_grows(
         find: The end of a system.
         touched: Nodes of the punch that touch or have worn in an end (n,).
     """
-    found = find(system)
-    while (grid := outgrown(system, touched(found))) is not None:
+    end = find(system)
+    while (grid := outgrown(system, touched(end))) is not None:
         system = regridded(system, grid)
-        found = find(system)
-    return system, found
+        end = find(system)
+    return system, end
 
 
 def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float) -> RegularGrid | None:
@@ -159,12 +159,12 @@ def with_room(system: Tribosystem, worn: WornDepths, carries: Mask, load: float)
         load: Factor of all loads.
     """
 
-    def found() -> RegularGrid | None:
+    def larger_grid() -> RegularGrid | None:
         contact = system.phase_contact((0,))
         contact.press(load)
         return outgrown(system, carries | (contact.solve(system.gap(0, worn)).pressure[0] > 0))
 
-    return system.team.lead(found)
+    return system.team.lead(larger_grid)
 
 
 def at_rim(system: ContactSetup, touched: Mask) -> bool:
@@ -192,12 +192,12 @@ def carried(worn: WornDepths, before: Tribosystem, after: Tribosystem) -> WornDe
 
 def node_maps(before: ContactSetup, after: ContactSetup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the node before at the place of each node of the punch and of the strip after, -1 for none."""
-    found = []
+    maps = []
     for old, new in ((before.pair.punch, after.pair.punch), (before.pair.strip, after.pair.strip)):
         assert old.grid
         assert new.grid
-        found.append(new.grid.of_other(old.grid))
-    return found[0], found[1]
+        maps.append(new.grid.of_other(old.grid))
+    return maps[0], maps[1]
 
 
 def kept_volume(depth: Array, nodes: NDArray[np.int64], before: Array, after: Array) -> Array:
@@ -208,9 +208,9 @@ def kept_volume(depth: Array, nodes: NDArray[np.int64], before: Array, after: Ar
         nodes: The old node of each new one (n_new,), -1 for none.
         before, after: Areas of old and new nodes, mm or mm².
     """
-    found = on_nodes(depth, nodes, np.zeros((*depth.shape[:-1], len(nodes))))
-    volume, now = depth @ before, found @ after
-    return np.asarray(found * np.divide(volume, now, out=np.ones_like(now), where=now != 0)[..., None])
+    moved = on_nodes(depth, nodes, np.zeros((*depth.shape[:-1], len(nodes))))
+    volume, now = depth @ before, moved @ after
+    return np.asarray(moved * np.divide(volume, now, out=np.ones_like(now), where=now != 0)[..., None])
 
 
 def on_nodes(values: Array, nodes: NDArray[np.int64], start: Array) -> Array:
@@ -254,9 +254,9 @@ def _part(
     corner = reach.middle + first * every * steps
     return replace(
         grid,
-        corner=tuple(float(one) for one in corner),
-        spacing=tuple(float(every * one) for one in steps),
-        counts=tuple(int(one) for one in last - first + 1),
+        corner=tuple(float(coordinate) for coordinate in corner),
+        spacing=tuple(float(every * step) for step in steps),
+        counts=tuple(int(count) for count in last - first + 1),
     )
 
 

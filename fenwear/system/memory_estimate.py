@@ -55,8 +55,8 @@ class Resources:
         Raises:
             CaseError: it does not.
         """
-        what, advice = f"the set-up of {self.sizes}", "Use larger elements, or more memory."
-        check_memory(self.bodies.comm, self.memory, "geometry", what, advice, spread=True)
+        subject, advice = f"the set-up of {self.sizes}", "Use larger elements, or more memory."
+        check_memory(self.bodies.comm, self.memory, "geometry", subject, advice, spread=True)
 
 
 def setup_resources(bodies: Bodies, nodes: int, asked: tuple[Asked, Asked], matrices: int) -> Resources:
@@ -83,7 +83,7 @@ def _numbers(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -
     """Return the count of numbers in a condensed body, its stiffness and its factor; collective."""
     if elastic.operator != CONDENSED:
         return 0.0
-    found = float(patterns) * (elastic.dim * columns + (elastic.size / elastic.dim if heat else 0.0))
+    count = float(patterns) * (elastic.dim * columns + (elastic.size / elastic.dim if heat else 0.0))
     if not elastic.is_factored:
-        found += 1.5 * elastic.matrix_entries() + WORKING * entries(elastic.size, elastic.dim)
-    return found + (2.0 * elastic.surface_dofs.size**2 if not heat and by_surface(elastic) else 0.0)
+        count += 1.5 * elastic.matrix_entries() + WORKING * entries(elastic.size, elastic.dim)
+    return count + (2.0 * elastic.surface_dofs.size**2 if not heat and by_surface(elastic) else 0.0)

@@ -59,10 +59,10 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
         middle = on_closed_track(middle, sliding.field, sliding.track)
     sliding = sliding.measured_on(middle)
     # Round surfaces that slide along themselves stay; a whole strip is moved where it does not turn by a table.
-    whole = case.heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
+    paired = case.heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
     places = [sliding.placement(phase) for phase in sliding.motion.phases]
     pairs = {
-        moved: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
+        moved: pair(middle.punch, middle.strip, moved) if paired else pass_material(middle, moved)
         for moved in dict.fromkeys(places)
         if moved != HERE
     }
@@ -75,9 +75,9 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
     made = {HERE: rigid}  # phases there and back share theirs
     rigids: list[RigidEquilibrium] = []
-    for moved, own in zip(places, loaded, strict=True):
-        if own is not bodies:
-            rigids.append(rigid_equilibrium(pairs[moved], own.punch, own.strip))
+    for moved, loaded_bodies in zip(places, loaded, strict=True):
+        if loaded_bodies is not bodies:
+            rigids.append(rigid_equilibrium(pairs[moved], loaded_bodies.punch, loaded_bodies.strip))
             continue
         if moved not in made:
             made[moved] = rigid_equilibrium(pairs[moved], bodies.punch, bodies.strip)
@@ -92,12 +92,12 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
         rigid=rigid,
         passage=None if case.heat is None else _passage(middle, sliding, rings=rings),
     )
-    for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
+    for phase, equilibrium, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         when, key = f"in {placed.direction_words[phase.direction]} sliding", "punch.loads"
         if isinstance(case.motion, Cycle):
             row = int(np.searchsorted(case.motion.course.fraction, phase.fraction))
             when, key = f"from row {row} to row {row + 1}", "punch.loads" if case.motion.load is None else "motion.load"
-        check_equilibrium(one, when, ratio, key)
+        check_equilibrium(equilibrium, when, ratio, key)
     return placed
 
 
@@ -119,7 +119,10 @@ def place_at_rest(
     """
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
-    own = [rigid if one is bodies else rigid_equilibrium(middle, one.punch, one.strip) for one in loaded]
+    rigids = [
+        rigid if loaded_bodies is bodies else rigid_equilibrium(middle, loaded_bodies.punch, loaded_bodies.strip)
+        for loaded_bodies in loaded
+    ]
     return ContactSetup(
         bodies=bodies,
         sliding=sliding,
@@ -127,7 +130,7 @@ def place_at_rest(
         law=law,
         case=case,
         loaded=loaded,
-        rigids=tuple(own),
+        rigids=tuple(rigids),
         rigid=rigid,
         passes=passes,
     )
@@ -185,8 +188,8 @@ def _wanted(case: Case, placed: ContactSetup) -> int:
     if not case.leaves_positions or not placed.track_varies or case.grid is not None or case.heat is not None:
         return 0
     longest = max([_step(make_sliding(stage.case).motion) for stage in stages_of(case)], default=0.0)
-    own = _step(placed.motion)
-    spacing = placed.position_spacing * max(1.0, longest / own if own else 1.0)
+    step = _step(placed.motion)
+    spacing = placed.position_spacing * max(1.0, longest / step if step else 1.0)
     nearest = int(np.ceil(DEFAULT_POSITIONS * spacing))
     most = min(MOST, int(ENTRIES / len(placed.pair.x) ** 2))
     return min(nearest + 1 - nearest % 2, most - 1 + most % 2)  # odd: one is the middle of the stroke

@@ -76,7 +76,7 @@ class Creep:
     @cached_property
     def _ends(self) -> list[int]:
         """Ends of the members' states."""
-        return [int(end) for end in np.cumsum([len(one.retardation.times) * one.size for one in self.members])]
+        return [int(end) for end in np.cumsum([len(member.retardation.times) * member.size for member in self.members])]
 
     @property
     def creeps(self) -> bool:
@@ -110,12 +110,12 @@ class Creep:
 
     def depths(self, crept: Array) -> dict[str, Array]:
         """Return the creep of punch, strip and layer (n,), or of states (size, k) each, (n, k), mm, by name."""
-        found = {}
+        by_name = {}
         for member, y in self._each(crept):
-            found[member.name] = member.opened(
+            by_name[member.name] = member.opened(
                 self.middle, np.asarray(np.tensordot(member.retardation.compliances, y, 1))
             )
-        return found
+        return by_name
 
     def _each(self, crept: Array) -> list[tuple[Member, Array]]:
         return list(zip(self.members, self.parted(crept), strict=True))
@@ -137,24 +137,24 @@ class Creep:
         if not self.creeps:
             return self.interfaces
         known: dict[tuple[float, ...], Interface] = {}
-        found = []
-        for phase, own in enumerate(self.interfaces):
+        scaled = []
+        for phase, interface in enumerate(self.interfaces):
             times = self.factors(phase)
-            alike = (id(own), *times)
+            alike = (id(interface), *times)
             if alike not in known:
-                known[alike] = self._scaled(own, times, self.moved[phase])
-            found.append(known[alike])
-        return tuple(found)
+                known[alike] = self._scaled(interface, times, self.moved[phase])
+            scaled.append(known[alike])
+        return tuple(scaled)
 
     def factors(self, phase: int) -> tuple[float, ...]:
         """Return the compliances of punch, strip and layer over a phase of a march, over their immediate ones."""
         factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
         return tuple(float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER))
 
-    def _scaled(self, own: Interface, times: Sequence[float], by_supports: tuple[Array, Array]) -> Interface:
-        bodies = zip(both(own), times[:2], by_supports, strict=True)
+    def _scaled(self, interface: Interface, times: Sequence[float], by_supports: tuple[Array, Array]) -> Interface:
+        bodies = zip(both(interface), times[:2], by_supports, strict=True)
         punch, strip = (scaled(body, factor, moved) for body, factor, moved in bodies)
-        return replace(own, punch=punch, strip=strip, layer=times[2] * own.layer, like=None)
+        return replace(interface, punch=punch, strip=strip, layer=times[2] * interface.layer, like=None)
 
     def offset(self, phase: int, crept: Array) -> Array:
         """Return the gap (n,) that a state opens at the end of the phase that it is the beginning of, mm."""
@@ -176,12 +176,12 @@ class Creep:
             ratio: tau (n, d).
             load: Factor of all loads.
         """
-        found = [
+        changes = [
             cycle.taken[phase][:, None] * member.displacement(phase, pressure, ratio, load)
             - (1 - cycle.decays[phase])[:, None] * y
             for (member, y), cycle in zip(self._each(crept), self.cycles, strict=True)
         ]
-        return _joined([one.ravel() for one in found])
+        return _joined([change.ravel() for change in changes])
 
     def tangent(self, phase: int, ratio: Array) -> CreepTangent:
         """Return the derivatives of a phase by changes of state and pressure."""
@@ -219,8 +219,8 @@ class Creep:
         shares = [cycle.within(cycles) for cycle in self.cycles]
         gap = self._by_loads([by for by, _ in shares], ratios, load)
         for (member, y), (_, by_state) in zip(self._each(crept), shares, strict=True):
-            for phase, own in enumerate(by_state):
-                gap[phase] += member.opened(phase, own @ y)
+            for phase, share in enumerate(by_state):
+                gap[phase] += member.opened(phase, share @ y)
         return CreepStage(self, gap, [by for by, _ in shares], crept, cycles, list(ratios), load)
 
     def lasting(self, pressure: Array, ratios: Sequence[Array], load: float) -> list[Array]:
@@ -234,9 +234,9 @@ class Creep:
         """Return the gap (m, n) that the loads alone creep open."""
         m = len(self.durations)
         none, gap = np.zeros((m, self._nodes)), np.zeros((m, self._nodes))
-        for member, own, v in zip(self.members, shares, self.lasting(none, ratios, load), strict=True):
+        for member, member_shares, v in zip(self.members, shares, self.lasting(none, ratios, load), strict=True):
             for phase in range(m):
-                gap[phase] += member.opened(phase, own[phase] @ v)
+                gap[phase] += member.opened(phase, member_shares[phase] @ v)
         return gap
 
     @cached_property
@@ -250,39 +250,39 @@ class Creep:
             shares: Of the v_i in each phase (phases, i), of each member.
             ratios: tau of each phase.
         """
-        for known_shares, known_ratios, found in self._couplings:
+        for known_shares, known_ratios, gaps in self._couplings:
             if _same(known_ratios, ratios) and _same(known_shares, shares):
-                return found
+                return gaps
         m, n = len(self.durations), self._nodes
-        found = np.zeros((m, n, m, n))
-        for member, own in zip(self.members, shares, strict=True):
+        gaps = np.zeros((m, n, m, n))
+        for member, member_shares in zip(self.members, shares, strict=True):
             for i in range(m):
                 displaced = member.matrix(i, ratios[i])
                 for phase in range(m):
-                    found[phase, :, i] += own[phase, i] * member.opened(phase, displaced)
-        self._couplings.append((list(shares), list(ratios), found))
+                    gaps[phase, :, i] += member_shares[phase, i] * member.opened(phase, displaced)
+        self._couplings.append((list(shares), list(ratios), gaps))
         del self._couplings[:-KEPT]
-        return found
+        return gaps
 
 
 def _courses(placed: ContactSetup) -> Array:
     """Return the loads over those of the middle, at even times of each phase (m, 2 k + 1); ones where they stay."""
-    phases, case, found = placed.motion.phases, placed.case, np.ones((len(placed.motion.phases), TIMES))
+    phases, case, courses = placed.motion.phases, placed.case, np.ones((len(placed.motion.phases), TIMES))
     loads = [load for body in case.bodies for load in case.loads_of(body)]
     if all(load.steady for load in loads):
-        return found
+        return courses
     period = sum(phase.duration for phase in phases)
 
     def at(fraction: float) -> Array:
         given = [load.at(fraction % 1.0 if fraction > 1 else max(fraction, 0.0)) for load in loads]
         return np.concatenate([part for load in given for part in (load.force, load.traction, load.moment) if part])
 
-    for own, phase in zip(found, phases, strict=True):
+    for course, phase in zip(courses, phases, strict=True):
         middle, half = at(phase.fraction), phase.duration / period / 2
         if middle.any():
             times = np.linspace(phase.fraction - half, phase.fraction + half, TIMES)
-            own[:] = [at(float(time)) @ middle / (middle @ middle) for time in times]
-    return found
+            course[:] = [at(float(time)) @ middle / (middle @ middle) for time in times]
+    return courses
 
 
 def _joined(parts: Sequence[Array]) -> Array:
@@ -290,8 +290,8 @@ def _joined(parts: Sequence[Array]) -> Array:
     return np.concatenate([np.zeros(0), *parts])
 
 
-def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
-    return all(a is b or np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+def _same(first: Sequence[Array], other: Sequence[Array]) -> bool:
+    return all(a is b or np.array_equal(a, b) for a, b in zip(first, other, strict=True))
 
 
 @dataclass(frozen=True)
@@ -320,17 +320,17 @@ class CreepStage:
         """Return gaps (m, n), mm, and a coupling (m, n, m, n), mm/MPa, with creep; None for no coupling."""
         if not self.creep.creeps:
             return gap, coupling
-        own = self.creep.coupling(self.shares, self.ratios)
-        return gap + self.gap, own if coupling is None else own + coupling
+        by_creep = self.creep.coupling(self.shares, self.ratios)
+        return gap + self.gap, by_creep if coupling is None else by_creep + coupling
 
     def rate(self, pressure: Array) -> Array:
         """Return the change of the state in each cycle of the step, at pressures (m, n)."""
-        creep, found = self.creep, []
+        creep, changes = self.creep, []
         displaced = creep.lasting(pressure, self.ratios, self.load)
         for cycle, y, v in zip(creep.cycles, creep.parted(self.crept), displaced, strict=True):
             by_v, by_y = cycle.rate(self.cycles)
-            found.append((by_v @ v + by_y[:, None] * y).ravel())
-        return _joined(found)
+            changes.append((by_v @ v + by_y[:, None] * y).ravel())
+        return _joined(changes)
 
 
 def creep_of(
@@ -365,8 +365,8 @@ def creep_of(
     if given is not None and np.any(placed.layers.winkler):
         members.append(CreepingLayer(Retardation.of(given), np.asarray(placed.layers.winkler)))
     durations = np.array([phase.duration for phase in placed.motion.phases])
-    found = [  # on a grid the strip answers opposite the punch in each of its places
-        moved if face is own else (moved[0], by_supports(1, own.strip))
-        for face, own in zip(faces, interfaces, strict=True)
+    by_phase = [  # on a grid the strip answers opposite the punch in each of its places
+        moved if face is interface else (moved[0], by_supports(1, interface.strip))
+        for face, interface in zip(faces, interfaces, strict=True)
     ]
-    return Creep(tuple(members), durations, _courses(placed), interfaces, tuple(found), placed.motion.positions // 2)
+    return Creep(tuple(members), durations, _courses(placed), interfaces, tuple(by_phase), placed.motion.positions // 2)

@@ -105,8 +105,8 @@ class Tribosystem(ContactSetup):
     @cached_property
     def layers(self) -> Layers:
         """Layers between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
-        found = super().layers
-        return found if found.hardness == np.inf else replace(found, softness=SOFT * self.interface.elastic_length)
+        layers = super().layers
+        return layers if layers.hardness == np.inf else replace(layers, softness=SOFT * self.interface.elastic_length)
 
     @property
     def replicated(self) -> bool:
@@ -151,8 +151,8 @@ class Tribosystem(ContactSetup):
             worn: Depths at its start, what lies between and what has crept.
             passing: Whether creep continues over the phase, in a march; else it is left out.
         """
-        found = super().gap(phase, worn)
-        return found + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else found
+        gap = super().gap(phase, worn)
+        return gap + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else gap
 
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, with the initial layers and without creep."""
@@ -275,24 +275,30 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
     interface = condensed.join(placed.rigid, placed.layers.winkler)
     under = _under_all(condensed, placed)
-    found: list[Interface] = []
+    joins: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
         earlier = next((j for j in range(k) if placed.rigids[j] is rigid and placed.loaded[j] is bodies), None)
         if rigid is placed.rigid:
-            found.append(interface)
+            joins.append(interface)
         elif earlier is not None:
-            found.append(found[earlier])
+            joins.append(joins[earlier])
         else:
-            own = under[id(bodies)]
+            loaded = under[id(bodies)]
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
             layer = placed.layers.winkler
-            found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
+            joins.append(
+                interface.under(rigid, loaded.punch, loaded.facing(rigid)[0]) if alike else loaded.join(rigid, layer)
+            )
     parts = {name: getattr(placed, name) for name in ContactSetup.__dataclass_fields__}
-    interfaces = tuple(found)
+    interfaces = tuple(joins)
 
     def on_material(phase: int) -> Interface:
-        own, bodies = interfaces[phase], under[id(placed.loaded[phase])]
-        return own if own.strip is bodies.strip else Interface(own.rigid, bodies.punch, bodies.strip, strip_moves=True)
+        interface, bodies = interfaces[phase], under[id(placed.loaded[phase])]
+        return (
+            interface
+            if interface.strip is bodies.strip
+            else Interface(interface.rigid, bodies.punch, bodies.strip, strip_moves=True)
+        )
 
     creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
     return Tribosystem(
@@ -310,27 +316,27 @@ def _under_all(condensed: Condensed, placed: ContactSetup) -> dict[int, Condense
 
     Displacements are linear in the loads: solved are those that the others are made of.
     """
-    others = list({id(one): one for one in placed.loaded if one is not placed.bodies}.values())
-    found = {id(placed.bodies): condensed}
+    others = list({id(bodies): bodies for bodies in placed.loaded if bodies is not placed.bodies}.values())
+    by_id = {id(placed.bodies): condensed}
     if not others:
-        return found
-    loads = np.array([np.concatenate([one.punch.load, one.strip.load]) for one in (placed.bodies, *others)])
+        return by_id
+    loads = np.array([np.concatenate([bodies.punch.load, bodies.strip.load]) for bodies in (placed.bodies, *others)])
     chosen, shares = _spanning(placed.comm, loads)
     base = [condensed if k == 0 else condensed.under_loads(others[k - 1]) for k in chosen]
-    for own, bodies in zip(shares.T[1:], others, strict=True):
+    for share, bodies in zip(shares.T[1:], others, strict=True):
         if isinstance(condensed.punch, CondensedBody) and isinstance(condensed.strip, CondensedBody):
             on_punch, on_strip = (
-                np.asarray(np.tensordot(own, [body.by_load for body in bodies_of], 1), dtype=np.float64)
-                for bodies_of in ([one.punch for one in base], [one.strip for one in base])
+                np.asarray(np.tensordot(share, [body.by_load for body in bodies_of], 1), dtype=np.float64)
+                for bodies_of in ([body.punch for body in base], [body.strip for body in base])
             )
-            found[id(bodies)] = replace(
+            by_id[id(bodies)] = replace(
                 condensed,
                 punch=replace(condensed.punch, by_load=on_punch),
                 strip=replace(condensed.strip, by_load=on_strip),
             )
         else:
-            found[id(bodies)] = condensed.under_loads(bodies)
-    return found
+            by_id[id(bodies)] = condensed.under_loads(bodies)
+    return by_id
 
 
 def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
@@ -356,8 +362,8 @@ def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
         parts.append(comm.allreduce(left @ along))
         left -= np.outer(parts[-1], along)
         sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
-    whole = np.array(parts)
-    return chosen, np.linalg.lstsq(whole[:, chosen], whole, rcond=None)[0]
+    all_loads = np.array(parts)
+    return chosen, np.linalg.lstsq(all_loads[:, chosen], all_loads, rcond=None)[0]
 
 
 def answers_for(before: ContactSetup, placed: ContactSetup) -> bool:
@@ -365,7 +371,7 @@ def answers_for(before: ContactSetup, placed: ContactSetup) -> bool:
     frame = _frame(placed)
     if _frame(before) != frame:
         return False
-    first, second = (np.zeros(0) if one.passage is None else one.passage.nodes for one in (before, placed))
+    first, second = (np.zeros(0) if setup.passage is None else setup.passage.nodes for setup in (before, placed))
     return np.array_equal(first, second)
 
 

@@ -165,13 +165,13 @@ def set_up_by(case: Case) -> tuple[object, ...]:
     return (*meshed, grid, case.model, case.setup, case.materials, case.heat is None, initial, *bodies)
 
 
-def same_conduction(one: Case, other: Case) -> bool:
+def same_conduction(first: Case, other: Case) -> bool:
     """Return whether heat is conducted alike in the bodies of two cases, whatever passes between them."""
-    if one.heat is None or other.heat is None:
-        return one.heat is other.heat
-    own, others = (case.heat.model_dump(exclude=set(Heat.exchange_keys)) for case in (one, other) if case.heat)
-    held = [(case.punch.boundary_of_heat, case.strip.boundary_of_heat) for case in (one, other)]
-    return own == others and held[0] == held[1]
+    if first.heat is None or other.heat is None:
+        return first.heat is other.heat
+    values, others = (case.heat.model_dump(exclude=set(Heat.exchange_keys)) for case in (first, other) if case.heat)
+    held = [(case.punch.boundary_of_heat, case.strip.boundary_of_heat) for case in (first, other)]
+    return values == others and held[0] == held[1]
 
 
 ELASTIC = frozenset(("young", "expansion"))
@@ -212,7 +212,7 @@ def property_change(system: Tribosystem, state: HeatState | None) -> float:
             changed = max(changed, _change(case, body, description, now, then))
         except CaseError as error:  # raised below, on all ranks
             problem = error
-    problems = [one for one in system.comm.allgather(problem) if one is not None]
+    problems = [raised for raised in system.comm.allgather(problem) if raised is not None]
     if problems:
         raise problems[0]
     return float(system.comm.allreduce(changed, op=MPI.MAX)) / case.heat.property_tolerance
@@ -239,9 +239,9 @@ def _change(case: Case, body: HeatBody, description: Body, now: Array, then: Arr
             case.materials[name],
             _nodes_of(body.space, body.body.cell_tags.find(body.body.regions[region])),
         )
-        for one in material.dependent:
-            new, old = (material.values(one, theta[nodes], f"materials.{name}") for theta in (now, then))
-            scale = np.abs(old) if one != "expansion" else np.abs(old).max(initial=0.0)  # it may pass through zero
+        for quantity in material.dependent:
+            new, old = (material.values(quantity, theta[nodes], f"materials.{name}") for theta in (now, then))
+            scale = np.abs(old) if quantity != "expansion" else np.abs(old).max(initial=0.0)  # it may pass through zero
             largest = max(largest, float((np.abs(new - old) / np.maximum(scale, 1e-300)).max(initial=0.0)))
     return largest
 

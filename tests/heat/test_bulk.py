@@ -49,7 +49,7 @@ def on_track(**more: Any) -> Callable[[dict[str, Any]], None]:
 
 
 def bulk(system: Tribosystem, block: Any) -> float:
-    found = system.exchange.own(block.end.temperature).bulk
+    found = system.exchange.on_bases(block.end.temperature).bulk
     assert found is not None
     assert found == pytest.approx(block.heat.temperature_bulk[-1], rel=1e-10)
     return found

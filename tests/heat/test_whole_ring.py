@@ -51,7 +51,9 @@ def around_the_pad(height: float, speed: float) -> tuple[Floats, Floats, float]:
     for _ in range(STOPS):
         for exchange, time in ((slides, SLIDES), (rests, RESTS)):
             for _ in range(round(time / STEP)):
-                state, terms = exchange.half_cycle(exchange.own(state), 0, pressure, exchange.conductance(pressure))
+                state, terms = exchange.half_cycle(
+                    exchange.on_bases(state), 0, pressure, exchange.conductance(pressure)
+                )
                 made, *gone = terms[: len(TERMS)]
                 apart = max(apart, abs(made - sum(gone)) / (FLUX * PAD * STEP))
             found.append(exchange.contact_temperatures(state)[1])

@@ -119,7 +119,7 @@ class Calibration:
     @property
     def values(self) -> dict[str, float]:
         """Values by key."""
-        return {one.key: one.value for one in self.fitted}
+        return {unknown.key: unknown.value for unknown in self.fitted}
 
     def scatter(self) -> Scatter:
         """Return the unknowns' joint distribution: normal, of the logarithms where they were fitted so.
@@ -130,19 +130,20 @@ class Calibration:
         if self.not_known:
             raise CaseError([InputError("calibration", f"gives no distribution: {line}") for line in self.not_known])
         return Scatter.joint(
-            [one.key for one in self.fitted],
-            [one.value for one in self.fitted],
+            [unknown.key for unknown in self.fitted],
+            [unknown.value for unknown in self.fitted],
             self.covariance,
-            [one.logarithmic for one in self.fitted],
+            [unknown.logarithmic for unknown in self.fitted],
         )
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that --json prints and calibration.json holds."""
-        found = {
+        table = {
             "unknowns": [
-                {"key": one.key, "value": one.value, "unit": one.unit, "standard_error": one.standard_error,
-                 "interval_95": [one.low, one.high], "logarithmic": one.logarithmic}
-                for one in self.fitted
+                {"key": unknown.key, "value": unknown.value, "unit": unknown.unit,
+                 "standard_error": unknown.standard_error, "interval_95": [unknown.low, unknown.high],
+                 "logarithmic": unknown.logarithmic}
+                for unknown in self.fitted
             ],
             "correlation": self.correlation.tolist(),
             "covariance": self.covariance.tolist() if np.isfinite(self.covariance).all() else None,
@@ -159,21 +160,21 @@ class Calibration:
             "at_bound": list(self.at_bound),
             "evaluations": self.evaluations,
         }  # fmt: skip
-        return dict(finite(found))
+        return dict(finite(table))
 
     def text(self) -> str:
         """Return a table for people."""
         lines = [f"  {'key':36} {'value':>13} {'std. error':>11} {'95 % interval':>27}  unit"]
-        for one in self.fitted:
+        for unknown in self.fitted:
             lines.append(
-                f"  {one.key:36} {one.value:13.6g} {one.standard_error:11.3g} "
-                f"{one.low:13.5g} {one.high:13.5g}  {one.unit or '-'}"
+                f"  {unknown.key:36} {unknown.value:13.6g} {unknown.standard_error:11.3g} "
+                f"{unknown.low:13.5g} {unknown.high:13.5g}  {unknown.unit or '-'}"
             )
         if len(self.fitted) > 1:
             lines.append("  correlation")
             lines += [
-                f"    {one.key:34} " + " ".join(f"{value:7.3f}" for value in np.atleast_1d(row))
-                for one, row in zip(self.fitted, list(self.correlation), strict=True)
+                f"    {row_unknown.key:34} " + " ".join(f"{value:7.3f}" for value in np.atleast_1d(row))
+                for row_unknown, row in zip(self.fitted, list(self.correlation), strict=True)
             ]
         lines.append(f"  noise {self.noise:.4g}, {self.degrees_of_freedom} degrees of freedom, {self.evaluations} runs")
         for trace in self.traces:
@@ -223,17 +224,17 @@ def calibrate_each(
 ) -> list[Calibration]:
     """Return the calibration on the data sets of each test, as `calibrate`; collective."""
     study = Study(**how)
-    asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
+    asked = [Unknown(unknown) if isinstance(unknown, str) else unknown for unknown in unknowns]
     problems = [LeastSquares(case, data, asked, baseline, progress, study) for data in tests]
-    store = study.open(case, named(case_text(case), [one.key for one in problems], asked, list(baseline)))
-    found = []
+    store = study.open(case, named(case_text(case), [problem.key for problem in problems], asked, list(baseline)))
+    calibrations = []
     while problems:
         problem = problems.pop(0)  # whose systems are then free
         if len(tests) > 1:
             progress(f"calibrating on {problem.data[0].name}")
         problem.store = store
-        found.append(problem.team.lead(partial(_calibrated, problem, progress)))
-    return found
+        calibrations.append(problem.team.lead(partial(_calibrated, problem, progress)))
+    return calibrations
 
 
 def _calibrated(problem: LeastSquares, progress: Log) -> Calibration:
@@ -273,19 +274,21 @@ def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
     """Return the result in the unknowns' own units, with the limits of the data."""
     m, n = len(problem.unknowns), len(problem.observed)
     z, lines, weighted = result.x[:m], result.x[m:], np.asarray(result.jac)
-    free = np.array([not _at_bound(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
+    free = np.array([not _at_bound(scaled, part) for scaled, part in zip(problem.unknowns, z, strict=True)])
     freedom = n - len(result.x)
     noise = float(np.sqrt(2 * result.cost / freedom))
     scale = 1.0 if problem.has_sigma else noise
-    own = without_baselines(weighted, m)
-    covariance = _covariance(own, free, scale)
+    columns = without_baselines(weighted, m)
+    covariance = _covariance(columns, free, scale)
     factor = stats.norm.ppf(0.975) if problem.has_sigma else stats.t.ppf(0.975, freedom)
     errors = np.sqrt(np.diag(covariance))
-    keys = [one.unknown.key for one in problem.unknowns]
+    keys = [scaled.unknown.key for scaled in problem.unknowns]
     at_bound = [key for key, inside in zip(keys, free, strict=True) if not inside]
-    relative = own * np.array([_per_relative(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
+    relative = columns * np.array(
+        [_per_relative(scaled, part) for scaled, part in zip(problem.unknowns, z, strict=True)]
+    )
     not_known = not_determined([key for key in keys if key not in at_bound], relative[:, free] / scale)
-    own_units = np.array([1.0 if one.logarithmic else one.scale for one in problem.unknowns])
+    own_units = np.array([1.0 if scaled.logarithmic else scaled.scale for scaled in problem.unknowns])
     correlation = covariance / np.outer(errors, errors)
     traces = _traces(problem, problem.with_baselines(result.x), lines)
     remarks = [*_scatter_remarks(result, traces, free, errors), *known_together(keys, correlation, at_bound)]
@@ -299,7 +302,7 @@ def _calibration(problem: LeastSquares, result: OptimizeResult) -> Calibration:
         tuple(traces),
         noise,
         freedom,
-        tuple(not_known or hardly_known(keys, problem.data, own)),
+        tuple(not_known or hardly_known(keys, problem.data, columns)),
         tuple(remarks),
         tuple(at_bound),
         problem.evaluations,
@@ -343,59 +346,59 @@ def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask
     return remarks
 
 
-def _covariance(own: Array, free: Mask, scale: float) -> Array:
+def _covariance(columns: Array, free: Mask, scale: float) -> Array:
     """Return the covariance of the fitted unknowns (m, m); NaN of those at a bound, and where they are not known."""
-    m = own.shape[1]
+    m = columns.shape[1]
     covariance = np.full((m, m), np.nan)
-    lengths = np.linalg.norm(own[:, free], axis=0)
+    lengths = np.linalg.norm(columns[:, free], axis=0)
     if free.any() and (lengths > 0).all():
-        unit = own[:, free] / lengths
+        unit = columns[:, free] / lengths
         if np.linalg.cond(unit) < LARGEST_CONDITION:
             inner = np.linalg.inv(unit.T @ unit) / np.outer(lengths, lengths)
             covariance[np.ix_(free, free)] = inner * scale**2
     return covariance
 
 
-def _fitted(case: Case, one: ScaledUnknown, z: float, error: float, reach: float) -> Fitted:
+def _fitted(case: Case, scaled: ScaledUnknown, z: float, error: float, reach: float) -> Fitted:
     """Return an unknown in its own unit, whose interval reaches from z by `reach` and ends at the key's bounds."""
-    key, value = one.unknown.key, one.value(z)
+    key, value = scaled.unknown.key, scaled.value(z)
 
     def end(z: float) -> float:
-        reached = float(np.clip(one.value(z), one.unknown.low, one.unknown.high))
+        reached = float(np.clip(scaled.value(z), scaled.unknown.low, scaled.unknown.high))
         return nearest_possible(case, key, value, reached) if np.isfinite(reached) else reached
 
-    spread = float((value if one.logarithmic else one.scale) * error)
-    return Fitted(key, value, one.unit, spread, end(z - reach), end(z + reach), one.logarithmic)
+    spread = float((value if scaled.logarithmic else scaled.scale) * error)
+    return Fitted(key, value, scaled.unit, spread, end(z - reach), end(z + reach), scaled.logarithmic)
 
 
-def _at_bound(one: ScaledUnknown, z: float) -> bool:
-    ends = [one.fitted(bound) for bound in (one.unknown.low, one.unknown.high) if np.isfinite(bound)]
+def _at_bound(scaled: ScaledUnknown, z: float) -> bool:
+    ends = [scaled.fitted(bound) for bound in (scaled.unknown.low, scaled.unknown.high) if np.isfinite(bound)]
     return any(abs(z - end) < 1e-6 * max(1.0, abs(end)) for end in ends)
 
 
-def _per_relative(one: ScaledUnknown, z: float) -> float:
+def _per_relative(scaled: ScaledUnknown, z: float) -> float:
     """Return the change of the fitted unknown for a relative change of its value."""
-    return 1.0 if one.logarithmic else (abs(one.value(z)) or one.scale) / one.scale
+    return 1.0 if scaled.logarithmic else (abs(scaled.value(z)) or scaled.scale) / scaled.scale
 
 
 def _traces(problem: LeastSquares, predicted: Array, lines: Array) -> list[Trace]:
     """Return every series with its prediction, of all predictions (n,) with their baselines."""
-    found, begin = [], 0
-    names = [one.name for one in problem.data for _ in one.series]
+    traces, begin = [], 0
+    names = [data_set.name for data_set in problem.data for _ in data_set.series]
     for number, (name, series) in enumerate(zip(names, problem.series, strict=True)):
         rows = slice(begin, begin + len(series.values))
         begin = rows.stop
-        own = {
-            what: float(value) for (k, what), value in zip(problem.baseline_names, lines, strict=True) if k == number
+        baselines = {
+            term: float(value) for (k, term), value in zip(problem.baseline_names, lines, strict=True) if k == number
         }
-        found.append(Trace(name, series, predicted[rows], **own))
-    return found
+        traces.append(Trace(name, series, predicted[rows], **baselines))
+    return traces
 
 
 LEAST_TESTS = 3
 
 
-def between(found: Sequence[Calibration]) -> Scatter:
+def between(calibrations: Sequence[Calibration]) -> Scatter:
     """Return the distribution of the unknowns from test to test: what tests of the same kind differ by.
 
     Normal, or lognormal where they were fitted so, with mean and covariance of the tests' results.
@@ -403,31 +406,35 @@ def between(found: Sequence[Calibration]) -> Scatter:
     Raises:
         CaseError: fewer than three tests, not of the same unknowns, or their results do not differ.
     """
-    values, covariance, logarithmic = _between(found)
-    return Scatter.joint(list(found[0].values), [float(value) for value in values], covariance, logarithmic)
+    values, covariance, logarithmic = _between(calibrations)
+    return Scatter.joint(list(calibrations[0].values), [float(value) for value in values], covariance, logarithmic)
 
 
-def _between(found: Sequence[Calibration]) -> tuple[Array, Array, list[bool]]:
+def _between(calibrations: Sequence[Calibration]) -> tuple[Array, Array, list[bool]]:
     """Return middle values, covariance between tests, and which unknowns are taken by their logarithms."""
-    if len(found) < LEAST_TESTS:
-        raise CaseError(InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(found)}"))
-    if len({tuple(one.values) for one in found}) > 1:
+    if len(calibrations) < LEAST_TESTS:
+        raise CaseError(
+            InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(calibrations)}")
+        )
+    if len({tuple(calibration.values) for calibration in calibrations}) > 1:
         raise CaseError(InputError("--each", "expected the same unknowns in every calibration"))
-    logarithmic = [one.logarithmic for one in found[0].fitted]
-    table = np.array([[np.log(u.value) if u.logarithmic else u.value for u in one.fitted] for one in found])
+    logarithmic = [fitted.logarithmic for fitted in calibrations[0].fitted]
+    table = np.array(
+        [[np.log(u.value) if u.logarithmic else u.value for u in calibration.fitted] for calibration in calibrations]
+    )
     covariance = np.atleast_2d(np.cov(table.T))
-    if not (np.diag(covariance) > 0).all() or len(found) <= table.shape[1]:
+    if not (np.diag(covariance) > 0).all() or len(calibrations) <= table.shape[1]:
         raise CaseError(InputError("--each", "expected more tests than unknowns, and results that differ"))
     middle = table.mean(axis=0)
     return np.where(logarithmic, np.exp(middle), middle), covariance, logarithmic
 
 
-def between_as_json(found: Sequence[Calibration]) -> dict[str, Any]:
+def between_as_json(calibrations: Sequence[Calibration]) -> dict[str, Any]:
     """Return the scatter between tests in the form of a calibration's result."""
-    values, covariance, logarithmic = _between(found)
+    values, covariance, logarithmic = _between(calibrations)
     rows = [
-        {"key": one.key, "value": float(value), "unit": one.unit, "logarithmic": by_log}
-        for one, value, by_log in zip(found[0].fitted, values, logarithmic, strict=True)
+        {"key": fitted.key, "value": float(value), "unit": fitted.unit, "logarithmic": by_log}
+        for fitted, value, by_log in zip(calibrations[0].fitted, values, logarithmic, strict=True)
     ]
-    lines = list(dict.fromkeys(line for one in found for line in one.not_known))
+    lines = list(dict.fromkeys(line for calibration in calibrations for line in calibration.not_known))
     return {"unknowns": rows, "covariance": covariance.tolist(), "not_known": lines}

@@ -32,10 +32,10 @@ APART = 0.995  # correlation, of data of one condition, from which two unknowns 
 
 def without_baselines(weighted: Array, m: int) -> Array:
     """Return the unknowns' columns less what offsets and tilts can take over."""
-    own, lines = weighted[:, :m], weighted[:, m:]
+    columns, lines = weighted[:, :m], weighted[:, m:]
     if not lines.shape[1]:
-        return own
-    return own - lines @ np.linalg.lstsq(lines, own, rcond=None)[0]
+        return columns
+    return columns - lines @ np.linalg.lstsq(lines, columns, rcond=None)[0]
 
 
 def not_determined(keys: Sequence[str], relative: Array) -> list[str]:
@@ -57,15 +57,15 @@ def not_determined(keys: Sequence[str], relative: Array) -> list[str]:
     return lines
 
 
-def hardly_known(keys: Sequence[str], data: Sequence[DataSet], own: Array) -> list[str]:
+def hardly_known(keys: Sequence[str], data: Sequence[DataSet], columns: Array) -> list[str]:
     """Return the pairs that the data of one condition can hardly separate.
 
     By all columns of the Jacobian, also those of unknowns at a bound: a pair that wanders there is one.
     """
-    lengths = np.linalg.norm(own, axis=0)
-    if len({one.settings for one in data}) > 1 or not (lengths > 0).all():
+    lengths = np.linalg.norm(columns, axis=0)
+    if len({data_set.settings for data_set in data}) > 1 or not (lengths > 0).all():
         return []
-    unit = own / lengths
+    unit = columns / lengths
     inverse = np.linalg.pinv(unit.T @ unit, rcond=1e-15, hermitian=True)
     errors = np.sqrt(np.diag(inverse))
     correlation = inverse / np.outer(errors, errors)
@@ -131,7 +131,7 @@ class LeastSquares:
         self._tell = now_and_then(progress)
         self.model = Model(case)
         self.data = list(data)
-        self.series = [series for one in data for series in one.series]
+        self.series = [series for data_set in data for series in data_set.series]
         self.unknowns = [scaled(case, unknown) for unknown in unknowns]
         self.baseline = tuple(baseline)
         self._check(unknowns)
@@ -168,20 +168,22 @@ class LeastSquares:
                 problems.append(InputError("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
         if self.baseline and not any(series.is_profile for series in self.series):
             problems.append(InputError("--baseline", "works with profiles only, and the data hold none. Leave it out"))
-        for one in self.data:
-            for setting in one.settings:
+        for data_set in self.data:
+            for setting in data_set.settings:
                 key = setting.partition("=")[0]
                 if key in keys:
                     problems.append(
                         InputError(
-                            f"{one.name}: # set {key}",
+                            f"{data_set.name}: # set {key}",
                             "is an unknown of the calibration, too. Remove this line or --unknown",
                         )
                     )
         kinds = {series.quantity for series in self.series}
         given = {series.has_sigma for series in self.series}
         if len(given) > 1 or (len(kinds) > 1 and given == {False}):
-            names = ", ".join(dict.fromkeys(one.name for one in self.data if not all(s.has_sigma for s in one.series)))
+            names = ", ".join(
+                dict.fromkeys(without.name for without in self.data if not all(s.has_sigma for s in without.series))
+            )
             text = "gives no sigma; expected the standard deviation of every measurement where "
             problems.append(InputError(names, text + f"{' and '.join(sorted(kinds))} are fitted together"))
         if problems:
@@ -227,7 +229,7 @@ class LeastSquares:
 
     def values(self, z: Vector) -> dict[str, float]:
         """Return the keys' values of fitted unknowns."""
-        return {one.unknown.key: one.value(part) for one, part in zip(self.unknowns, z, strict=True)}
+        return {scaled.unknown.key: scaled.value(part) for scaled, part in zip(self.unknowns, z, strict=True)}
 
     def predicted(self, z: Vector, *, strict: bool = False) -> Array:
         """Return the predictions without baselines (n,); `strict` as of `Predictor`."""
@@ -238,7 +240,10 @@ class LeastSquares:
         """Return the predictions (n,) without baselines at fitted unknowns; collective, a run for each condition."""
         conditions = list(self.predict.conditions)
         runs = [
-            [Run((self.values(z), one), named(self.key, self._jumps, z.tobytes(), one), str(z)) for one in conditions]
+            [
+                Run((self.values(z), condition), named(self.key, self._jumps, z.tobytes(), condition), str(z))
+                for condition in conditions
+            ]
             for z in points
         ]
         before = self.store.computed
@@ -252,13 +257,13 @@ class LeastSquares:
         if trouble:
             return Outcome({}, trouble)
         of = dict(zip(self.predict.conditions, (part.values["prediction"] for part in parts), strict=True))
-        found, begin = [], dict.fromkeys(of, 0)
-        for one in self.data:
-            for series in one.series:
-                end = begin[one.settings] + len(series.values)
-                found.append(of[one.settings][begin[one.settings] : end])
-                begin[one.settings] = end
-        return Outcome({"prediction": np.concatenate(found)})
+        predictions, begin = [], dict.fromkeys(of, 0)
+        for data_set in self.data:
+            for series in data_set.series:
+                end = begin[data_set.settings] + len(series.values)
+                predictions.append(of[data_set.settings][begin[data_set.settings] : end])
+                begin[data_set.settings] = end
+        return Outcome({"prediction": np.concatenate(predictions)})
 
     def _tried(self, z: Array) -> Array:
         """Return the predictions of a trial (n,); far too large where the model rejects it, so that it is not kept.
@@ -266,12 +271,12 @@ class LeastSquares:
         Raises:
             ConvergenceError: it is the first one on its jumps.
         """
-        (found,) = self.team.each(self, "shared_predictions", [z])
-        if not found.trouble:
+        (outcome,) = self.team.each(self, "shared_predictions", [z])
+        if not outcome.trouble:
             self._computed = True
-            return np.asarray(found.values["prediction"])
+            return np.asarray(outcome.values["prediction"])
         if not self._computed:
-            raise ConvergenceError(found.trouble)
+            raise ConvergenceError(outcome.trouble)
         return self.observed + REFUSED * (np.abs(self.observed) + self.sigma)
 
     def jacobian(self, z: Vector, *, central: bool = False) -> Array:
@@ -287,11 +292,13 @@ class LeastSquares:
         at = np.array(z, dtype=float)
         here = self._tried(at)
         steps = np.vstack([side * STEP * np.eye(len(at)) for side in ((1, -1) if central else (1,))])
-        found = self.team.each(self, "shared_predictions", list(at + steps))
-        for one in found:
-            if one.trouble:
-                raise ConvergenceError(one.trouble)
-        columns = [(one.values["prediction"] - here) / step.sum() for one, step in zip(found, steps, strict=True)]
+        outcomes = self.team.each(self, "shared_predictions", list(at + steps))
+        for outcome in outcomes:
+            if outcome.trouble:
+                raise ConvergenceError(outcome.trouble)
+        columns = [
+            (trial.values["prediction"] - here) / step.sum() for trial, step in zip(outcomes, steps, strict=True)
+        ]
         return np.asarray(np.reshape(columns, (-1, *np.shape(columns[: len(at)]))).mean(axis=0).T)
 
     def check_influence(self, jacobian: Array, z: Vector) -> None:
@@ -302,8 +309,8 @@ class LeastSquares:
         """
         scale = float(np.abs(self._tried(np.asarray(z, dtype=float))).max()) or 1.0
         problems = [
-            InputError(f"--unknown {one.unknown.key}", "has no influence on the measured values")
-            for one, column in zip(self.unknowns, jacobian.T, strict=True)
+            InputError(f"--unknown {scaled.unknown.key}", "has no influence on the measured values")
+            for scaled, column in zip(self.unknowns, jacobian.T, strict=True)
             if np.abs(column).max() <= NO_INFLUENCE * scale
         ]
         if problems:
@@ -317,13 +324,13 @@ class LeastSquares:
         jacobian = self.jacobian(np.zeros(len(self.unknowns)) if z is None else z)
         weighted = self.whitened(np.hstack([jacobian, self._lines]))
         return hardly_known(
-            [one.unknown.key for one in self.unknowns], self.data, without_baselines(weighted, len(self.unknowns))
+            [scaled.unknown.key for scaled in self.unknowns], self.data, without_baselines(weighted, len(self.unknowns))
         )
 
     def whitened(self, values: Array) -> Array:
         """Return residuals, or columns of their Jacobian (n, ...), as those of independent errors."""
         rows = np.split(values, np.cumsum([len(series.values) for series in self.series])[:-1])
-        return np.concatenate([series.whitened(own) for series, own in zip(self.series, rows, strict=True)])
+        return np.concatenate([series.whitened(part) for series, part in zip(self.series, rows, strict=True)])
 
     def approach(self, start: Array) -> Array:
         """Return fitted unknowns near those of the fit (m,), from any start within the bounds; collective.
@@ -350,23 +357,23 @@ class LeastSquares:
                 at = z.copy()
             return slope
 
-        found = least_squares(
+        solution = least_squares(
             residual,
             at,
             derivative,
             (low, high),
-            x_scale=np.where([one.logarithmic for one in self.unknowns], FAR, 1.0),
+            x_scale=np.where([scaled.logarithmic for scaled in self.unknowns], FAR, 1.0),
             xtol=NEAR,
             ftol=NEAR,
             max_nfev=MOST_TRIALS,
         )
-        return np.asarray(found.x)
+        return np.asarray(solution.x)
 
     def _ends(self) -> Array:
         """Return the bounds of the fitted unknowns (2, m)."""
         ends = [
-            [one.fitted(b) if np.isfinite(b) else b for b in (one.unknown.low, one.unknown.high)]
-            for one in self.unknowns
+            [scaled.fitted(b) if np.isfinite(b) else b for b in (scaled.unknown.low, scaled.unknown.high)]
+            for scaled in self.unknowns
         ]
         return np.array(ends).T
 
@@ -387,10 +394,10 @@ class LeastSquares:
             return self.whitened(np.hstack([self.jacobian(both[:m]), self._lines]))
 
         def residual(both: Array) -> Array:
-            found = self.whitened(self.with_baselines(both) - self.observed)
-            size = np.sqrt(np.mean(found**2))
+            residuals = self.whitened(self.with_baselines(both) - self.observed)
+            size = np.sqrt(np.mean(residuals**2))
             self._tell(f"{self.evaluations:,} runs so far: root mean square of the residuals {size:.3g} sigma")
-            return found
+            return residuals
 
         result = least_squares(
             residual, begin, derivative, (low, high), x_scale=self._reach, xtol=settled, ftol=FLAT, max_nfev=MOST_TRIALS

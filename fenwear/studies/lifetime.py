@@ -64,15 +64,19 @@ class Lives:
     def as_json(self) -> dict[str, Any]:
         """Return the object that --json prints and life.json holds."""
         rows = zip(self.quantities, self.values, strict=True)
-        lives = [{"quantity": one.text, "unit": one.unit or "cycles", "value": value} for one, value in rows]
+        lives = [
+            {"quantity": quantity.text, "unit": quantity.unit or "cycles", "value": value} for quantity, value in rows
+        ]
         return {"lives": finite(lives)}
 
     def text(self) -> str:
         """Return a line for each."""
         rows = zip(self.quantities, self.values, strict=True)
         return "\n".join(
-            f"{one.text}: {value:.6g} {one.unit or 'cycles'}" if np.isfinite(value) else f"{one.text}: {UNREACHED}"
-            for one, value in rows
+            f"{quantity.text}: {value:.6g} {quantity.unit or 'cycles'}"
+            if np.isfinite(value)
+            else f"{quantity.text}: {UNREACHED}"
+            for quantity, value in rows
         )
 
 
@@ -108,7 +112,7 @@ class Lifetime:
     @property
     def first_share(self) -> list[float]:
         """Of each level, in which share of the parts that reach any it is reached first."""
-        lives = np.array([one.lives for one in self.each]).reshape(len(self.each), len(self.lives))
+        lives = np.array([level.lives for level in self.each]).reshape(len(self.each), len(self.lives))
         ended = lives[:, np.isfinite(lives).any(axis=0)]
         first = (ended == ended.min(axis=0, initial=np.inf)).sum(axis=1)
         return [float(count) / max(ended.shape[1], 1) for count in first]
@@ -121,22 +125,22 @@ class Lifetime:
     def as_json(self) -> dict[str, Any]:
         """Return the object that --json prints and life.json holds."""
 
-        def row(one: Estimate, name: str) -> dict[str, Any]:
-            return {name: one.level, "value": one.value, "interval_95": [one.low, one.high]}
+        def row(estimate: Estimate, name: str) -> dict[str, Any]:
+            return {name: estimate.level, "value": estimate.value, "interval_95": [estimate.low, estimate.high]}
 
-        each = [{**one.as_json(), "first": share} for one, share in zip(self.each, self.first_share, strict=True)]
-        found = {
+        each = [{**level.as_json(), "first": share} for level, share in zip(self.each, self.first_share, strict=True)]
+        table = {
             "quantity": self.quantity,
             "unit": self.counted_in,
             "samples": len(self.lives),
             "failed": len(self.failures),
             "never_reached": int(np.isinf(self.lives).sum()),
-            "quantiles": [row(one, "level") for one in self.quantiles],
+            "quantiles": [row(estimate, "level") for estimate in self.quantiles],
             "reliability": None if self.reliability is None else row(self.reliability, "wanted"),
             "seed": self.seed,
             **({"each": each} if each else {}),
         }
-        return dict(finite(found))
+        return dict(finite(table))
 
     def text(self) -> str:
         """Return a table for people."""
@@ -148,13 +152,17 @@ class Lifetime:
             lines.append(f"  {np.isinf(self.lives).sum()} of them: {UNREACHED}")
         heading = f"life ({unit})" if unit else "life"
         lines.append(f"  {'share that fails before':24} {heading:>13} {'95 % interval':>27}")
-        lines += [f"  {one.level:24.0%} {one.value:13.5g} {_end(one.low)} {_end(one.high)}" for one in self.quantiles]
-        if any(_end(end).endswith("-") for one in self.quantiles for end in (one.low, one.high)):
+        lines += [
+            f"  {estimate.level:24.0%} {estimate.value:13.5g} {_end(estimate.low)} {_end(estimate.high)}"
+            for estimate in self.quantiles
+        ]
+        if any(_end(end).endswith("-") for estimate in self.quantiles for end in (estimate.low, estimate.high)):
             lines.append("  - too few samples to give this end")
         if self.reliability is not None:
-            one = self.reliability
+            reliability = self.reliability
             lines.append(
-                f"  a share of {one.value:.4f} ({one.low:.4f} to {one.high:.4f}) lives for {one.level:.6g} {unit}"
+                f"  a share of {reliability.value:.4f} ({reliability.low:.4f} to {reliability.high:.4f}) lives "
+                f"for {reliability.level:.6g} {unit}"
             )
         if self.each:
             lines.append(
@@ -242,27 +250,27 @@ def lifetime(
     design = on_root(study.comm, lambda: scatter.sample(samples, seed))
     model = Model(case)
     quantities = on_root(study.comm, lambda: _of_contacts(model, asked))
-    names = [one.text for one in quantities]
+    names = [quantity.text for quantity in quantities]
     store = study.open(case, named(case_text(case), scatter.keys, names, limit, seed))
     runs = [Run(row, named(row.tobytes()), f"sample {k + 1}") for k, row in enumerate(design)]
     done = study.outcomes(_Samples(model, quantities, scatter.keys, limit), runs, store, progress)
     outcomes = [done[run.name] for run in runs]
     unknown = np.full(len(quantities), np.nan)
-    lives = np.array([one.values.get("lives", unknown) for one in outcomes])
-    failures = {k: one.trouble for k, one in enumerate(outcomes) if one.trouble}
+    lives = np.array([outcome.values.get("lives", unknown) for outcome in outcomes])
+    failures = {k: outcome.trouble for k, outcome in enumerate(outcomes) if outcome.trouble}
     if (folder := study.folder) is not None:
         heading = ["sample", *scatter.keys, *names, "trouble"]
         table = [[k, *map(float, (*design[k], *lives[k])), failures.get(k, "")] for k in range(samples)]
         on_root(study.comm, lambda: write_text(folder / SAMPLES, csv_text(heading, table)))
 
-    def summary(one: Quantity, own: Array, level: float | None) -> Lifetime:
-        return _summary(one, scatter.keys, design, own, failures, level, seed)
+    def summary(quantity: Quantity, level_lives: Array, level: float | None) -> Lifetime:
+        return _summary(quantity, scatter.keys, design, level_lives, failures, level, seed)
 
-    whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
-    found = summary(whole, lives.min(axis=1), wanted)
-    further = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one != asked[0]]
-    each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in further)
-    return replace(found, each=each)
+    first_level = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
+    life = summary(first_level, lives.min(axis=1), wanted)
+    further = [(k, quantity) for k, quantity in enumerate(quantities) if len(asked) > 1 or quantity != asked[0]]
+    each = tuple(summary(quantity, np.asarray(lives[:, k]), None) for k, quantity in further)
+    return replace(life, each=each)
 
 
 @dataclass(frozen=True)
@@ -286,15 +294,15 @@ def _asked(case: Case, until: Sequence[str | Quantity]) -> list[Quantity]:
     Raises:
         CaseError: one is none, or makes no sense; or they are not counted alike.
     """
-    found = [parse_quantity(one, "--until", case.names) if isinstance(one, str) else one for one in until]
-    for quantity in found:
+    levels = [parse_quantity(level, "--until", case.names) if isinstance(level, str) else level for level in until]
+    for quantity in levels:
         if quantity.kind != "life":
             message = f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}"
             raise CaseError(InputError("--until", message))
         of_case(quantity, case, "--until")
-    if not found or len({one.life for one in found}) > 1:
+    if not levels or len({level.life for level in levels}) > 1:
         raise CaseError(InputError("--until", "expected levels that are all counted in cycles, distance or time"))
-    return found
+    return levels
 
 
 def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
@@ -305,16 +313,16 @@ def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
     """
     pair = model.system().pair
     surfaces = {"punch": pair.punch, "strip": pair.strip}
-    for one in asked:
-        names = [name for name in pair.punch.names if name in surfaces[one.body].names]
-        if one.contact and one.contact not in names:
-            known = f"known are {', '.join(names)}" if names else f"contacts of the {one.body} have no names"
-            raise CaseError(InputError("--until", f"{one.text!r}: no contact is called {one.contact!r}; {known}"))
-    whole = asked[0]
-    names = [name for name in pair.punch.names if name in surfaces[whole.body].names]
-    if len(asked) > 1 or whole.contact or whole.at is not None or len(names) < 2:
+    for level in asked:
+        names = [name for name in pair.punch.names if name in surfaces[level.body].names]
+        if level.contact and level.contact not in names:
+            known = f"known are {', '.join(names)}" if names else f"contacts of the {level.body} have no names"
+            raise CaseError(InputError("--until", f"{level.text!r}: no contact is called {level.contact!r}; {known}"))
+    single = asked[0]
+    names = [name for name in pair.punch.names if name in surfaces[single.body].names]
+    if len(asked) > 1 or single.contact or single.at is not None or len(names) < 2:
         return list(asked)
-    return [whole, *(whole.within(name) for name in names)]
+    return [single, *(single.within(name) for name in names)]
 
 
 def _summary(

@@ -119,8 +119,8 @@ def in_order(x: Array) -> tuple[NDArray[np.int64], Array]:
 
 def neighbours_ratio(residual: Sequence[float] | Array) -> float:
     """Return von Neumann's ratio: 2 for independent residuals, near 0 for those like their neighbours."""
-    found = np.asarray(residual)
-    return float((np.diff(found) ** 2).sum() / max(float(found @ found), 1e-300))
+    residuals = np.asarray(residual)
+    return float((np.diff(residuals) ** 2).sum() / max(float(residuals @ residuals), 1e-300))
 
 
 # Words for what is measured, and the registry's names of it; a column may have any name of the registry, too.
@@ -288,12 +288,12 @@ class _Reader:
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", unit_of(quantity), body)
             of_case(wanted, case, str(self.path))
             x = self._column("x", "mm") if "x" in names else None
-            whole = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity))
+            of_file = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity))
             if x is not None:
-                series += self._profiles(whole, x)
+                series += self._profiles(of_file, x)
             else:
                 self._check_rising(after, strictly=True)
-                series.append(whole)
+                series.append(of_file)
         return DataSet(self.path.name, tuple(self.settings), tuple(series), self.table.listing())
 
     def _column(self, name: str, unit: str, *, as_written: bool = False) -> Array:
@@ -358,8 +358,8 @@ class _Reader:
         if given:
             raise self._fail("# after", "given together with a column after; expected one of them")
         unit = self.table.heads[self.table.names.index("after")].unit
-        one, counted = self._amount(f"1 {unit}".strip(), "column 'after'")
-        values = one * self._column("after", "", as_written=True)
+        per_unit, counted = self._amount(f"1 {unit}".strip(), "column 'after'")
+        values = per_unit * self._column("after", "", as_written=True)
         self._check(values >= 0, "after", "expected more than zero: nothing has worn before")
         self._check_rising(values, strictly=False)
         return values, counted
@@ -416,17 +416,24 @@ class _Reader:
             raise self._fail("# scatter", str(error)) from None
         return noise
 
-    def _profiles(self, whole: Series, x: Array) -> list[Series]:
+    def _profiles(self, measured: Series, x: Array) -> list[Series]:
         """Return one series for each time."""
-        found = []
-        for amount in np.unique(whole.after):
-            own = np.flatnonzero(whole.after == amount)
-            if len(own) < LEAST_ROWS:
-                raise self._fail(f"row {whole.rows[int(own[0])]}", f"expected at least {LEAST_ROWS} rows of a profile, "
-                                 f"got {len(own)}")  # fmt: skip
-            sigma = None if whole.sigma is None else whole.sigma[own]
-            rows = tuple(whole.rows[int(k)] for k in own)
-            found.append(
-                replace(whole, x=x[own], after=whole.after[own], values=whole.values[own], sigma=sigma, rows=rows)
+        profiles = []
+        for amount in np.unique(measured.after):
+            at_time = np.flatnonzero(measured.after == amount)
+            if len(at_time) < LEAST_ROWS:
+                message = f"expected at least {LEAST_ROWS} rows of a profile, got {len(at_time)}"
+                raise self._fail(f"row {measured.rows[int(at_time[0])]}", message)
+            sigma = None if measured.sigma is None else measured.sigma[at_time]
+            rows = tuple(measured.rows[int(k)] for k in at_time)
+            profiles.append(
+                replace(
+                    measured,
+                    x=x[at_time],
+                    after=measured.after[at_time],
+                    values=measured.values[at_time],
+                    sigma=sigma,
+                    rows=rows,
+                )
             )
-        return found
+        return profiles

@@ -64,8 +64,8 @@ class Course:
     @classmethod
     def of(cls, snapshots: Sequence[Snapshot]) -> Course:
         """Return the course of a run of these snapshots."""
-        made = {half_cycle: renewal for one in snapshots for half_cycle, renewal in one.renewals}
-        return cls(tuple(int(one.cycle) for one in snapshots), made)
+        made = {half_cycle: renewal for snapshot in snapshots for half_cycle, renewal in snapshot.renewals}
+        return cls(tuple(int(snapshot.cycle) for snapshot in snapshots), made)
 
 
 FREE = Course()  # of a run that finds its own
@@ -279,8 +279,8 @@ class Model:
         system = self._sliding("run_in", values, settings)
         self.evaluations += 1
         state = steady(system)
-        found = running_in(state.system, state, NEAR_THE_END, jumps=FINE_JUMPS, ends=course.ends)
-        return (np.inf, FREE) if found is None else (found.cycles, Course(found.ends))
+        running = running_in(state.system, state, NEAR_THE_END, jumps=FINE_JUMPS, ends=course.ends)
+        return (np.inf, FREE) if running is None else (running.cycles, Course(running.ends))
 
     def critical_speed(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
         """Return the speed above which full contact is thermo-elastically unstable in either direction, mm/s.
@@ -359,29 +359,29 @@ class Snapshot:
             known = f"known are {names}" if names else "the contacts have no names"
             raise CaseError(InputError(asked, f"no contact is called {contact!r}; {known}"))
         masks = [
-            one.nodes_of(contact) if contact in one.names else np.zeros(len(one.weights), dtype=bool)
-            for one in (pair.punch, pair.strip)
+            surface.nodes_of(contact) if contact in surface.names else np.zeros(len(surface.weights), dtype=bool)
+            for surface in (pair.punch, pair.strip)
         ]
         depths = zip(masks, (self.rate.punch, self.rate.strip), strict=True)
-        rate = WornDepths(*(np.where(own, depth, 0.0) for own, depth in depths))
+        rate = WornDepths(*(np.where(nodes, depth, 0.0) for nodes, depth in depths))
         return replace(self, end=within(self.end, contact, self.rate), rate=rate)
 
     def at_cycle(self, cycle: float) -> Snapshot:
         """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""
         if not isinstance(self.end, Block) or cycle == self.cycle:
             return replace(self, cycle=cycle)
-        end, more = self.end, cycle - self.cycle
-        totals = end.totals + cycle_of(end).times(more)
-        wear, wear_strip = end.wear + more * self.rate.punch, end.wear_strip + more * self.rate.strip
+        end, ahead = self.end, cycle - self.cycle
+        totals = end.totals + cycle_of(end).times(ahead)
+        wear, wear_strip = end.wear + ahead * self.rate.punch, end.wear_strip + ahead * self.rate.strip
         return replace(self, cycle=cycle, end=replace(end, wear=wear, wear_strip=wear_strip, totals=totals))
 
 
 def edge_moved(run: Sequence[Snapshot]) -> bool:
     """Return whether an edge of contact or scar has moved within the mesh in a run, be it there and back."""
-    ends = [one.end for one in run if isinstance(one.end, Block)]
+    ends = [snapshot.end for snapshot in run if isinstance(snapshot.end, Block)]
     if len({end.pressure.shape[1] for end in ends}) > 1:  # a grid has grown with the scar
         return True
-    masks = [np.array([(one.phase_pressure > 0).any(axis=0) for one in run])]
+    masks = [np.array([(snapshot.phase_pressure > 0).any(axis=0) for snapshot in run])]
     masks += [np.array([getattr(end, body)[-1] > 0 for end in ends]) for body in ("wear", "wear_strip") if ends]
     return any(bool((mask != mask[0]).any()) for mask in masks)
 
@@ -398,8 +398,8 @@ def snapshot_of(block: Block) -> Snapshot:
     strokes = system.motion.half_cycles
     if block.steps:
         steps: tuple[Any, ...] = block.steps[-strokes:]
-        rate = reduce(WornDepths.__add__, [one.wear for one in steps])
-        pressure = np.concatenate([one.records.pressure for one in steps])
+        rate = reduce(WornDepths.__add__, [stroke.wear for stroke in steps])
+        pressure = np.concatenate([stroke.records.pressure for stroke in steps])
     else:
         pressure, heat = pressure if len(pressure) else block.pressure, block.heat
         latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])

@@ -28,8 +28,8 @@ class Predictor:
     def __init__(self, model: Model, data: Sequence[DataSet]) -> None:
         self.model, self.data = model, list(data)
         self.conditions: dict[tuple[str, ...], list[Series]] = {}
-        for one in self.data:
-            self.conditions.setdefault(one.settings, []).extend(one.series)
+        for data_set in self.data:
+            self.conditions.setdefault(data_set.settings, []).extend(data_set.series)
         self._courses: dict[tuple[str, ...], Course] = {}
 
     def keep_jumps(self, values: Mapping[str, float]) -> bool:
@@ -48,8 +48,8 @@ class Predictor:
         Raises:
             CaseError: a scar has outgrown the contact surface.
         """
-        found = {settings: iter(self._predicted(values, settings, strict=strict)) for settings in self.conditions}
-        return [next(found[one.settings]) for one in self.data for _ in one.series]
+        predictions = {settings: iter(self._predicted(values, settings, strict=strict)) for settings in self.conditions}
+        return [next(predictions[data_set.settings]) for data_set in self.data for _ in data_set.series]
 
     def compute(self, given: tuple[Mapping[str, float], tuple[str, ...]]) -> Values:
         """Return the predictions of all series under one condition (k,), for values of the keys and its overrides."""
@@ -61,7 +61,9 @@ class Predictor:
 
     def _run(self, values: Mapping[str, float], settings: tuple[str, ...]) -> list[Snapshot]:
         measures = self.model.cycle_measures(values, settings)
-        amounts = {(float(after), one.counted) for one in self.conditions[settings] for after in np.unique(one.after)}
+        amounts = {
+            (float(after), series.counted) for series in self.conditions[settings] for after in np.unique(series.after)
+        }
         stops = sorted({max(1, round(cycles_of(amount, *measures))) for amount in amounts})
         course = self._courses.get(settings, FREE)
         return list(self.model.run(values, course.last(stops[-1]), settings=settings, stops=stops, course=course))
@@ -75,11 +77,11 @@ def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[floa
     for amount in np.unique(series.after):
         cycles = cycles_of((float(amount), series.counted), *measures)
         snapshot = snapshots[int(np.argmin(np.abs(ends - cycles)))].at_cycle(cycles)
-        own = series.after == amount
+        rows = series.after == amount
         if series.is_profile:
-            predicted[own] = _profile(series, snapshot, series.places[own], strict=strict)
+            predicted[rows] = _profile(series, snapshot, series.places[rows], strict=strict)
         else:
-            predicted[own] = quantity.of_snapshot(snapshot)
+            predicted[rows] = quantity.of_snapshot(snapshot)
     return predicted
 
 
@@ -92,8 +94,8 @@ def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> A
     surface: ContactSurface = getattr(snapshot.end.system.pair, series.body)
     depth: Array = getattr(snapshot.end, "wear_strip" if series.body == "strip" else "wear")[-1]
     places = padded(x[:, None], surface.dim - 1)
-    found = at_places(surface, depth, places)
-    beyond = np.isnan(found)
+    depths = at_places(surface, depth, places)
+    beyond = np.isnan(depths)
     if strict and beyond.any():
         nodes = surface.abscissa[:, None] if surface.dim == 2 else surface.x[:, :2]
         ends = np.flatnonzero(rim(surface))
@@ -107,4 +109,4 @@ def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> A
                     f"measured profile spans x = {x.min():g} to {x.max():g} mm. Expected a wider contact surface",
                 )
             )
-    return np.where(beyond, 0.0, found)
+    return np.where(beyond, 0.0, depths)

@@ -121,21 +121,25 @@ class Quantity:
         Raises:
             CaseError: the snapshot does not know it.
         """
-        own = self._own(snapshot)
+        of_contact = self._of_contact(snapshot)
         if self.name.startswith("lambda_"):
-            return self._velocity(own)
+            return self._velocity(of_contact)
         if self.body == BOTH:
-            return self._of_both(own)
-        known = registry.quantities_of(own.end.system)
+            return self._of_both(of_contact)
+        known = registry.quantities_of(of_contact.end.system)
         if self.name == APPROACH:
-            moved = [self._registered(known, "moved_z", own), *filter(None, [known.get("moved_z_strip")])]
-            return float(sum(sign * one.of_cycle(own.end) for sign, one in zip((-1, 1), moved, strict=False)))
+            moved = [self._registered(known, "moved_z", of_contact), *filter(None, [known.get("moved_z_strip")])]
+            return float(
+                sum(sign * entry.of_cycle(of_contact.end) for sign, entry in zip((-1, 1), moved, strict=False))
+            )
         if self.at is None:
-            return float(self._registered(known, self.name + self.of_strip, own).of_cycle(own.end))
+            return float(self._registered(known, self.name + self.of_strip, of_contact).of_cycle(of_contact.end))
         fields = WARMER if self.name == "temperature" else (self.name + self.of_strip,)
-        found = [self._registered(known, name, own) for name in fields]
-        on_strip = found[0].dims[-1].endswith("_strip")
-        return self._at_place(own, np.max([one.of_cycle(own.end) for one in found], axis=0), on_strip=on_strip)
+        entries = [self._registered(known, name, of_contact) for name in fields]
+        on_strip = entries[0].dims[-1].endswith("_strip")
+        return self._at_place(
+            of_contact, np.max([entry.of_cycle(of_contact.end) for entry in entries], axis=0), on_strip=on_strip
+        )
 
     def _of_both(self, snapshot: Snapshot) -> float:
         """Return the volume worn off both bodies, or the depth that is worn off both between them."""
@@ -153,14 +157,14 @@ class Quantity:
         """
         pair, places = snapshot.end.system.pair, np.array([self.at])
         surface = pair.strip if on_strip else pair.punch
-        own = surface.nodes_of(self.contact) if self.contact else None
-        found = at_places(surface, values, padded(places, surface.dim - 1), own)
-        if np.isnan(found).any():
-            x = surface.abscissa if own is None else surface.abscissa[own]
-            place = ", ".join(f"{one:g}" for one in places[0])
+        nodes = surface.nodes_of(self.contact) if self.contact else None
+        at_place = at_places(surface, values, padded(places, surface.dim - 1), nodes)
+        if np.isnan(at_place).any():
+            x = surface.abscissa if nodes is None else surface.abscissa[nodes]
+            place = ", ".join(f"{coordinate:g}" for coordinate in places[0])
             message = f"{place} mm is not on the contact, which goes from {x.min():g} to {x.max():g} mm"
             raise CaseError(InputError(self.text, message))
-        return float(found[0])
+        return float(at_place[0])
 
     def _registered(self, known: Mapping[str, Registered], name: str, snapshot: Snapshot) -> Registered:
         """Return the quantity of the registry.
@@ -168,15 +172,15 @@ class Quantity:
         Raises:
             CaseError: this system has none of the name, or not in a steady state, or not of one contact.
         """
-        found = known.get(name)
-        if found is None:
-            names = ", ".join(one.name for one in known.values() if one.dims == RECORD)
+        entry = known.get(name)
+        if entry is None:
+            names = ", ".join(known_entry.name for known_entry in known.values() if known_entry.dims == RECORD)
             raise CaseError(InputError(self.text, f"this case has no {name}; expected one of {names}"))
-        if np.isinf(snapshot.cycle) and not found.steady:
+        if np.isinf(snapshot.cycle) and not entry.steady:
             raise CaseError(InputError(self.text, f"a steady state has no {name}: it is of a run"))
-        if self.contact and not found.nodal:
+        if self.contact and not entry.nodal:
             raise CaseError(InputError(self.text, f"{name} is of all contacts together; leave out 'in {self.contact}'"))
-        return found
+        return entry
 
     def _velocity(self, snapshot: Snapshot) -> float:
         if self.name not in snapshot.velocity:
@@ -186,29 +190,29 @@ class Quantity:
 
     def rate(self, snapshot: Snapshot) -> float:
         """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
-        own = self._own(snapshot)
+        of_contact = self._of_contact(snapshot)
         if self.body == BOTH or self.name == APPROACH:
             return float("nan")
-        depth: Array = getattr(own.rate, self.body)
+        depth: Array = getattr(of_contact.rate, self.body)
         if self.name == "worn_volume":
-            return float(cycle_of(own.end).of(f"volume_{self.body}"))
+            return float(cycle_of(of_contact.end).of(f"volume_{self.body}"))
         if self.at is not None:
-            return self._at_place(own, depth, on_strip=self.body == "strip")
+            return self._at_place(of_contact, depth, on_strip=self.body == "strip")
         if self.name == "largest_depth":
-            return float(depth[int(getattr(own.end, f"wear{self.of_strip}")[-1].argmax())])
+            return float(depth[int(getattr(of_contact.end, f"wear{self.of_strip}")[-1].argmax())])
         return float("nan")
 
-    def _own(self, snapshot: Snapshot) -> Snapshot:
+    def _of_contact(self, snapshot: Snapshot) -> Snapshot:
         """Return the snapshot of its contact.
 
         Raises:
             CaseError: there is none, or its body's surface has none of this name.
         """
-        own = snapshot.within(self.contact, self.text)
-        names = getattr(own.end.system.pair, "punch" if self.body == BOTH else self.body).names
+        of_contact = snapshot.within(self.contact, self.text)
+        names = getattr(of_contact.end.system.pair, "punch" if self.body == BOTH else self.body).names
         if self.contact and self.contact not in names:
             raise CaseError(InputError(self.text, f"the surface of the {self.body} is not named by contacts"))
-        return own
+        return of_contact
 
     def within(self, contact: str) -> Quantity:
         """Return the quantity of one named contact."""
@@ -225,7 +229,7 @@ def parse_amount(text: str, option: str) -> tuple[float, str]:
         CaseError: none of them.
     """
     stripped = re.sub(r"\s*cycles?$", "", text.strip())
-    for unit, what in (("", "cycles"), ("mm", "distance"), ("s", "time")):
+    for unit, kind in (("", "cycles"), ("mm", "distance"), ("s", "time")):
         try:
             if (unit == "") != bool(re.fullmatch(r"[-+\d.eE]+", stripped)):
                 continue  # a number alone is a number of cycles, and nothing else is: neither ppm nor percent
@@ -234,7 +238,7 @@ def parse_amount(text: str, option: str) -> tuple[float, str]:
             continue
         if amount <= 0:
             raise CaseError(InputError(option, f"expected more than zero, got {text!r}"))
-        return amount, what
+        return amount, kind
     raise CaseError(InputError(option, f"expected cycles, a distance or a time such as '3600 m', got {text!r}"))
 
 
@@ -250,9 +254,9 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
         CaseError: it names none; says what is known.
     """
     words = " ".join(text.split())
-    whole = OLD_NAMES.get(words, words)
-    if whole in WHOLE:
-        return Quantity(words, whole, "whole", WHOLE[whole])
+    word = OLD_NAMES.get(words, words)
+    if word in WHOLE:
+        return Quantity(words, word, "whole", WHOLE[word])
     match = _UNTIL.fullmatch(words)
     if match and registered_name(match["name"], at_a_place=bool(match["at"])):
         return _life(words, match, option, names)
@@ -293,15 +297,15 @@ def registered_name(word: str, *, at_a_place: bool) -> str:
         field = registry.known(WARMER[0] if name == "temperature" else name)
         return "" if field.dims[1:] not in (("x",), ("x_strip",)) else name
     name = registry.LARGEST.get(name, name)
-    found = registry.known(name)
-    return "" if found.dims not in (RECORD, ()) else name
+    entry = registry.known(name)
+    return "" if entry.dims not in (RECORD, ()) else name
 
 
 def registered(name: str, body: str = "punch") -> Registered:
     """Return the entry of the registry of a name; that of the strip where the strip has one."""
     name = "moved_z" if name == APPROACH else name
     names = (f"{name}_strip", name) if body == "strip" else (name, f"{name}_punch")
-    return next(found for one in names if (found := registry.known(one)).name)
+    return next(entry for candidate in names if (entry := registry.known(candidate)).name)
 
 
 def unit_of(name: str) -> str:
@@ -316,10 +320,10 @@ def parse_level(text: str, option: str, names: Names = BY_ROLE) -> Quantity:
     Raises:
         CaseError: it names none.
     """
-    found = parse_quantity(text, option, names)
-    if found.kind != "life":
+    level = parse_quantity(text, option, names)
+    if level.kind != "life":
         raise CaseError(InputError(option, f"expected a quantity with a level, such as 'depth 0.1 mm', got {text!r}"))
-    return found
+    return level
 
 
 def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
@@ -391,8 +395,8 @@ def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
 
 def cycles_of(amount: tuple[float, str], distance: float, period: float) -> float:
     """Return the cycles of an amount, for the distance (mm) and the time (s) of one."""
-    value, what = amount
-    return value / {"cycles": 1.0, "distance": distance, "time": period}[what]
+    value, kind = amount
+    return value / {"cycles": 1.0, "distance": distance, "time": period}[kind]
 
 
 @dataclass(frozen=True)
@@ -442,10 +446,10 @@ def evaluate(
         return quantity.of_snapshot(state), Path(rough=of_nodes, grain=_grain(quantity, state))
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
-        return _whole(model, quantity, values, settings, distance, path)
+        return _system_quantity(model, quantity, values, settings, distance, path)
     if quantity.kind == "life":
-        found, path = _until(model, (quantity,), values, settings, path, limit, (distance, period))
-        return float(found[0]), path
+        lives, path = _until(model, (quantity,), values, settings, path, limit, (distance, period))
+        return float(lives[0]), path
     if quantity.after is None:
         half_cycles = model.system(values, settings).motion.half_cycles
         wanted = float(max(1, model.case.run.half_cycles // half_cycles))
@@ -460,7 +464,7 @@ def _grain(quantity: Quantity, snapshot: Snapshot) -> float:
     return float(snapshot.end.system.pair.weights.max()) if quantity.name in OF_NODES else 0.0
 
 
-def _whole(
+def _system_quantity(
     model: Model,
     quantity: Quantity,
     values: Mapping[str, float],
@@ -495,7 +499,7 @@ def _until(
 ) -> tuple[Array, Path]:
     """Run until all levels are passed, and count to where a cubic through values and rates meets each."""
     taken = [[(0.0, 0.0, float("nan"))] for _ in quantities]
-    levels, passed = np.array([one.level for one in quantities]), np.zeros(len(quantities), dtype=int)
+    levels, passed = np.array([quantity.level for quantity in quantities]), np.zeros(len(quantities), dtype=int)
     course = path.course
     run: list[Snapshot] = []
 
@@ -503,12 +507,12 @@ def _until(
         return bool((passed > 1).all())  # one jump more, so that values nearby find their level on the same path
 
     for snapshot in model.run(values, course.last(limit), settings=settings, course=course, until=enough):
-        for rows, one in zip(taken, quantities, strict=True):
-            rows.append((snapshot.cycle, one.of_snapshot(snapshot), one.rate(snapshot)))
+        for rows, asked in zip(taken, quantities, strict=True):
+            rows.append((snapshot.cycle, asked.of_snapshot(snapshot), asked.rate(snapshot)))
         passed += np.array([rows[-1][1] for rows in taken]) >= levels
         run.append(snapshot)
     made = Path(Course.of(run), edge_moved(run))
-    counted = np.array([cycles_of((1.0, one.life), *measures) for one in quantities])
+    counted = np.array([cycles_of((1.0, quantity.life), *measures) for quantity in quantities])
     cycles = [crossing(np.array(rows), level) for rows, level in zip(taken, levels, strict=True)]
     return np.array(cycles) / counted, made
 

@@ -133,15 +133,15 @@ def run_with(
     """Run a case and write its results, as `run_case`, with signals to look out for; collective."""
     begin, comm = time.perf_counter(), signals.comm
     log = case.names.telling(log)
-    found = resolve_law(case, log, comm, heat=preparation_of(case), fresh=fresh)
-    for line in found.system.bodies.solved_by:
+    resolved = resolve_law(case, log, comm, heat=preparation_of(case), fresh=fresh)
+    for line in resolved.system.bodies.solved_by:
         log(line)
     if not resume:
-        found.system.check_touching()
-    how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}
+        resolved.system.check_touching()
+    how = {"setup_seconds": time.perf_counter() - begin, **resolved.numbers}
     directory = Path(output) if output else on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        summary = _run(found.system, directory, log, progress, how, signals, resume=resume)
+        summary = _run(resolved.system, directory, log, progress, how, signals, resume=resume)
         return summary, directory
     except OutputError as error:
         way_on = on_root(comm, lambda: _way_on(checkpoint.reached(directory)))
@@ -173,7 +173,7 @@ def _run(
     # Who interrupts a run is in a hurry: its figures can be drawn later.
     hurry = isinstance(failure, InterruptedRunError) or agreed(system.comm, signals.received)
     if run.last is not None and not hurry:
-        summary |= run.tell_more(run.last, summary, uncertain=failure is None)
+        summary |= run.uncertainty_and_report(run.last, summary, uncertain=failure is None)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -422,10 +422,10 @@ class _Run:
         if len(all_phases(self.state.contacts).pressure):  # a first half-cycle is no cycle
             self._see_heat(self.system, self.state)
         texts = unique_text(np.concatenate(self.unique)), sliding_text(last), passing_text(last)
-        found = [*(text for text in texts if text), *self._level.missed(self.state.half_cycle)]
-        for warning in found:
+        warnings = [*(text for text in texts if text), *self._level.missed(self.state.half_cycle)]
+        for warning in warnings:
             self.log(f"warning: {warning}")
-        return [*self.warnings, *self._heat_watch.warnings(), *self.watch.warnings(), *found]
+        return [*self.warnings, *self._heat_watch.warnings(), *self.watch.warnings(), *warnings]
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
@@ -463,7 +463,7 @@ class _Run:
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         return summary
 
-    def tell_more(self, last: Block, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
+    def uncertainty_and_report(self, last: Block, summary: dict[str, Any], *, uncertain: bool) -> dict[str, Any]:
         """Estimate the uncertainty of what is written, draw it, and return the summary with it; collective."""
         if uncertain and self.case.output.uncertainty:
             summary |= self._uncertainty(last)
@@ -482,11 +482,11 @@ class _Run:
         from fenwear.checks import uncertainty, uncertainty_table
 
         try:
-            found = uncertainty(self.case, last)
+            estimate = uncertainty(self.case, last)
         except (FenwearError, ArithmeticError, RuntimeError, ValueError) as error:
             self.log(f"warning: the numerical uncertainty of the run could not be estimated: {error}")
             return {}
-        return {"uncertainty": uncertainty_table(last.system, found)}
+        return {"uncertainty": uncertainty_table(last.system, estimate)}
 
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""

@@ -63,8 +63,8 @@ class RunLevel:
         if self.reached:
             way = f"{distance / 1e3:.5g} m, {time:.5g} s"
             log(f"{self.text} is reached after {cycles:,.6g} cycles, {way}")
-        found = {"level": self.text, "reached": self.reached, "value": self.value}
-        return {"until": {**found, "cycles": cycles, "distance_mm": distance, "time_s": time}}
+        level = {"level": self.text, "reached": self.reached, "value": self.value}
+        return {"until": {**level, "cycles": cycles, "distance_mm": distance, "time_s": time}}
 
     def see(self, block: Block) -> int:
         """Return the half-cycle at which a block reaches the level; 0 where it does not."""
@@ -75,5 +75,5 @@ class RunLevel:
             self._before = now
             return 0
         cycles = crossing(np.array([self._before, now]), self.quantity.level)
-        found = strokes * math.ceil(cycles - 1e-9) if math.isfinite(cycles) else last
-        return found if strokes * self._before[0] < found < last else last
+        half_cycle = strokes * math.ceil(cycles - 1e-9) if math.isfinite(cycles) else last
+        return half_cycle if strokes * self._before[0] < half_cycle < last else last

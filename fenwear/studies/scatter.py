@@ -49,7 +49,7 @@ class Scatter:
         """Return values of the keys (size, d)."""
         generator = np.random.default_rng(seed)
         normal = generator.multivariate_normal(np.zeros(len(self.keys)), self.correlation, size, method="eigh")
-        columns = [one.ppf(stats.norm.cdf(z)) for one, z in zip(self.marginals, normal.T, strict=True)]
+        columns = [marginal.ppf(stats.norm.cdf(z)) for marginal, z in zip(self.marginals, normal.T, strict=True)]
         return np.column_stack(columns)
 
     @classmethod
@@ -183,11 +183,11 @@ def load_scatter(path: Path, case: Case) -> Scatter:
     """
     place = path / "calibration.json" if path.is_dir() else path
     try:
-        found = json.loads(place.read_text("utf-8"))
-        rows, covariance = found["unknowns"], found["covariance"]
+        stored = json.loads(place.read_text("utf-8"))
+        rows, covariance = stored["unknowns"], stored["covariance"]
         keys, values = [row["key"] for row in rows], [float(row["value"]) for row in rows]
         logarithmic = [bool(row["logarithmic"]) for row in rows]
-        not_known = list(found["not_known"])
+        not_known = list(stored["not_known"])
     except OSError as error:
         raise CaseError(InputError(f"--from {place}", f"cannot be read: {error.strerror}")) from None
     except (ValueError, KeyError, TypeError):

@@ -60,13 +60,13 @@ def over_window(
     for half in WINDOWS:
         t: Array = np.linspace(-half, half, SAMPLES, dtype=np.float64)
         try:
-            found = np.array([value if step == 0.0 else function(float(key * np.exp(step))) for step in t])
+            values = np.array([value if step == 0.0 else function(float(key * np.exp(step))) for step in t])
         except (CaseError, ConvergenceError):
             continue
-        ratio = found / value
+        ratio = values / value
         if np.isfinite(ratio).all() and (ratio > 0).all():
             slope, error = _slope(t, np.log(ratio))
-            if np.ptp(found) < grain:
+            if np.ptp(values) < grain:
                 error = max(error, grain / abs(value) / (2 * half))
             return slope * value / key, error * abs(value / key)
     return None
@@ -142,8 +142,8 @@ class Sensitivity:
     def as_json(self) -> dict[str, Any]:
         """Return the object that --json prints, NaN as null."""
         rows = [{**asdict(row), "error_of": row.error_of} for row in self.derivatives]
-        found = {**asdict(self), "derivatives": rows}
-        return dict(finite(found))
+        table = {**asdict(self), "derivatives": rows}
+        return dict(finite(table))
 
     def text(self) -> str:
         """Return a table for people, the most influential key first."""
@@ -202,15 +202,15 @@ def sensitivity(
     if not 0 <= spread < 1:
         raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
     wanted = [of_case(parse_quantity(q, names=case.names) if isinstance(q, str) else q, case) for q in quantities]
-    found = [find_key(case, key, "--to") for key in keys]
-    if not wanted or not found:
+    chosen_keys = [find_key(case, key, "--to") for key in keys]
+    if not wanted or not chosen_keys:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
-    for key in found:
+    for key in chosen_keys:
         _sides(case, key)
     model = Model(case)
     bases = on_root(study.comm, lambda: [] if study.collect else _bases(model, wanted))
-    store = study.open(case, named(case_text(case), [one.text for one in wanted], spread, method))
-    runs = [Run(key, named(key.path), key.path) for key in found]
+    store = study.open(case, named(case_text(case), [quantity.text for quantity in wanted], spread, method))
+    runs = [Run(key, named(key.path), key.path) for key in chosen_keys]
     done = study.outcomes(_Derivatives(model, wanted, bases, spread, method), runs, store, progress)
     columns = [done[run.name] for run in runs]
     for run, column in zip(runs, columns, strict=True):
@@ -220,9 +220,9 @@ def sensitivity(
     def of(q: int) -> Sensitivity:
         value = float(columns[0].values["value"][q])
         rows = []
-        for key, one in zip(found, columns, strict=True):
-            numbers = {name: float(one.values[name][q]) for name in NUMBERS}
-            rows.append(Derivative(key.path, key.value, key.unit, method=str(one.values["method"][q]), **numbers))
+        for key, outcome in zip(chosen_keys, columns, strict=True):
+            numbers = {name: float(outcome.values[name][q]) for name in NUMBERS}
+            rows.append(Derivative(key.path, key.value, key.unit, method=str(outcome.values["method"][q]), **numbers))
         return Sensitivity(wanted[q].text, wanted[q].unit, value, spread, tuple(rows))
 
     return [of(q) for q in range(len(wanted))]
@@ -255,9 +255,9 @@ class _Derivatives:
 
     def compute(self, given: Key) -> Values:
         """Return the value of each quantity (q,), the numbers of its derivative, and their method (q,)."""
-        found = [self._derivative(*one, given) for one in zip(self.wanted, self.bases, strict=True)]
-        numbers = dict(zip(NUMBERS, np.array([row for row, _ in found]).T, strict=True))
-        values, methods = [value for value, _ in self.bases], [method for _, method in found]
+        derivatives = [self._derivative(*pair, given) for pair in zip(self.wanted, self.bases, strict=True)]
+        numbers = dict(zip(NUMBERS, np.array([row for row, _ in derivatives]).T, strict=True))
+        values, methods = [value for value, _ in self.bases], [method for _, method in derivatives]
         return {"value": np.array(values), "method": np.array(methods), **numbers}
 
     def _derivative(
@@ -389,8 +389,8 @@ class Forward:
 
     def _derivatives(self, given: tuple[float, ...]) -> Array:
         case, paths = with_values(self.case, self._named(given)), [key.path for key in self.keys]
-        found = sensitivity(case, self.quantities, paths, spread=0, comm=MPI.COMM_SELF)
-        return np.array([[row.derivative for row in one.derivatives] for one in found])
+        sensitivities = sensitivity(case, self.quantities, paths, spread=0, comm=MPI.COMM_SELF)
+        return np.array([[row.derivative for row in of_quantity.derivatives] for of_quantity in sensitivities])
 
     def _named(self, given: Sequence[float]) -> dict[str, float]:
         return {key.path: float(value) for key, value in zip(self.keys, given, strict=True)}

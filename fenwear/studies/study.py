@@ -313,23 +313,25 @@ class Study:
         workers = self.comm.size * (UNKNOWN_WORKERS if self.executor else self._processes)
         dealt = in_pieces(runs, parts)  # alike for all parts, whatever workers each of them has
         shares = [list(chain(*dealt[(number - 1 + k) % parts :: parts])) for k in range(parts)]
-        own = [piece for share in (shares if by_all else shares[:1]) for piece in in_pieces(share, workers)]
-        left = [kept for piece in own if (kept := [run for run in piece if run.name not in known])]
-        total = sum(map(len, own))
+        pieces_here = [piece for share in (shares if by_all else shares[:1]) for piece in in_pieces(share, workers)]
+        left = [kept for piece in pieces_here if (kept := [run for run in piece if run.name not in known])]
+        total = sum(map(len, pieces_here))
         before = total - sum(map(len, left))
-        found: dict[str, Outcome] = {}
+        done_here: dict[str, Outcome] = {}
         failure: Exception | None = None
         progress(before, total)
         try:
             for done in self._computed(job, [] if self.collect else left[self.comm.rank :: self.comm.size], store):
-                found |= done
-                progress(min(before + len(found) * self.comm.size, total), total)
+                done_here |= done
+                progress(min(before + len(done_here) * self.comm.size, total), total)
         except KeyboardInterrupt:
             failure = InterruptedRunError("interrupted")
         except Exception as error:  # raised below, on all ranks
             failure = error
-        each = self.comm.allgather((found, failure))
-        store.add({name: one for outcomes, _ in each for name, one in outcomes.items()}, sum(len(o) for o, _ in each))
+        each = self.comm.allgather((done_here, failure))
+        store.add(
+            {name: outcome for outcomes, _ in each for name, outcome in outcomes.items()}, sum(len(o) for o, _ in each)
+        )
         for _, problem in each:
             if problem is not None:
                 raise self._with_advice(problem, runs, store)
@@ -370,7 +372,7 @@ class Study:
         left, seconds, done = deque(run for piece in pieces for run in piece), 0.0, 0
         while left and alone:
             outcomes = _compute(job, [left.popleft()], store)
-            seconds += sum(one.seconds for one in outcomes.values())
+            seconds += sum(outcome.seconds for outcome in outcomes.values())
             done += 1
             yield outcomes
             alone = count == 1 or done < 2 or seconds / done * len(left) < WORTH

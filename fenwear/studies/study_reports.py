@@ -39,18 +39,20 @@ DECADE = 10.0
 
 def tornado(sensitivities: Sequence[Sensitivity]) -> Figure:
     """Return a panel for each quantity: its values with each key smaller and larger, the most influential on top."""
-    most = max(len(one.derivatives) for one in sensitivities)
+    most = max(len(result.derivatives) for result in sensitivities)
     figure, axes = panels(len(sensitivities), 0.9 + 0.35 * most, share_x=False)
-    for ax, one in zip(axes, sensitivities, strict=True):
-        rows = one.ranked()[::-1]
+    for ax, of_quantity in zip(axes, sensitivities, strict=True):
+        rows = of_quantity.ranked()[::-1]
         for height, row in enumerate(rows):
             for end, colour, name in ((row.low, BLUE, "smaller"), (row.high, RED, "larger")):
                 if np.isfinite(end):
-                    label = f"key {100 * one.spread:g} % {name}" if height == len(rows) - 1 else None
-                    ax.barh(height, end - one.value, left=one.value, color=colour, height=0.7, label=label)
+                    label = f"key {100 * of_quantity.spread:g} % {name}" if height == len(rows) - 1 else None
+                    ax.barh(
+                        height, end - of_quantity.value, left=of_quantity.value, color=colour, height=0.7, label=label
+                    )
         ax.set_yticks(range(len(rows)), [row.key for row in rows])
-        ax.axvline(one.value, color=GREY, linewidth=0.8)
-        ax.set_xlabel(f"{one.quantity} ({one.unit or '-'})")
+        ax.axvline(of_quantity.value, color=GREY, linewidth=0.8)
+        ax.set_xlabel(f"{of_quantity.quantity} ({of_quantity.unit or '-'})")
         if ax.get_legend_handles_labels()[0]:
             ax.legend(frameon=False)
     return figure
@@ -97,16 +99,16 @@ def life_figure(life: Lifetime) -> Figure:
     share = np.arange(1, len(known) + 1) / len(known)
     finite = np.isfinite(known)
     axes[0].step(known[finite], share[finite], where="post", color=BLUE)
-    for own, style in zip(life.each, itertools.cycle(("--", ":", "-.")), strict=False):
-        alone = np.sort(own.lives[np.isfinite(own.lives)])
+    for level, style in zip(life.each, itertools.cycle(("--", ":", "-.")), strict=False):
+        alone = np.sort(level.lives[np.isfinite(level.lives)])
         height = np.arange(1, len(alone) + 1) / len(known)
-        axes[0].step(alone, height, where="post", color=GREY, linestyle=style, label=own.quantity)
+        axes[0].step(alone, height, where="post", color=GREY, linestyle=style, label=level.quantity)
     if life.each:
         axes[0].lines[0].set_label("the first")
         axes[0].legend(frameon=False)
-    for one in life.quantiles:
-        if np.isfinite(one.value) and np.isfinite(one.high):
-            axes[0].plot([one.low, one.high], [one.level, one.level], color=RED, linewidth=1.5)
+    for estimate in life.quantiles:
+        if np.isfinite(estimate.value) and np.isfinite(estimate.high):
+            axes[0].plot([estimate.low, estimate.high], [estimate.level, estimate.level], color=RED, linewidth=1.5)
     axes[0].set_xscale("log")
     _label_places(axes[0])
     axes[0].set_xlabel(f"{life.quantity} ({life.unit or 'cycles'})")
@@ -126,10 +128,10 @@ def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
         log(f"warning: {line}")
 
 
-def _counter(log: Log, what: str) -> Callable[[int, int], None]:
+def _counter(log: Log, subject: str) -> Callable[[int, int], None]:
     """Return the report of progress: first, last, and now and then."""
     seldom = now_and_then(log)
-    return lambda done, total: (log if done == total else seldom)(f"{what} {done:,} of {total:,}")
+    return lambda done, total: (log if done == total else seldom)(f"{subject} {done:,} of {total:,}")
 
 
 def _write(folder: Path, comm: MPI.Comm, files: Mapping[str, Any], figures: Mapping[str, Drawn]) -> None:
@@ -161,10 +163,12 @@ def run_sensitivity(
     how, folder = in_results(how, f"sensitivity-{name}")
     comm = Study(**how).comm
     _tell_of_stick(case, log, comm)
-    found = sensitivity(case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how)
-    figures = {"tornado.png": lambda: tornado(found)} if spread > 0 else {}
-    _write(folder, comm, {"sensitivity.json": [one.as_json() for one in found]}, figures)
-    return found, folder
+    sensitivities = sensitivity(
+        case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how
+    )
+    figures = {"tornado.png": lambda: tornado(sensitivities)} if spread > 0 else {}
+    _write(folder, comm, {"sensitivity.json": [sensitivity.as_json() for sensitivity in sensitivities]}, figures)
+    return sensitivities, folder
 
 
 def run_calibrate(
@@ -190,14 +194,16 @@ def run_calibrate(
     how, folder = in_results(how, f"calibrate-{name}")
     comm = Study(**how).comm
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
-    for one in data:
-        log(one.listing)
+    for measured in data:
+        log(measured.listing)
     _tell_of_stick(case, log, comm)
     if each:
-        fits = calibrate_each(case, [[one] for one in data], asked, baseline=baseline, progress=log, **how)
+        fits = calibrate_each(case, [[data_set] for data_set in data], asked, baseline=baseline, progress=log, **how)
         scatter = between(fits)
         table = {**between_as_json(fits), "scatter": list(scatter.text), "tests": [fit.as_json() for fit in fits]}
-        pictures = [(f"residuals_{Path(one.name).stem}.png", fit) for one, fit in zip(data, fits, strict=True)]
+        pictures = [
+            (f"residuals_{Path(data_set.name).stem}.png", fit) for data_set, fit in zip(data, fits, strict=True)
+        ]
         _write(folder, comm, {"calibration.json": table}, {file: partial(residuals, fit) for file, fit in pictures})
         return table, "\n".join([*(fit.text() for fit in fits), *scatter.text]), folder
     fit = calibrate(case, data, asked, baseline=baseline, progress=log, **how)
@@ -210,9 +216,9 @@ def run_calibrate(
     return table, fit.text(), folder
 
 
-def _residual_table(found: Calibration) -> str:
+def _residual_table(calibration: Calibration) -> str:
     rows: list[list[object]] = []
-    for trace in found.traces:
+    for trace in calibration.traces:
         series = trace.series
         for k, row in enumerate(series.rows):
             rows.append(
@@ -240,7 +246,7 @@ def run_life(
 
     Without any scatter it is one life, in life.json.
     """
-    quantities = [parse_quantity(one, "--until", case.names) for one in until]
+    quantities = [parse_quantity(level, "--until", case.names) for level in until]
     scatter = Scatter() if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         scatter = scatter.and_also(parse_scatter(case, text))
@@ -253,28 +259,28 @@ def run_life(
                 f"applies to a distribution of lives. Add --scatter KEY=KIND(A, B) or --from DIR, or leave out {option}"
             )
             raise CaseError(InputError(option, message))
-        return _one_life(case, quantities, folder, log, study.comm), folder
+        return _life_without_scatter(case, quantities, folder, log, study.comm), folder
     scatter.check(case)
     _tell_of_stick(case, log, study.comm)
     level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
     for line in scatter.text:
         log(line)
     counter = _counter(log, "samples")
-    found = lifetime(case, quantities, scatter, samples=samples, seed=seed, wanted=level, progress=counter, **how)
-    _write(folder, study.comm, {"life.json": found.as_json()}, {"life.png": lambda: life_figure(found)})
-    return found, folder
+    life = lifetime(case, quantities, scatter, samples=samples, seed=seed, wanted=level, progress=counter, **how)
+    _write(folder, study.comm, {"life.json": life.as_json()}, {"life.png": lambda: life_figure(life)})
+    return life, folder
 
 
-def _one_life(case: Case, quantities: Sequence[Quantity], folder: Path, log: Log, comm: MPI.Comm) -> Lives:
+def _life_without_scatter(case: Case, quantities: Sequence[Quantity], folder: Path, log: Log, comm: MPI.Comm) -> Lives:
     """Return the lives until each level of a case whose keys do not scatter, and write them; collective."""
     _tell_of_stick(case, log, comm)
-    asked = [of_case(one, case, "--until") for one in quantities]
+    asked = [of_case(quantity, case, "--until") for quantity in quantities]
     on_root(comm, lambda: make_directory(folder))
     on_root(comm, lambda: write_case(folder, case))
     values = on_root(comm, lambda: [float(life) for life in lives(Model(case), asked, {})])
-    found = Lives(tuple(asked), tuple(values))
-    _write(folder, comm, {"life.json": found.as_json()}, {})
-    return found
+    result = Lives(tuple(asked), tuple(values))
+    _write(folder, comm, {"life.json": result.as_json()}, {})
+    return result
 
 
 def _wanted(case: Case, life: str, text: str) -> float:
@@ -283,6 +289,6 @@ def _wanted(case: Case, life: str, text: str) -> float:
     return cycles_of(parse_amount(text, "--wanted"), *measures) / cycles_of((1.0, life), *measures)
 
 
-def as_json(found: Sequence[Sensitivity]) -> dict[str, Any]:
+def as_json(sensitivities: Sequence[Sensitivity]) -> dict[str, Any]:
     """Return what `fenwear sensitivity --json` prints."""
-    return {"sensitivities": [one.as_json() for one in found]}
+    return {"sensitivities": [sensitivity.as_json() for sensitivity in sensitivities]}

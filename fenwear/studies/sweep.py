@@ -136,9 +136,9 @@ def failures(dataset: xarray.Dataset) -> list[str]:
     places = np.argwhere(trouble.values != "")
     lines = []
     for place in places[:TOLD]:
-        own = trouble[tuple(place)]
-        names = ", ".join(f"{key} = {_text(own[key])}" for key in own.coords)
-        lines.append(f"failed: {names}: {own.item()}")
+        variant = trouble[tuple(place)]
+        names = ", ".join(f"{key} = {_text(variant[key])}" for key in variant.coords)
+        lines.append(f"failed: {names}: {variant.item()}")
     if len(places) > TOLD:
         lines.append(f"failed: {len(places) - TOLD} more; sweep.csv has them all")
     return lines
@@ -155,10 +155,10 @@ def text(dataset: xarray.Dataset) -> str:
     if "variant" in frame and "variant" not in dataset.coords:
         frame["variant"] += 1
     shown = frame.head(ROWS).to_string(index=False, float_format=lambda value: f"{value:.5g}")
-    more = f"\n... {len(frame) - ROWS} more in sweep.csv" if len(frame) > ROWS else ""
+    rest = f"\n... {len(frame) - ROWS} more in sweep.csv" if len(frame) > ROWS else ""
     failed = int((dataset["trouble"].values != "").sum())
     count = f"{len(frame)} variants" + (f", {failed} of them failed" if failed else "")
-    return f"{shown}{more}\n{count}"
+    return f"{shown}{rest}\n{count}"
 
 
 def as_json(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -36,8 +36,8 @@ def _other(name: str, dims: tuple[str, ...], unit: str, long_name: str) -> Quant
 
 # What is not of the registry.
 OTHERS = {
-    one.name: one
-    for one in (
+    quantity.name: quantity
+    for quantity in (
         _other("x", ("node",), "mm", "position along the contact"),
         _other("y", ("node",), "mm", "position across the contact"),
         _other("shape", ("node",), "mm", "worn shape without the rigid motion of the punch"),
@@ -54,15 +54,15 @@ def meaning(name: str, of: Of, case: Case) -> Quantity:
     """Return what a result is, with its dimensions besides those of the sweep."""
     if name in OTHERS:
         return OTHERS[name]
-    found = registry.known(name)
-    if not found.name or name.startswith("lambda_"):
+    entry = registry.known(name)
+    if not entry.name or name.startswith("lambda_"):
         unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
         return _other(name, RECORD if of == "optimum" else (), f"{unit}/{per}", "rigid-body wear of the punch")
-    nodes = tuple("node" for d in found.dims[1:])
+    nodes = tuple("node" for d in entry.dims[1:])
     if case.model.kind != "plane":
-        found = registry.on_surface(found)
-    each = name == "direction" or (found.dims and found.cycle != "last")
-    return _other(name, (*(RECORD if each else ()), *nodes), "" if found.unit == "1" else found.unit, found.long_name)
+        entry = registry.on_surface(entry)
+    each = name == "direction" or (entry.dims and entry.cycle != "last")
+    return _other(name, (*(RECORD if each else ()), *nodes), "" if entry.unit == "1" else entry.unit, entry.long_name)
 
 
 def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarray.Dataset:
@@ -73,14 +73,14 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     """
     sizes = plan.dimensions
     dims, shape = tuple(sizes), tuple(sizes.values())
-    good = {place: one.values for place, one in outcomes.items() if not one.trouble}
+    good = {place: done.values for place, done in outcomes.items() if not done.trouble}
     names = list(dict.fromkeys(name for values in good.values() for name in values))
     data, coordinates = {}, _coordinates(plan)
     for name in names:
-        what = meaning(name, plan.of, case)
-        scale = degrees_of(case) if what.unit == KELVIN.unit else None
-        unit = what.unit if scale is None else scale.unit
-        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.with_names(what.long_name)}
+        entry = meaning(name, plan.of, case)
+        scale = degrees_of(case) if entry.unit == KELVIN.unit else None
+        unit = entry.unit if scale is None else scale.unit
+        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.with_names(entry.long_name)}
         if name == "direction":
             words = make_sliding(case).field.words(3 if case.model.kind == "solid" else 2)
             attributes |= {"flag_values": list(words), "flag_meanings": " ".join(words.values())}
@@ -88,12 +88,12 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
         if scale is not None:
             arrays = {place: scale.of(values) for place, values in arrays.items()}
         if name in NODES and len(arrays) == len(good) and _same(list(arrays.values())):
-            coordinates[name] = (what.dims, next(iter(arrays.values())), attributes)
+            coordinates[name] = (entry.dims, next(iter(arrays.values())), attributes)
         else:
-            data[name] = ((*dims, *what.dims), _filled(arrays, shape, len(what.dims)), attributes)
+            data[name] = ((*dims, *entry.dims), _filled(arrays, shape, len(entry.dims)), attributes)
     trouble, seconds = np.full(shape, "", dtype=object), np.full(shape, np.nan)
-    for place, one in outcomes.items():
-        trouble[place], seconds[place] = one.trouble, one.seconds
+    for place, outcome in outcomes.items():
+        trouble[place], seconds[place] = outcome.trouble, outcome.seconds
     data["trouble"] = (dims, trouble.astype(str), {"units": "", "long_name": "why a variant failed"})
     data[SECONDS] = (dims, seconds, {"units": "s", "long_name": "time to compute a variant, with its set-up if any"})
     about = {"title": case.title or "fenwear sweep", "Conventions": "CF-1.11", "of": plan.of, "case": case.to_toml()}
@@ -101,21 +101,23 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
 
 
 def _coordinates(plan: Plan) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
-    found: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]] = {}
+    coordinates: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]] = {}
     for axis, (values, unit) in zip(plan.axes, plan.coordinates, strict=True):
         dimension = "variant" if plan.zipped else axis.key
-        found[axis.key] = ((dimension,), np.array(values), {"units": unit, "long_name": axis.key})
-    return found
+        coordinates[axis.key] = ((dimension,), np.array(values), {"units": unit, "long_name": axis.key})
+    return coordinates
 
 
 def _same(arrays: Sequence[NDArray[np.generic]]) -> bool:
     first = arrays[0]
     size = float(np.ptp(first)) if first.size else 0.0
-    return all(one.shape == first.shape and np.allclose(one, first, rtol=0, atol=SAME * size) for one in arrays[1:])
+    return all(
+        array.shape == first.shape and np.allclose(array, first, rtol=0, atol=SAME * size) for array in arrays[1:]
+    )
 
 
-def _filled(arrays: Mapping[Place, NDArray[np.generic]], shape: Place, own: int) -> NDArray[np.float64]:
-    most = np.max([array.shape for array in arrays.values()], axis=0) if own else ()
+def _filled(arrays: Mapping[Place, NDArray[np.generic]], shape: Place, inner_dims: int) -> NDArray[np.float64]:
+    most = np.max([array.shape for array in arrays.values()], axis=0) if inner_dims else ()
     result = np.full((*shape, *map(int, most)), np.nan)
     for place, array in arrays.items():
         at: tuple[Any, ...] = (*place, *(slice(length) for length in array.shape))

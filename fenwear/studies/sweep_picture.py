@@ -99,10 +99,10 @@ def _cycle_largest(values: xarray.DataArray) -> xarray.DataArray:
 
 def _places(values: xarray.DataArray, key: str) -> tuple[np.ndarray[Any, Any], list[str]]:
     """Return where the values of a key stand on an axis, and the names of those that are no numbers."""
-    own = values[key].values if key in values.coords else np.arange(1, values.sizes[key] + 1)
-    if own.dtype.kind in "if":
-        return own, []
-    return np.arange(len(own)), [str(name) for name in own]
+    column = values[key].values if key in values.coords else np.arange(1, values.sizes[key] + 1)
+    if column.dtype.kind in "if":
+        return column, []
+    return np.arange(len(column)), [str(name) for name in column]
 
 
 def _axis_label(values: xarray.DataArray, key: str) -> str:
@@ -113,9 +113,9 @@ def _axis_label(values: xarray.DataArray, key: str) -> str:
 def _label(values: xarray.Dataset | xarray.DataArray, key: str, at: int) -> str:
     if key not in values.coords:
         return str(at + 1)
-    own = values[key].values[at]
+    value = values[key].values[at]
     unit = values[key].attrs.get("units", "")
-    return f"{own:.4g} {unit}".strip() if values[key].dtype.kind in "if" else str(own)
+    return f"{value:.4g} {unit}".strip() if values[key].dtype.kind in "if" else str(value)
 
 
 Line = tuple[str | None, xarray.DataArray, dict[str, Any]]

@@ -170,8 +170,8 @@ def read_table(path: Path) -> list[Axis]:
 
 
 def _key_and_unit(name: str) -> tuple[str, str]:
-    found = re.fullmatch(r"\s*([^\s(\[]+)\s*[(\[](.*)[)\]]\s*", name)
-    return (found[1], found[2].strip()) if found else (name.strip(), "")
+    match = re.fullmatch(r"\s*([^\s(\[]+)\s*[(\[](.*)[)\]]\s*", name)
+    return (match[1], match[2].strip()) if match else (name.strip(), "")
 
 
 def settings(case: Case, given: Mapping[str, tuple[Axis, Value]]) -> list[str]:
@@ -276,7 +276,7 @@ def make_plan(case: Case, axes: Sequence[Axis], of: str, *, zipped: bool = False
             that go together have not equally many values.
     """
     check_keys(axes)
-    kind = next((one for one in KINDS if one == of), None)
+    kind = next((known for known in KINDS if known == of), None)
     if kind is None:
         raise CaseError(InputError("--of", f"expected one of {', '.join(KINDS)}, got {of!r}"))
     lengths = [len(axis.values) for axis in axes]
@@ -300,13 +300,13 @@ def make_plan(case: Case, axes: Sequence[Axis], of: str, *, zipped: bool = False
 
 def _variant(case: Case, axes: Sequence[Axis], place: tuple[int, ...], *, zipped: bool) -> Variant:
     given = {axis.key: (axis, axis.values[at]) for axis, at in zip(axes, place, strict=True)}
-    own = place[:1] if zipped else place
+    position = place[:1] if zipped else place
     changes = tuple(axis.setting(value) for axis, value in given.values())
     try:
         changed = changed_case(case, *settings(case, given))
     except CaseError as error:
-        return Variant(own, changes, case, error)
-    return Variant(own, changes, changed)
+        return Variant(position, changes, case, error)
+    return Variant(position, changes, changed)
 
 
 def _check_values(
@@ -316,10 +316,10 @@ def _check_values(
     problems: dict[InputError, None] = {}
     for k, axis in enumerate(axes):
         for at in range(len(axis.values)):
-            own = [variant for place, variant in zip(places, variants, strict=True) if place[k] == at]
-            if own[0].error and not any(variant.possible for variant in own):
+            with_value = [variant for place, variant in zip(places, variants, strict=True) if place[k] == at]
+            if with_value[0].error and not any(variant.possible for variant in with_value):
                 row = f"variant {at + 1}: " if zipped else ""
-                problems |= {InputError(p.key, f"{row}{p.message}"): None for p in own[0].error.problems}
+                problems |= {InputError(p.key, f"{row}{p.message}"): None for p in with_value[0].error.problems}
     if problems:
         raise CaseError(list(problems)[:MOST_TOLD])
 
@@ -328,11 +328,11 @@ def _coordinate(
     axis: Axis, k: int, places: Sequence[tuple[int, ...]], variants: Sequence[Variant]
 ) -> tuple[tuple[Value, ...], str]:
     """Return the values of an axis as the cases have them: numbers in one unit, else texts."""
-    found: dict[int, tuple[Value, str]] = {}
+    by_place: dict[int, tuple[Value, str]] = {}
     for place, variant in zip(places, variants, strict=True):
-        if variant.possible and place[k] not in found:
-            found[place[k]] = value_at(variant.case, axis.key)
-    values, units = zip(*(found[at] for at in range(len(axis.values))), strict=True)
+        if variant.possible and place[k] not in by_place:
+            by_place[place[k]] = value_at(variant.case, axis.key)
+    values, units = zip(*(by_place[at] for at in range(len(axis.values))), strict=True)
     if len(set(units)) == 1 and all(isinstance(value, int | float) for value in values):
         return values, units[0]
     return tuple(map(str, axis.values)), ""

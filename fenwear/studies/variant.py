@@ -70,40 +70,40 @@ def _registered(system: Tribosystem, records: Block | SteadyCycle) -> dict[str, 
     """Return the quantities of the last cycle of records of half-cycles, by their names."""
     strokes = system.motion.half_cycles
     numbers = [
-        one
-        for one in registry.quantities_of(system).values()
-        if (one.dims in (RECORD, ()) or one.name in FIELDS)
-        and one.name not in LEFT_OUT
-        and (isinstance(records, Block) or (one.steady and (records.moves or one.nodal)))
+        quantity
+        for quantity in registry.quantities_of(system).values()
+        if (quantity.dims in (RECORD, ()) or quantity.name in FIELDS)
+        and quantity.name not in LEFT_OUT
+        and (isinstance(records, Block) or (quantity.steady and (records.moves or quantity.nodal)))
     ]
-    found, nominal = computed(records, numbers), nominal_pressure(system, float(records.load[-1]))
+    by_name, nominal = computed(records, numbers), nominal_pressure(system, float(records.load[-1]))
     values = {"direction": np.array(system.motion.stroke_directions, dtype=float)}
-    for one in numbers:
-        rows = np.asarray(found[one.name], dtype=float)
-        if one.dims:
-            rows = rows[-1] if one.cycle == "last" else _by_half_cycle(rows, records.half_cycle, strokes)
-        values[one.name] = rows
+    for entry in numbers:
+        rows = np.asarray(by_name[entry.name], dtype=float)
+        if entry.dims:
+            rows = rows[-1] if entry.cycle == "last" else _by_half_cycle(rows, records.half_cycle, strokes)
+        values[entry.name] = rows
     return {**values, **{name: np.array(value) for name, value in nominal.items()}}
 
 
 def _by_half_cycle(rows: Array, numbers: NDArray[np.int64], count: int) -> Array:
     """Return the last row of each half-cycle of the cycle, NaN where there is none."""
-    found = np.full((count, *rows.shape[1:]), np.nan)
-    found[(numbers[-count:] - 1) % count] = rows[-count:]
-    return found
+    by_number = np.full((count, *rows.shape[1:]), np.nan)
+    by_number[(numbers[-count:] - 1) % count] = rows[-count:]
+    return by_number
 
 
 def _final_shape(system: Tribosystem) -> Values:
     """Return the shape to which partial slip wears."""
-    found = cast(FinalShape, steady(system))  # under Coulomb's law
-    system, thickness = found.system, found.system.bodies.punch.thickness
-    values = _registered(system, cycle_of_final(found))
+    final = cast(FinalShape, steady(system))  # under Coulomb's law
+    system, thickness = final.system, final.system.bodies.punch.thickness
+    values = _registered(system, cycle_of_final(final))
     size = "stick_area" if system.pair.punch.dim == 3 else "stick_width"
-    values |= {size: np.array(found.size), "wear": found.worn.punch, "largest_depth": found.worn.punch.max()}
-    values["worn_volume"] = np.array(thickness * float(system.pair.weights @ found.worn.punch))
+    values |= {size: np.array(final.size), "wear": final.worn.punch, "largest_depth": final.worn.punch.max()}
+    values["worn_volume"] = np.array(thickness * float(system.pair.weights @ final.worn.punch))
     if system.strip_wears:
-        values["largest_depth_strip"] = np.array(found.worn.strip.max())
-        volume = thickness * float(system.pair.strip.weights @ found.worn.strip)
+        values["largest_depth_strip"] = np.array(final.worn.strip.max())
+        volume = thickness * float(system.pair.strip.weights @ final.worn.strip)
         values["worn_volume_strip"] = np.array(volume)
     return values
 
@@ -124,15 +124,15 @@ def _steady(system: Tribosystem) -> Values:
 def _optimum(system: Tribosystem) -> Values:
     system = at_step(system)
     directions = system.motion.stroke_directions
-    found = [system.optimum(d) for d in directions]
+    optima = [system.optimum(d) for d in directions]
     nominal = nominal_pressure(system, system.normal_force)
     return {
         "direction": np.array(directions, dtype=float),
-        "pressure": np.array([one.pressure for one in found]),
-        "largest_pressure": np.array([one.pressure.max() for one in found]),
+        "pressure": np.array([optimal.pressure for optimal in optima]),
+        "largest_pressure": np.array([optimal.pressure.max() for optimal in optima]),
         **{name: np.array(value) for name, value in nominal.items()},
-        "angle": np.array([one.tilt for one in found]),
-        **{name: np.array([one.velocity[name] for one in found]) for name in found[0].velocity},
+        "angle": np.array([optimal.tilt for optimal in optima]),
+        **{name: np.array([optimal.velocity[name] for optimal in optima]) for name in optima[0].velocity},
     }
 
 
@@ -142,8 +142,8 @@ def _run(system: Tribosystem) -> Values:
     if not ends:
         raise ConvergenceError("no half-cycle was done: expected run.half_cycles of one cycle at least")
     last = ends[0]
-    found = {**_registered(last.system, last), "half_cycles": np.array(float(last.half_cycle[-1]))}
-    return {name: np.asarray(values, dtype=float) for name, values in found.items()}
+    by_name = {**_registered(last.system, last), "half_cycles": np.array(float(last.half_cycle[-1]))}
+    return {name: np.asarray(values, dtype=float) for name, values in by_name.items()}
 
 
 COMPUTED: Mapping[Of, Callable[[Tribosystem], Values]] = {"steady": _steady, "optimum": _optimum, "run": _run}

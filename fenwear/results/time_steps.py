@@ -25,7 +25,7 @@ from fenwear.laws.wear import WornDepths
 from fenwear.results.history_surfaces import Column
 from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.steps import Block
-from fenwear.steps.block import BlockHeat
+from fenwear.steps.block import HeatRecord
 from fenwear.steps.run_state import all_phases
 from fenwear.steps.stick_final import beside, stick_edges, zone_width
 from fenwear.steps.stick_position import along_sliding, directions
@@ -296,7 +296,7 @@ def extremes(block: Block) -> dict[str, float]:
     }
 
 
-def hottest(block: Block, heat: BlockHeat) -> Array:
+def hottest(block: Block, heat: HeatRecord) -> Array:
     """Return the largest temperature of each half-cycle of a block (k,), K: of its time steps, or at its end."""
     if not block.system.sticks:
         return heat.largest_temperature

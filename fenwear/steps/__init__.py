@@ -19,11 +19,12 @@ from fenwear.steps.stability import (
     decay_rates,
     explicit_growth,
     growth_rate,
+    heat_gain,
+    heat_warnings,
     stability_number,
     stationary_growth,
 )
 from fenwear.steps.steady import RunningIn, SteadyState, cycles_to_reach, running_in, steady
-from fenwear.steps.uniqueness import heat_gain, heat_warnings
 
 __all__ = [
     "Block",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,15 +24,15 @@ from fenwear.system import Tribosystem
 
 
 @dataclass(frozen=True)
-class BlockHeat:
-    """The heat of k half-cycles.
+class HeatRecord:
+    """The heat of a phase or half-cycle, or of k half-cycles in rows.
 
     Attributes:
-        temperature_punch: Of the punch's contact surface at the end of each half-cycle (k, n), K.
-        temperature_strip: Of the strip's (k, n), K.
-        terms: Heat of each half-cycle by `fenwear.heat.heat_exchange.TERMS`, and by `CROSSING` (k, 8), mJ.
-        coupling_iterations: Of heat and contact (k,).
-        temperature_bulk: Of the bulk of the strip's closed track at the end (k,), K; NaN where there is none.
+        temperature_punch: Of the punch's contact surface at the end of each (n,) or (k, n), K.
+        temperature_strip: Of the strip's (n,) or (k, n), K.
+        terms: Heat of each by `fenwear.heat.heat_exchange.TERMS`, and by `CROSSING` (8,) or (k, 8), mJ.
+        coupling_iterations: Of heat and contact () or (k,).
+        temperature_bulk: Of the bulk of the strip's closed track at the end () or (k,), K; NaN where there is none.
     """
 
     temperature_punch: Array
@@ -40,6 +40,11 @@ class BlockHeat:
     terms: Array
     coupling_iterations: NDArray[np.int64]
     temperature_bulk: Array
+
+    def then(self, later: HeatRecord) -> HeatRecord:
+        """Return the heat of this phase and the next one."""
+        iterations = np.asarray(np.maximum(self.coupling_iterations, later.coupling_iterations))
+        return replace(later, terms=self.terms + later.terms, coupling_iterations=iterations)
 
     @property
     def largest_temperature(self) -> Array:
@@ -54,27 +59,10 @@ class BlockHeat:
         return np.abs(missing) / np.maximum(np.abs(balance).max(axis=1), 1e-300)
 
 
-@dataclass(frozen=True)
-class HalfCycleHeat:
-    """The heat of one half-cycle, or of one of its phases: one row of `BlockHeat`."""
-
-    temperature_punch: Array
-    temperature_strip: Array
-    terms: Array
-    coupling_iterations: int
-    temperature_bulk: float = np.nan
-
-    def then(self, later: HalfCycleHeat) -> HalfCycleHeat:
-        """Return the heat of this phase and the next one."""
-        iterations = max(self.coupling_iterations, later.coupling_iterations)
-        terms, bulk = self.terms + later.terms, later.temperature_bulk
-        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, terms, iterations, bulk)
-
-
-def heat_of_phases(heats: Iterable[HalfCycleHeat | None]) -> HalfCycleHeat | None:
+def heat_of_phases(heats: Iterable[HeatRecord | None]) -> HeatRecord | None:
     """Return the heat of phases one after the other; None of those without."""
     known = [heat for heat in heats if heat is not None]
-    return reduce(HalfCycleHeat.then, known) if known else None
+    return reduce(HeatRecord.then, known) if known else None
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,7 +115,7 @@ class Block:
     equilibrium_error: Array
     complementarity_error: Array
     retries: NDArray[np.int64]
-    heat: BlockHeat | None = field(default=None, kw_only=True)
+    heat: HeatRecord | None = field(default=None, kw_only=True)
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
     load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
@@ -237,7 +225,7 @@ class HalfCycle(NamedTuple):
     phases: Sequence[PhaseRecord]
     worn: WornDepths
     totals: Totals
-    heat: HalfCycleHeat | None
+    heat: HeatRecord | None
     load: float = 1.0
     steps: Any = None
 
@@ -252,10 +240,6 @@ class Recorder:
     _retries: list[int] = field(default_factory=list)
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
-
-    @cached_property
-    def _slides_one_way(self) -> bool:
-        return not (self.system.sticks or self.system.motion.steps)
 
     def add(self, one: HalfCycle) -> None:
         """Record one half-cycle."""
@@ -292,14 +276,14 @@ class Recorder:
         middles = [row.phases[len(row.phases) // 2] for row in rows]
         directions = [system.motion.phases[middle.phase].direction for middle in middles]
         pressure = np.concatenate([middle.contact.pressure for middle in middles])
+        pressures = [np.concatenate([phase.contact.pressure for phase in row.phases]) for row in rows]
         adds = [reduce(Totals.__add__, [p.adds for p in row.phases]) for row in rows]
         loads = np.array([row.load for row in rows])
         # Pressures that balance the loads grow with them.
         optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
         heat, heats = None, [row.heat for row in rows if row.heat is not None]
         if heats:
-            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations", "temperature_bulk")
-            heat = BlockHeat(*(np.array([getattr(one, name) for one in heats]) for name in names))
+            heat = HeatRecord(*map(np.array, zip(*(vars(one).values() for one in heats), strict=True)))
         block = Block(
             system,
             np.array([row.number for row in rows]),
@@ -325,13 +309,10 @@ class Recorder:
             carried=np.array([row.worn.carried for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             friction_ratio=tuple(middle.friction_ratio for middle in middles),
-            sliding=tuple(self._sliding(row) for row in rows) if system.slides_many_ways else (),
+            sliding=tuple(map(system.ways.tensor, pressures)) if system.slides_many_ways else (),
         )
         self._rows, self._retries, self._remedies = [], [], Counter()
         return block
-
-    def _sliding(self, row: HalfCycle) -> SlidingTensor:
-        return self.system.ways.tensor(np.concatenate([one.contact.pressure for one in row.phases]))
 
     def __bool__(self) -> bool:
         return bool(self._rows)
@@ -378,7 +359,7 @@ class Recorder:
         So where a threshold or cap leaves none, nodes stick, or directions change. Solved again only when the zone
         changes.
         """
-        if not self._slides_one_way:
+        if self.system.sticks or self.system.motion.steps:
             return np.full(len(pressure), np.nan)
         zone = pressure > 0
         key = (direction, zone.tobytes())

@@ -19,7 +19,7 @@ from fenwear.common.errors import CaseError, ConvergenceError, InputError
 from fenwear.contact import ContactState
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import WornDepths
-from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord
+from fenwear.steps.block import HalfCycle, HeatRecord, PhaseRecord
 from fenwear.steps.driver import Loading, Watch
 from fenwear.steps.gross_sliding import LAW as SLIDING
 from fenwear.steps.run_state import RunState, Totals, approach, counted_back, with_worn
@@ -341,7 +341,9 @@ class _Run:
         heat = None
         if problem.heat is not None:
             punch, strip = records.temperature[-1]
-            heat = HalfCycleHeat(punch, strip, records.heat.sum(axis=0), int(records.coupling.max()))
+            heat = HeatRecord(
+                punch, strip, records.heat.sum(axis=0), np.array(int(records.coupling.max())), np.array(np.nan)
+            )
         return HalfCycle(number, [phase], states[0], states[1], heat, load, steps)
 
     def middle(self, steps: Steps) -> int:

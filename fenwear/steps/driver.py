@@ -82,9 +82,6 @@ class Jumps(Step, Protocol):
     def system(self) -> Tribosystem:
         """With its heat on bases as jumps need them."""
 
-    def beginning(self) -> RunState:
-        """Return the state in which a run begins."""
-
 
 @dataclass(frozen=True)
 class RunLimits:

@@ -25,7 +25,7 @@ from fenwear.steps.block import Block, HalfCycle
 from fenwear.steps.driver import Jumps, RunLimits, Watching, run_steps
 from fenwear.steps.program_stages import follow_program
 from fenwear.steps.run_state import RunState, all_phases, beginning, on_exchange
-from fenwear.steps.uniqueness import NO_JUMPS, heat_gain
+from fenwear.steps.stability import NO_JUMPS, heat_gain
 from fenwear.system import Tribosystem, with_reduced_heat
 
 LATE = 1.5  # times the wear from which on meshes follow, at most at the end of a jump of several cycles

@@ -46,6 +46,7 @@ from fenwear.case.dependence import parse_expression
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.csv_table import read_profile
 from fenwear.common.errors import CaseError, ConvergenceError, InputError
+from fenwear.steps.program_stages import loads_times
 from fenwear.steps.run_state import pressure_scale
 from fenwear.steps.steady import SteadyState, steady
 from fenwear.steps.stick_final import FinalShape
@@ -103,7 +104,7 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     if system.sticks and len(loads) > 1:
         message = "each load has its own stick zone, which alone carries the load in the end. Give one load"
         raise CaseError(InputError("--load", message))
-    systems = [system if factor == 1.0 else _under(system, factor) for factor, _ in loads]
+    systems = [system if factor == 1.0 else with_case(system, loads_times(system.case, factor)) for factor, _ in loads]
     states: tuple[SteadyState | FinalShape, ...] = tuple(steady(one) for one in systems)
     if system.sticks:
         systems = [state.system for state in states]  # on the grid that the scar has grown to
@@ -207,14 +208,6 @@ def pressure_at(surface: ContactSurface, text: str) -> Array:
                 "--pressure", f"expected a CSV file or an expression in {', '.join(place)}, got {text!r}: {error}"
             )
         ) from None
-
-
-def _under(system: Tribosystem, factor: float) -> Tribosystem:
-    """Return the system with all loads times a factor; collective."""
-    case, of = system.case, {}
-    for name, body in case.bodies.items():
-        of[name] = body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
-    return with_case(system, case.model_copy(update=of))
 
 
 def _depth(system: Tribosystem, states: Sequence[SteadyState | FinalShape], shares: Array) -> Array:

@@ -32,7 +32,7 @@ from fenwear.heat.temperature import HeatState
 from fenwear.laws import Evolution
 from fenwear.laws.friction import ContactConditions
 from fenwear.laws.wear import NOTHING, PhasesWear, WornDepths
-from fenwear.steps.block import HalfCycle, HalfCycleHeat, PhaseRecord, heat_of_phases
+from fenwear.steps.block import HalfCycle, HeatRecord, PhaseRecord, heat_of_phases
 from fenwear.steps.coupled_phases import Coupled, DepthEvolution, check_cycle_memory
 from fenwear.steps.driver import Loading, Watch, as_given, unwatched
 from fenwear.steps.jump_method import HALVES, Attempt, Estimate, JumpLaw, Moment, Sizes, attempt
@@ -324,30 +324,23 @@ class Stepper(JumpLaw[JumpMoment]):
 
     def ended(self, end: JumpMoment, cycles: float) -> None:
         """Take the half-cycles of the last cycle of a jump, whose end is what was solved last."""
-        motion, found = self.system.motion, []
-        reached = self._begin.half_cycle + round(cycles) * motion.half_cycles
-        contacts, pressure = parted(end.contact), end.contact.pressure
+        motion, worn, totals = self.system.motion, end.worn, end.totals
+        number = self._begin.half_cycle + round(cycles) * motion.half_cycles
+        contacts, pressure, load = parted(end.contact), end.contact.pressure, self.loading(number)
         before = np.concatenate([contact.pressure for contact in self._begin.contacts])
         earlier = pressure - (pressure - before) / cycles  # in the cycle before
-        heats = self._last_cycle_heat(end)
-        # Half-cycles after one have worn what is missing at its end.
-        depths, totals = [end.worn], [end.totals]
-        adds, phases = self._adds(pressure), list(range(len(contacts)))
+        heats, adds = self._last_cycle_heat(end), self._adds(pressure)
         if self.wear.coated:
-            own_worn = [self._worn([k], contacts, end.worn) for k in phases]
+            own_worn = [self._worn([k], contacts, end.worn) for k in range(len(contacts))]
             adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
-        for stroke in reversed(range(1, motion.half_cycles)):
-            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            depths.insert(0, depths[0] - self._worn(own, contacts, depths[0]))
-            totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
-        for stroke, depth in enumerate(depths):
-            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            records = [PhaseRecord(k, contacts[k], earlier[k], adds[k], self.ratios[k]) for k in own]
-            number = reached - (motion.half_cycles - 1 - stroke)
-            heat = heat_of_phases(heats[k] for k in own)
-            load = self.loading(reached)
-            found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
-        self._last_cycle = found
+        self._last_cycle = []
+        for phases in reversed(np.arange(len(contacts)).reshape(-1, motion.positions).tolist()):
+            records = [PhaseRecord(k, contacts[k], earlier[k], adds[k], self.ratios[k]) for k in phases]
+            heat = heat_of_phases(heats[k] for k in phases)
+            self._last_cycle.insert(0, HalfCycle(number, records, worn, totals, heat, load))
+            # Half-cycles before have not worn yet what this one does.
+            number, worn = number - 1, worn - self._worn(phases, contacts, worn)
+            totals = reduce(Totals.__sub__, [adds[k] for k in phases], totals)
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
@@ -355,17 +348,17 @@ class Stepper(JumpLaw[JumpMoment]):
         passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
         return passing.worn(pressures, now)
 
-    def _last_cycle_heat(self, end: JumpMoment) -> list[HalfCycleHeat | None]:
+    def _last_cycle_heat(self, end: JumpMoment) -> list[HeatRecord | None]:
         """Return the heat of the cycle that ends a jump."""
         assert end.rate is not None
         if not self.coupled.heat.dim:
             return [None] * len(end.contact.pressure)
-        heats: list[HalfCycleHeat | None] = []
+        heats: list[HeatRecord | None] = []
         exchange = self.coupled.heat.exchange
         temperature = exchange.at(end.temperature - end.rate.heated)
         for phase, pressure in enumerate(end.contact.pressure):
             heated, conductance = self.coupled.mu[phase] * pressure, end.rate.conductances[phase]
             temperature, terms = exchange.half_cycle(temperature, phase, heated, conductance)
             surfaces = exchange.contact_temperatures(temperature, phase)
-            heats.append(HalfCycleHeat(*surfaces, terms, 1, temperature.bulk))
+            heats.append(HeatRecord(*surfaces, terms, np.array(1), np.array(temperature.bulk)))
         return heats

@@ -37,7 +37,7 @@ from fenwear.laws.compliant_layer import Law
 from fenwear.laws.friction import ContactConditions, FollowingFriction
 from fenwear.laws.sliding_tensors import CycleShear
 from fenwear.laws.wear import WornDepths
-from fenwear.steps.block import HalfCycleHeat, PhaseRecord
+from fenwear.steps.block import HeatRecord, PhaseRecord
 from fenwear.steps.run_state import PhaseMeter, Totals, pressure_scale, with_coated
 from fenwear.system import Tribosystem, heating_friction
 
@@ -49,6 +49,9 @@ APART = (
 )
 SPLIT_ADVICE = 'Reduce heat.relaxation, increase heat.steps, or set heat.coupling = "implicit"'
 WORTH_IT = 12  # iterations with the same conductances after which a costly response of their own pays
+
+
+_Contact = tuple[ContactState, HeatState | None, HeatRecord | None]
 
 
 @dataclass
@@ -65,7 +68,7 @@ class ThermalContact:
     """Contact in one phase of the motion together with the heat of its half-cycle.
 
     Args:
-        system: The assembled problem, with heat.
+        system: The assembled problem.
         phase: Which phase.
         contact: Contact of the phase.
     """
@@ -78,15 +81,15 @@ class ThermalContact:
 
     def slide(self, mu: Array) -> None:
         """Set the friction of the nodes times what they slide for a unit of the stroke (n,)."""
-        friction = self.exchange.friction.copy()
-        if not np.array_equal(friction[self.phase], mu):
+        if self.exchange.conducts and not np.array_equal(self.exchange.friction[self.phase], mu):
+            friction = self.exchange.friction.copy()
             friction[self.phase] = mu
             self.exchange, self._response = self.exchange.with_friction(friction), None
 
     def solve(
         self, temperature: HeatState, gap: Array, start: ContactState | None, wearing: WearCompliance | None
-    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
-        """Return contact, temperature at the end of the half-cycle, and its heat.
+    ) -> _Contact:
+        """Return contact, temperature at the end of the half-cycle, and its heat; None of bodies without heat.
 
         Args:
             temperature: At the start.
@@ -97,6 +100,8 @@ class ThermalContact:
         Raises:
             ConvergenceError: contact and heat do not converge.
         """
+        if not self.exchange.conducts:
+            return self._contact.solve(gap, start, wearing), None, None
         if start is None:
             start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, wearing)
         if self.exchange.heat.coupling == "split":
@@ -105,7 +110,7 @@ class ThermalContact:
 
     def _implicit(
         self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
-    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
+    ) -> tuple[ContactState, HeatState, HeatRecord]:
         exchange, contact = self.exchange, start
         mean = self.system.rigid.mean_pressure
         relaxed = 1.0
@@ -144,7 +149,7 @@ class ThermalContact:
 
     def _split(
         self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
-    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
+    ) -> tuple[ContactState, HeatState, HeatRecord]:
         exchange = self.exchange
         relaxation, tolerance = exchange.heat.relaxation, exchange.heat.split_tolerance
         contact, pressure, volume = start, start.pressure[0], np.inf
@@ -166,29 +171,9 @@ class ThermalContact:
             f"the operator split of heat and contact did not converge in {iteration} iterations. {SPLIT_ADVICE}"
         )
 
-    def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
+    def _heat(self, state: HeatState, terms: Array, iterations: int) -> HeatRecord:
         punch, strip = self.exchange.contact_temperatures(state, self.phase)
-        return HalfCycleHeat(punch, strip, terms, iterations, state.bulk)
-
-
-class ColdContact:
-    """Contact in one phase of bodies without heat; methods as of `ThermalContact`."""
-
-    def __init__(self, system: Tribosystem, phase: int, contact: ContactSolver) -> None:  # noqa: ARG002
-        self._contact = contact
-
-    def slide(self, mu: Array) -> None:
-        """Set the friction of the nodes, which heats nothing."""
-
-    def solve(
-        self,
-        temperature: HeatState,  # noqa: ARG002
-        gap: Array,
-        start: ContactState | None,
-        wearing: WearCompliance | None,
-    ) -> tuple[ContactState, None, None]:
-        """Return contact, and no heat."""
-        return self._contact.solve(gap, start, wearing), None, None
+        return HeatRecord(punch, strip, terms, np.array(iterations), np.array(state.bulk))
 
 
 def gap_volume(system: Tribosystem, gap: Array) -> float:
@@ -265,8 +250,7 @@ COEFFICIENTS_FAIL = (
     "the coefficients of friction and wear and the pressure they depend on did not converge. Use a weaker dependence "
     "on p, or a smoother table"
 )
-_Contact = tuple[ContactState, HeatState | None, HalfCycleHeat | None]
-_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
+_Solved = tuple[ContactState, HeatState | None, HeatRecord | None, LayerEvolution]
 
 
 @dataclass(frozen=True)
@@ -299,7 +283,7 @@ class PhaseEnd:
 
     record: PhaseRecord
     temperature: HeatState | None
-    heat: HalfCycleHeat | None
+    heat: HeatRecord | None
     worn: WornDepths
 
 
@@ -325,8 +309,7 @@ class PhaseStep:
         follows = apart and not system.exchange.conducts and asks("p", "pm")
         self._contact = system.passed_contact(phase)
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
-        self._kind = ThermalContact if system.exchange.conducts else ColdContact
-        self._thermal = self._kind(system, phase, self._contact)
+        self._thermal = ThermalContact(system, phase, self._contact)
         conditions = system.conditions(phase)
         # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
         more = system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
@@ -529,7 +512,7 @@ class PhaseStep:
         """Return the end of a phase whose contact flows by and by."""
         wearing, near, thermal = passing.step(at.worn, implicit=self.implicit), at.start, self._thermal
         if solver is not self._contact:
-            thermal = self._kind(self.system, self.phase, solver)
+            thermal = ThermalContact(self.system, self.phase, solver)
             thermal.slide(heating_friction(self.system, self._mu, self.phase))
 
         def solve(flowed: Array) -> _Contact:
@@ -546,7 +529,7 @@ class PhaseStep:
         at: _Begin,
         contact: ContactState,
         temperature: HeatState | None,
-        heat: HalfCycleHeat | None,
+        heat: HeatRecord | None,
         passing: LayerEvolution,
     ) -> PhaseEnd:
         if self._onwards is not None:

@@ -5,7 +5,6 @@ A stage begins with the depths and temperatures that the stage before it has lef
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -99,13 +98,8 @@ def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
         system: Of the case, on meshes as they are now.
         stage: Of its program.
     """
-    return _at_its_time(_varied(system, stage), system, stage)
-
-
-def _varied(system: Tribosystem, stage: Stage) -> Tribosystem:
-    """Return the system of the case of a stage, which leaves the bodies and their grids as they are; collective."""
     law: ContactLaw = system.contact_law
-    return law.varied(system, stage.case)
+    return _at_its_time(law.varied(system, stage.case), system, stage)
 
 
 def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
@@ -117,8 +111,7 @@ class Recurring:
 
     def __init__(self, stages: Sequence[Stage]) -> None:
         """Take the stages of a program."""
-        self._times = Counter(map(_changes, stages))
-        self._made: dict[str, tuple[Case, Tribosystem]] = {}
+        self._cases, self._made = [stage.case for stage in stages], list[tuple[Case, Tribosystem]]()
 
     def forget(self) -> None:
         """Make all further systems on other meshes."""
@@ -126,19 +119,11 @@ class Recurring:
 
     def at_stage(self, system: Tribosystem, stage: Stage) -> Tribosystem:
         """Return the bodies of a stage, as the function `at_stage`; collective."""
-        key = _changes(stage)
-        case, staged = self._made.get(key, (None, None))
-        if staged is None or case != stage.case:
-            staged = _varied(system, stage)
-            if self._times[key] > 1 and len(self._made) < MOST_RECURRING:
-                self._made[key] = stage.case, staged
-        return _at_its_time(staged, system, stage)
-
-
-def _changes(stage: Stage) -> str:
-    """Return the settings that differ from stage to stage, as a text."""
-    case = stage.case
-    return repr((case.motion, case.heat, case.punch.loads, case.strip.loads))
+        known = next((made for case, made in self._made if case == stage.case), None)
+        staged = at_stage(system, stage) if known is None else _at_its_time(known, system, stage)
+        if known is None and self._cases.count(stage.case) > 1 and len(self._made) < MOST_RECURRING:
+            self._made.append((stage.case, staged))
+        return staged
 
 
 def loading_of(system: Tribosystem, stage: Stage) -> Loading:
@@ -197,7 +182,7 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
     force = placed.normal_force * factor
     acts = f"normal force {force:,.6g} N" if force else f"all loads times {factor:.6g}"
     text = f"step {found.step + 1} of {found.steps} of the program ({found.key}), as it ends, held for ever: {acts}"
-    return _loaded(found.case, factor), text
+    return loads_times(found.case, factor), text
 
 
 def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
@@ -217,7 +202,7 @@ def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
     return with_case(system, case) if text else system
 
 
-def _loaded(case: Case, factor: float) -> Case:
+def loads_times(case: Case, factor: float) -> Case:
     """Return the case with all its loads times a factor."""
     if factor == 1:
         return case
@@ -236,7 +221,7 @@ def at_loads(system: Tribosystem, factor: float) -> Tribosystem:
     """Return the system under all its loads times a factor; collective."""
     if factor == 1:
         return system
-    case = _loaded(system.case, factor)
+    case = loads_times(system.case, factor)
     loaded = tuple(
         own.under(case, phase.fraction) for own, phase in zip(system.loaded, system.motion.phases, strict=True)
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fenwear.common.arrays import Array
 from fenwear.heat.heat_exchange import CROSSING, TERMS
 from fenwear.laws.wear import WornDepths
-from fenwear.steps.block import BlockHeat
+from fenwear.steps.block import HeatRecord
 from fenwear.steps.run_state import Totals, phase_totals, stacked
 from fenwear.steps.steady import SteadyState
 from fenwear.system import Tribosystem
@@ -39,7 +39,7 @@ class SteadyCycle:
     adds: Totals
     rate: WornDepths
     velocity: Mapping[str, float]
-    heat: BlockHeat | None
+    heat: HeatRecord | None
     moves: bool = True
 
     def __len__(self) -> int:
@@ -63,31 +63,21 @@ class SteadyCycle:
 
 def cycle_of_state(state: SteadyState) -> SteadyCycle:
     """Return the half-cycles of a cyclic steady state."""
-    sides = [] if state.heat is None else [state.heat.punch, state.heat.strip]
-    heat = heat_of(np.stack(sides, axis=1) if sides else np.zeros(0))
-    return _cycle(state.system, state.phase_pressure, state.velocity, heat)
-
-
-def _cycle(
-    system: Tribosystem, phase_pressure: Array, velocity: Mapping[str, float], heat: BlockHeat | None
-) -> SteadyCycle:
-    positions = system.motion.positions
-    latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
-    each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(phase_pressure)]
+    system, warm, positions = state.system, state.heat, state.system.motion.positions
+    latest = None if warm is None else (warm.punch[-1], warm.strip[-1])
+    each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(state.phase_pressure)]
     states = [system.conditions(k, p, latest, None, None) for k, p in each]
     if system.layers.memory.names:
         rest = system.rested(states)
         states = [system.conditions(k, p, latest, rest, None) for k, p in each]
-    adds = phase_totals(system, phase_pressure, states)
-    of_half_cycles = [reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)]
-    middle, rate = phase_pressure[positions // 2 :: positions], system.wear.phases(states).worn(phase_pressure)
-    return SteadyCycle(system, middle, phase_pressure, stacked(of_half_cycles), rate, velocity, heat)
+    adds, rate = phase_totals(system, state.phase_pressure, states), system.wear.phases(states)
+    half_cycles = stacked([reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)])
+    heat = None if warm is None else heat_of(warm.punch, warm.strip)
+    worn = rate.worn(state.phase_pressure)
+    return SteadyCycle(system, state.pressure, state.phase_pressure, half_cycles, worn, state.velocity, heat)
 
 
-def heat_of(temperature: Array) -> BlockHeat | None:
-    """Return temperatures at the ends of half-cycles (k, 2, n) as those of a block, without a balance; None of none."""
-    count = len(temperature)
-    if not count:
-        return None
-    terms, unknown = np.zeros((count, len(TERMS) + len(CROSSING))), np.full(count, np.nan)
-    return BlockHeat(temperature[:, 0], temperature[:, 1], terms, np.zeros(count, dtype=np.int64), unknown)
+def heat_of(punch: Array, strip: Array) -> HeatRecord:
+    """Return the temperatures of both surfaces at the ends of half-cycles (k, n) as a record without a balance."""
+    terms, unknown = np.zeros((len(punch), len(TERMS) + len(CROSSING))), np.full(len(punch), np.nan)
+    return HeatRecord(punch, strip, terms, np.zeros(len(punch), dtype=np.int64), unknown)

@@ -183,22 +183,6 @@ def stick_zone(problem: PartialSlipProblem) -> Mask:
     return problem.led(lambda: _second_cycle(problem).stuck)
 
 
-def stick_zone_edges(problem: PartialSlipProblem) -> list[Edge]:
-    """Return the ends of the stick zones of a plane contact in the second cycle without wear; collective.
-
-    Raises:
-        ConvergenceError: a time step did not converge.
-    """
-
-    def found() -> list[Edge]:
-        records = _second_cycle(problem)
-        return stick_edges(
-            problem.interface.middle.pair.x, records.stuck, records.slip_magnitude.sum(axis=0), records.touched
-        )
-
-    return problem.led(found)
-
-
 def _second_cycle(problem: PartialSlipProblem) -> TimeStepRecords:
     settled, _ = problem.cycle(problem.beginning(_crept(problem, problem.unworn())))
     return TimeStepRecords.joined(problem.cycle(settled)[1])
@@ -231,13 +215,13 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
     return fixed_point(advance, first, close, "creep and the cycle that it belongs to did not converge")
 
 
-def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
+def final_shape(problem: PartialSlipProblem, stick: Mask | None = None) -> FinalShape:
     """Return the shape to which partial slip wears; collective. With heat it and its temperatures go together.
 
     Args:
         problem: The bodies and what is done to them.
-        stick: The zone that never slips, as nodes (n,) or, in the plane, by its two ends; by default that of the second
-            cycle, see `stick_zone`.
+        stick: The nodes that never slip (n,); by default those of the second cycle, see `stick_zone`, in the plane
+            between ends that are located within their elements.
 
     Raises:
         ConvergenceError: nothing sticks, so that wear never ends; the contact did not converge.
@@ -246,7 +230,7 @@ def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None
     return problem.led(partial(_without_flow, problem, stick))
 
 
-def _without_flow(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+def _without_flow(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
     """Return the shape of bodies that nowhere flow: elsewhere it depends on the way there."""
     layers = problem.interface.layers
     if layers.hardness == np.inf:
@@ -262,7 +246,7 @@ def _without_flow(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | No
     )
 
 
-def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+def _with_heat(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
     heat = problem.heat
     if heat is None:
         return _final_shape(problem, stick)
@@ -278,12 +262,10 @@ def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None)
     raise ConvergenceError(f"contact and temperatures of the end did not converge in {MOST_TIMES} times")
 
 
-def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+def _final_shape(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
     """Return the shape of bodies whose temperatures stay."""
-    if isinstance(stick, np.ndarray):
-        return _of_nodes(problem, stick)
     if stick is not None:
-        return _of_ends(problem, stick)
+        return _of_nodes(problem, stick)
     forces = [step.force or 0.0 for step in problem.program.steps]
     force = max(map(abs, forces))
     found, factor = _of_cycle(problem, problem), 1.0
@@ -306,22 +288,15 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | Non
 
 def _of_cycle(problem: PartialSlipProblem, driven: PartialSlipProblem) -> FinalShape:
     """Return the shape whose stick zone is that of the second cycle of a problem, the same or under another force."""
-    if problem.interface.middle.pair.punch.dim == 2:
-        return _of_ends(problem, stick_zone_edges(driven))
-    if problem.interface.middle.compliance.on_grid is not None:
-        return _of_grid(problem, _second_cycle(driven))
-    return _of_surface(problem, stick_zone(driven))
-
-
-def _of_ends(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape:
-    """Return the shape with stick zones between located ends."""
-    found = _of_edges(problem, edges) if len(edges) == 2 else None
-    if found is not None:
-        return found
-    zone = np.zeros(len(problem.weights), dtype=bool)
-    for left, right in zip(edges[::2], edges[1::2], strict=True):
-        zone[left.node : right.node + 1] = True
-    return _of_surface(problem, zone)
+    records, middle = _second_cycle(driven), problem.interface.middle
+    if middle.compliance.on_grid is not None and middle.pair.punch.dim > 2:
+        return _of_grid(problem, records)
+    found = None
+    if middle.pair.punch.dim == 2:
+        slid = records.slip_magnitude.sum(axis=0)
+        edges = stick_edges(middle.pair.x, records.stuck, slid, records.touched)
+        found = _of_edges(problem, edges) if len(edges) == 2 else None
+    return _of_surface(problem, records.stuck) if found is None else found
 
 
 def _of_nodes(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
@@ -545,5 +520,6 @@ def cycle_of_final(found: FinalShape) -> SteadyCycle:
     strokes, steps = system.motion.half_cycles, system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
     adds, rate = stacked([none_yet(system)] * strokes), found.worn.times(0.0)
-    heat = heat_of(np.zeros(0) if found.temperature is None else np.stack([found.temperature] * strokes))
+    warm = found.temperature
+    heat = None if warm is None else heat_of(*(np.tile(side, (strokes, 1)) for side in warm))
     return SteadyCycle(system, found.pressures[ends], found.pressures, adds, rate, {}, heat, moves=False)

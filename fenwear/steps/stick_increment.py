@@ -6,7 +6,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
@@ -156,10 +155,6 @@ def _newton(step: Step) -> StickState:
         harder.hardness = np.inf
         pressed = _newton(harder)
         return _from(step, _status(pressed.pressure, pressed.trial, step.mu, step.hardness))
-    if step.imposed.force is not None:
-        held = _by_displacement(step, starts[1], step.imposed.force)
-        if held is not None:
-            return _from(step, held)
     raise failure
 
 
@@ -170,33 +165,6 @@ def _status(pressure: Array, trial: Array, friction: Array, hardness: float) -> 
     limit = friction * pressure
     slipping = closed & (np.linalg.norm(trial, axis=1) > limit)
     return ContactStatus(closed, slipping, trial, limit, pressure, pressure >= hardness)
-
-
-def _by_displacement(step: Step, status: ContactStatus, force: float) -> ContactStatus | None:
-    """Return the status in which the rig's displacement gives an imposed force, found by bisection; None for none."""
-    held = _step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
-    last = status
-
-    def missing(displacement: float) -> float:
-        nonlocal last
-        held.imposed = replace(held.imposed, displacement=displacement)
-        found = _iterate(held, last)[0]
-        last = held.status_of(found)[0]
-        return float(step.position.pull @ found.f) - force
-
-    begin = step.before.displacement
-    reach = float(step.scale[1].max() * max(abs(force), 1.0) / step.position.pair.weights.sum())
-    try:
-        first = missing(begin)
-        for _ in range(30):
-            end = begin - np.copysign(reach, first)
-            if missing(end) * first <= 0:
-                scipy.optimize.brentq(missing, begin, end, xtol=1e-14 * reach, rtol=1e-14)
-                return last
-            reach *= 2
-    except ConvergenceError:
-        pass
-    return None
 
 
 def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:

@@ -280,20 +280,15 @@ def _judged(
 
 def merged(finest: Program, ends: Ends) -> Program:
     """Return a program whose steps end where these of another one do."""
-    found, begin, place = [], 0, finest.steps[-1].displacement
-    for end in ends:
-        last = finest.steps[end]
-        duration = sum(step.duration for step in finest.steps[begin : end + 1])
-        middle, first = last.offset, finest.steps[begin].way
+    found, steps = [], finest.steps
+    for begin, end in zip(np.append(0, ends[:-1] + 1), ends, strict=True):
+        first, last, place = steps[begin].way, steps[end], steps[begin - 1].displacement
         if first is not None and last.way is not None:
             way = Screw(first.first, last.way.last)
-            found.append(replace(last, duration=duration, offset=way.at(0.5), way=way))
-            begin = end + 1
-            continue
-        if place is not None and last.displacement is not None:
-            middle = (place + last.displacement) / 2
-        found.append(replace(last, duration=duration, offset=middle))
-        begin, place = end + 1, last.displacement
+            last = replace(last, offset=way.at(0.5), way=way)
+        elif place is not None and last.displacement is not None:
+            last = replace(last, offset=(place + last.displacement) / 2)
+        found.append(replace(last, duration=sum(step.duration for step in steps[begin : end + 1])))
     return replace(finest, steps=tuple(found))
 
 

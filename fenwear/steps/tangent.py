@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from fenwear.laws.friction import ContactConditions
 from fenwear.laws.pressure_law import PressureLaw
 from fenwear.laws.wear import PhasesWear, WornDepths
 from fenwear.surfaces import Compliance, Interface
-from fenwear.system import Creep, Tribosystem, heating_friction
+from fenwear.system import Tribosystem, heating_friction
 
 STEP, MAX_HALVINGS, SETTLED = 1.0, 10, 1e-6  # of differences to temperatures, K; of their steps; of the slopes
 THIN = 1e-9  # mm: the least of differences to the thickness of debris
@@ -64,15 +63,15 @@ def phase_tangent(
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
     gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)
-    gap_by_p, gap_by_s = gap_rows @ state_p, gap_rows @ state_s
-    crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
-    none: Array = np.zeros((n, len(crept.stays)))
+    crept, steeper = creep.tangent(phase, friction_ratio), creep.tangent(phase, further)
+    by_mu_crept, seen_by_mu = steeper.by_pressure - crept.by_pressure, steeper.seen_by_pressure - crept.seen_by_pressure
+    none: Array = np.zeros((n, len(crept.stay)))
+    gap_by_p = gap_rows @ state_p + crept.opened @ (crept.seen_by_pressure + seen_by_mu * traction_p)
+    gap_by_s = np.hstack([gap_rows @ state_s + crept.opened @ seen_by_mu @ traction_s, crept.opened * crept.seen])
+    state_s = np.block([[state_s, np.zeros((dim, len(crept.stay)))], [by_mu_crept @ traction_s, np.diag(crept.stay)]])
+    state_p, dim = np.vstack([state_p, crept.by_pressure + by_mu_crept * traction_p]), len(state_s)
     laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
     traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
-    gap_by_p = gap_by_p + crept.gap_by_pressure
-    gap_by_s = np.hstack([gap_by_s + crept.gap_by_heat, crept.gap_by_state])
-    state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
-    state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p
     by_state = by_mu @ traction_s + gap_by_s + before_s
     slope = system.layers.at(phase).slope(pressure[None])
@@ -272,47 +271,6 @@ def _lying(
         by_loss = over.by_loss(thickness, (puts @ taken)[None])[:, None] * puts * path
         ends = [end + by_loss * more for end, more in zip(ends, by_lost, strict=True)]
     return np.diag(np.exp(-over.loss)), ends, reads
-
-
-class _Creeping(NamedTuple):
-    """Creep in a phase.
-
-    Attributes:
-        gap_by_state: Gap by its state at the start (n, k).
-        gap_by_heat: By the state of the heat (n, dim).
-        gap_by_pressure: By the pressures (n, n).
-        stays: Remaining share of its state (k,).
-        by_state: State at the end by the state of the heat (k, dim).
-        by_pressure: By the pressures (k, n).
-    """
-
-    gap_by_state: Array
-    gap_by_heat: Array
-    gap_by_pressure: Array
-    stays: Array
-    by_state: Array
-    by_pressure: Array
-
-
-def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p: Array, traction_s: Array) -> _Creeping:
-    """Return the derivatives of creep in a phase.
-
-    Args:
-        creep: All that does.
-        phase: Number of the phase.
-        ratios: tau (n, d), and that of a friction that is larger by 1.
-        traction_p, traction_s: Change of mu by pressure and by the state of the heat, times the pressure.
-    """
-    own, more = creep.tangent(phase, ratios[0]), creep.tangent(phase, ratios[1])
-    by_mu, seen_by_mu = more.by_pressure - own.by_pressure, more.seen_by_pressure - own.seen_by_pressure
-    return _Creeping(
-        own.opened * own.seen,
-        own.opened @ seen_by_mu @ traction_s,
-        own.opened @ (own.seen_by_pressure + seen_by_mu * traction_p),
-        own.stay,
-        by_mu @ traction_s,
-        own.by_pressure + by_mu * traction_p,
-    )
 
 
 def _heated(

@@ -52,7 +52,7 @@ from fenwear.results.stored_history import load_history
 from fenwear.steps.jump_method import FINE
 from fenwear.steps.jump_step import LOOSEST
 from fenwear.steps.run_state import RunState, all_phases
-from fenwear.steps.uniqueness import heat_gain
+from fenwear.steps.stability import heat_gain
 from fenwear.studies.run import preparation_of
 from fenwear.system import Tribosystem, assemble, set_up_by, with_case, with_reduced_heat
 

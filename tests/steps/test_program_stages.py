@@ -179,8 +179,8 @@ def test_stages_that_come_again_are_set_up_once(edited: Edited, monkeypatch: pyt
     for stage in stages_of(case):
         *_, each = march(program.at_stage(system, stage), stage.end, start=state, implicit=True)
         state = each.end
-    set_up = program._varied
-    monkeypatch.setattr(program, "_varied", lambda *given: (made.append(given), set_up(*given))[1])
+    set_up = program.at_stage
+    monkeypatch.setattr(program, "at_stage", lambda *given: (made.append(given), set_up(*given))[1])
     *_, last = follow_program(system, marched, RunLimits(case.run.half_cycles))
     assert len(made) == 2
     for name in ("pressure", "wear"):

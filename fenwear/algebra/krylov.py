@@ -9,18 +9,18 @@ import numpy as np
 from fenwear.common.arrays import Array
 
 ACCURACY, ENOUGH = 1e-11, 2e-12  # residual over the right-hand side, and scaled to 1, that end iterations of `solution`
-RESTART, RESTARTS = 80, 4
+MOST = 30  # iterations of `solution`
 FEW = 1e-6  # accuracy that directions which are at right angles to half of all digits are enough for
 
 
 def solution(multiply: Callable[[Array], Array], precondition: Callable[[Array], Array], b: Array) -> Array:
-    """Return the solution of a square system (size,) to many digits; arguments as of `flexible`.
+    """Return the solution of a square system (size,) to many digits by few iterations; arguments as of `flexible`.
 
     Raises:
         LinAlgError: the accuracy was not reached.
     """
     accuracy = max(ACCURACY, ENOUGH / max(float(np.linalg.norm(b)), 1e-300))
-    x, rest, *_ = flexible(multiply, precondition, b, accuracy, RESTART, RESTARTS)
+    x, rest, *_ = flexible(multiply, precondition, b, accuracy, MOST, 1)
     if not (rest <= accuracy and np.isfinite(x).all()):
         raise np.linalg.LinAlgError("iterations do not converge")
     return x

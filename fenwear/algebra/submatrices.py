@@ -132,7 +132,7 @@ class Updating:
         stayed, from_new = np.delete(np.arange(size), gone), np.searchsorted(kept, into)
 
         def solve(b: Array) -> Array:
-            first: Array = np.zeros(size)
+            first: Array = np.zeros((size, *b.shape[1:]))
             first[stayed] = b[from_base]
             first = base.solve(first)
             y = solve_schur(np.concatenate([b[from_new] - rows @ first, -first[gone]]))
@@ -211,15 +211,7 @@ class Blocks:
     def __init__(self, matrices: Array, nodes: int) -> None:
         self.matrices, self.nodes = matrices, nodes
         self.parts = [Dense(matrix) for matrix in matrices]
-        self._near: list[tuple[Array, Dense]] = []  # of the last steps, by their wear
-
-    @cached_property
-    def _mean(self) -> Array:
-        """The mean of the phases' S with the balance of forces added, for rigid modes open gaps, too."""
-        n = self.nodes
-        return np.asarray(
-            sum(matrix[:n, :n] + matrix[:n, n:] @ matrix[n:, :n] for matrix in self.matrices) / len(self.matrices)
-        )
+        self.depths = Depths(np.zeros(nodes), np.zeros((nodes, nodes)))  # of the last step that was eliminated
 
     def added(self, diagonal: Array) -> Blocks:
         """Return the blocks with numbers (m, n) added to the diagonal of each phase."""
@@ -227,27 +219,32 @@ class Blocks:
         blocks[:, every, every] += diagonal
         return Blocks(blocks, self.nodes)
 
-    def near(self, wear: Array, touched: Indices) -> Solve:
-        """Return a near inverse of 1 + (sum of D_k) S^-1 on nodes that touch: S (S + sum of D_k)^-1.
 
-        That of another step serves whose wear is alike.
+class Depths:
+    """Solution operators of 1 + sum of D_k A_k^-1 on nodes that touch, near to those of other nodes and other wear.
 
-        Args:
-            wear: D_k summed up (n,).
-            touched: Numbers of the nodes.
-        """
-        self._near.sort(key=lambda kept: _unlike(kept[0], wear))
-        if not self._near or _unlike(self._near[0][0], wear) > ALIKE:
-            self._near.insert(0, (wear, Dense(self._mean + np.diag(wear))))
-            del self._near[KEPT:]
-        near_wear, matrix = self._near[0]
-        solve = matrix.factor(touched)
-        return lambda v: v - near_wear[touched] * solve(v)
+    Args:
+        wear: D_k summed up (n,), of the matrix.
+        matrix: Sum of D_k A_k^-1 (n, n); zero at nodes that do not touch.
+    """
+
+    def __init__(self, wear: Array, matrix: Array) -> None:
+        self.wear, self.matrix = wear, matrix
+        self._factored: list[tuple[Array, Dense]] = []  # of the last steps, by their wear
+
+    def factor(self, wear: Array, touched: Indices) -> Solve:
+        """Return the solution operator of a wear (n,); that of another step serves whose wear is alike."""
+        self._factored.sort(key=lambda step: _unlike(step[0], wear))
+        if not self._factored or _unlike(self._factored[0][0], wear) > ALIKE:
+            ratio = wear / np.where(self.wear > 0, self.wear, 1.0)
+            self._factored.insert(0, (wear, Dense(np.eye(len(wear)) + ratio[:, None] * self.matrix)))
+            del self._factored[KEPT:]
+        return self._factored[0][1].factor(touched)
 
 
-def _unlike(wear: Array, other: Array) -> float:
+def _unlike(one: Array, other: Array) -> float:
     """Return the largest ratio of two wears (n,)."""
-    both = np.array([wear, other])
+    both = np.array([one, other])
     least, most = both.min(axis=0), both.max(axis=0)
     return float((most / np.where(least > 0, least, np.where(most > 0, TINY, 1.0))).max(initial=0.0))
 
@@ -378,7 +375,8 @@ class Worn(Phases):
 
         (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
 
-    with the phases' factors, which do not change with the length of a step: 5 to 20 iterations of GMRES.
+    with the phases' factors, which do not change with the length of a step: by GMRES from the factor of another step and
+    other nodes, which is made anew where it does not lead there in few iterations.
     """
 
     def __init__(self, blocks: Blocks, wear: Array) -> None:
@@ -394,14 +392,14 @@ class Worn(Phases):
         gaps += (self.wear * pressure).sum(axis=0)
 
     def _solution(self, cut: _Cut) -> Solve:
-        wear, touched = self.wear, np.unique(np.concatenate(cut.nodes)).astype(np.int32)
+        blocks, wear = self.blocks, self.wear.sum(axis=0)
+        touched = np.unique(np.concatenate(cut.nodes)).astype(np.int32)
         at = [np.searchsorted(touched, nodes) for nodes in cut.nodes]
-        near = self.blocks.near(wear.sum(axis=0), touched)
 
         def worn(parts: Sequence[Array]) -> Array:
             depth = np.zeros(len(touched))
             for k, there in enumerate(at):
-                depth[there] += wear[k, cut.nodes[k]] * parts[k][: len(there)]
+                depth[there] += self.wear[k, cut.nodes[k]] * parts[k][: len(there)]
             return depth
 
         def opened(depth: Array) -> list[Array]:
@@ -412,13 +410,24 @@ class Worn(Phases):
 
         def solve(b: Array) -> Array:
             first = cut.solve(b)
+            right = worn(first)
             try:
-                y = solution(lambda v: v + worn(opened(v)), near, worn(first))
+                y = solution(lambda v: v + worn(opened(v)), blocks.depths.factor(wear, touched), right)
             except np.linalg.LinAlgError:
-                return Bordered(self.blocks, *_as_border(wear))._solution(cut)(b)
+                blocks.depths = Depths(wear, self._depths(cut))
+                y = blocks.depths.factor(wear, touched)(right)
             return np.concatenate(first) - np.concatenate(opened(y))
 
         return solve
+
+    def _depths(self, cut: _Cut) -> Array:
+        """Return the sum of D_k A_k^-1 of some unknowns (n, n)."""
+        matrix = np.zeros((self.blocks.nodes, self.blocks.nodes))
+        for k, (nodes, factor) in enumerate(zip(cut.nodes, cut.solves, strict=True)):
+            low, high = cut.cuts[k]
+            by_depth = factor(np.eye(high - low, len(nodes)))
+            matrix[np.ix_(nodes, nodes)] += self.wear[k, nodes, None] * by_depth[: len(nodes)]
+        return matrix
 
 
 def _as_border(local: Array) -> tuple[Array, Array]:

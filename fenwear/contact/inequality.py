@@ -228,7 +228,7 @@ class Inequality:
                     f = self._function(x)
                 rest = f if free is None else f[free]
                 size = float(rest @ rest) ** 0.5
-                small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance())
+                small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance(len(rest)))
                 if small and self._wanted(x, f, free) == key:
                     self.residual = f
                     return x

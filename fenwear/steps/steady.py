@@ -54,7 +54,7 @@ from fenwear.system import (
 )
 
 # Lengths of steps over the elastic gap of the mean pressure by its wear of a cycle; from afar they grow.
-FAR = 1e3
+FAR, MIDWAY = 1e3, 30.0
 NEAR = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 MOST, RESTING = 12, 1e-8  # steps that far; change of the shape in a step over the elastic gap, that ends them
 DIGITS = 1e-9  # of contacts and heat
@@ -351,7 +351,7 @@ class _End:
         wear = self.system.phases_wear
         easy = wear.punch.linear and wear.strip.linear and not self.system.motion.steps
         try:
-            end = self._resting(() if easy else NEAR[::2])
+            end = self._resting(() if easy else (MIDWAY,))
         except ConvergenceError:
             end = self._resting(NEAR)
         return self._state(end)

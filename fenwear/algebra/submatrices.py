@@ -375,8 +375,8 @@ class Worn(Phases):
 
         (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
 
-    with the phases' factors, which do not change with the length of a step: by GMRES from the factor of another step and
-    other nodes, which is made anew where it does not lead there in few iterations.
+    with the phases' factors, which do not change with the length of a step: by GMRES from the factor of another step.
+    It is made anew where it does not lead there in few iterations.
     """
 
     def __init__(self, blocks: Blocks, wear: Array) -> None:

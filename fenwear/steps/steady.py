@@ -349,9 +349,9 @@ class _End:
         if self._rate == 0:
             raise ConvergenceError(NOTHING_WEARS)
         wear = self.system.phases_wear
-        easy = wear.punch.linear and wear.strip.linear and not self.system.motion.steps
+        loads_vary = (MIDWAY,) if self.system.motion.steps else ()
         try:
-            end = self._resting(() if easy else (MIDWAY,))
+            end = self._resting(loads_vary if wear.punch.linear and wear.strip.linear else NEAR[::2])
         except ConvergenceError:
             end = self._resting(NEAR)
         return self._state(end)

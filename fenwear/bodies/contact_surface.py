@@ -99,6 +99,13 @@ class ContactSurface:
         return np.asarray(np.unique(part[self.nodes], return_inverse=True)[1], dtype=np.int64)
 
     @cached_property
+    def number(self) -> NDArray[np.int64]:
+        """Number of each trace node among the contact's nodes (N,); -1 of one that carries no pressure."""
+        found = np.full(len(self.trace), -1)
+        found[self.nodes] = np.arange(len(self.nodes))
+        return found
+
+    @cached_property
     def rounds(self) -> tuple[list[Round], NDArray[np.int64]]:
         """Round parts of the surface as meshed, and the part of each trace node, -1 for none (N,)."""
         if self.made is not None:

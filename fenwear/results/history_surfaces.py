@@ -57,11 +57,9 @@ class Column(NamedTuple):
 
 def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     """Return the pressure nodes around each linear facet (f, 2, 3 or 4)."""
-    number = np.full(len(surface.trace), -1)
-    number[surface.nodes] = np.arange(len(surface.nodes))
     if surface.cell == "triangle":  # the pressure lives on the vertices
-        return number[surface.facets[:, :3]]
-    cells = number[surface.facets[:, linear_cells(surface.cell, surface.degree)]]
+        return surface.number[surface.facets[:, :3]]
+    cells = surface.number[surface.facets[:, linear_cells(surface.cell, surface.degree)]]
     cells = cells.reshape(-1, cells.shape[-1])
     return cells[(cells >= 0).all(axis=1)]
 

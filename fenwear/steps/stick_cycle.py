@@ -85,11 +85,7 @@ class PartialSlipProblem:
 
     def kept_at(self, heat: StickHeat, temperature: Array) -> PartialSlipProblem:
         """Return the problem at a constant temperature (dim,)."""
-
-        def expanded(loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
-            return heat.expanded(loaded, temperature, offset)
-
-        return replace(self, heat=None, expanded=expanded, pressed=[])
+        return replace(self, heat=None, expanded=partial(heat.expanded, temperature), pressed=[])
 
     def elastic(self) -> PartialSlipProblem:
         """Return the problem with surfaces of unlimited hardness."""

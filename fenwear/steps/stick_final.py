@@ -118,9 +118,7 @@ def zone_width(edges: Sequence[Edge]) -> tuple[float, float]:
 
 def beside(surface: ContactSurface, zone: Mask) -> Mask:
     """Return the nodes beside a zone of pressure nodes: they share a facet with it (n,)."""
-    number = np.full(len(surface.trace), -1)
-    number[surface.nodes] = np.arange(len(surface.nodes))
-    facets = number[surface.facets]
+    facets = surface.number[surface.facets]
     touched = (zone[facets] & (facets >= 0)).any(axis=1)
     found = np.zeros(len(zone), dtype=bool)
     found[facets[touched][facets[touched] >= 0]] = True

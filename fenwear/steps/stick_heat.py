@@ -26,7 +26,7 @@ from scipy.sparse import coo_array, csr_array
 from fenwear.algebra.fixed_point import fixed_point
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.case import Case
+from fenwear.case import Case, Heat
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, InputError
 from fenwear.heat.conduction import HeatBody
@@ -97,7 +97,7 @@ class StickHeat:
         friction, debris = terms.sum(axis=0)[:2]
         self.exchange.check_bounds(self.exchange.at(before), self.exchange.at(after), float(friction - debris))
 
-    def expanded(self, loaded: LoadEffect, temperature: Array, offset: float | Placement) -> LoadEffect:
+    def expanded(self, temperature: Array, loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
         """Return the effect of the loads and of the expansion at temperatures (dim,), with the strip at an offset."""
         punch, strip = (
             expansion(part)
@@ -162,18 +162,13 @@ class CycleMap:
         return JumpEnd(self.through, cycles).state(missing, np.zeros_like(missing))
 
 
-def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat | None:
-    """Return the heat of a case with this many time steps in a half-cycle; None without heat; collective.
+def stick_heat(interface: StickInterface, case: Case, heat: Heat, steps: int) -> StickHeat:
+    """Return the heat of a case with this many time steps in a half-cycle; collective.
 
     Raises:
         HeatError: no basis gives temperatures that die out.
     """
-    bodies = interface.bodies
-    if case.heat is None:
-        return None
-    middle = interface.middle.pair
-    motion = timed_motion(case, steps)
-    passage = None
+    bodies, middle, motion, passage = interface.bodies, interface.middle.pair, timed_motion(case, steps), None
     if case.stick.force is None and far_enough(case, middle.punch):
         passage = Passage(middle, interface.sliding.field, motion)
     punch, strip = bodies.heat
@@ -181,7 +176,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
     rows = n, n if passage is None else len(passage.nodes)
     nothing = tuple(np.zeros((count, body.owned)) for count, body in zip(rows, bodies.heat, strict=True))
     exchange = prepare_exchange(
-        case.heat,
+        heat,
         bodies.heat,
         middle,
         (nothing[0], nothing[1]),
@@ -195,7 +190,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         keep=interface.keep,
         fresh=interface.fresh,
     )
-    expanded = expansions(interface, exchange, bodies, case.heat.initial)
+    expanded = expansions(interface, exchange, bodies, heat.initial)
     exchange = exchange.through(conductance_of(interface.layers, case, bodies.regions, interface.middle.pair))
     return StickHeat(heated_directly(exchange), expanded, interface, stays=passage is None)
 
@@ -308,7 +303,7 @@ def coupled_step(
         conducting = last.closed if tries < ENOUGH else conducting
         made, pressure = np.split(x / units, 2)
         warm = heat.step(at.next_step, at.temperature, made, conductance(pressure, conducting))[0].values
-        expanded = heat.expanded(loaded, warm, step.offset)
+        expanded = heat.expanded(warm, loaded, step.offset)
         last = solved(expanded, near)
         near, tries = (last.pressure, last.trial), tries + 1
         settled = tries >= ENOUGH or bool((last.closed == conducting).all())

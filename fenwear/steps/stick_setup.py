@@ -77,7 +77,8 @@ def placed_by_slip(
     Arguments as of `partial_slip_problem`, bodies being built.
     """
     problem = unheated_problem(case, bodies, steps, fresh=fresh, condensed=condensed)
-    if _asks_for_slip(problem, case) and touches(problem) and not _slips_far(problem):
+    by_default = not isinstance(case.motion, Cycle) and getattr(case.motion, "positions", 2) is None
+    if problem.interface.moves and by_default and touches(problem) and not _slips_far(problem):
         return unheated_problem(case, bodies, steps, fresh=fresh, moves=False)
     return problem
 
@@ -132,8 +133,7 @@ def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
     if case.heat is None:
         return problem
     steps = len(problem.program.steps) // problem.program.half_cycles
-    heat = stick_heat(problem.interface, case, steps)
-    return replace(problem, heat=heat)
+    return replace(problem, heat=stick_heat(problem.interface, case, case.heat, steps))
 
 
 def _check_passing(case: Case, surface: ContactSurface) -> None:
@@ -175,20 +175,10 @@ def touches(problem: PartialSlipProblem) -> bool:
     return problem.led(lambda: bool(problem.beginning().contact.closed.any()))
 
 
-def _asks_for_slip(problem: PartialSlipProblem, case: Case) -> bool:
-    """Return whether a strip passes by default, judged by its supports."""
-    by_default = not isinstance(case.motion, Cycle) and getattr(case.motion, "positions", 2) is None
-    return problem.interface.moves and by_default
-
-
 def _slips_far(problem: PartialSlipProblem) -> bool:
     """Return whether the slip of the first cycle passes nodes, however far the supports move; collective."""
-
-    def found() -> bool:
-        pair, cycle = problem.interface.middle.pair, TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
-        return passes(cycle.slip_amplitude(pair.weights, problem.program.half_cycles), pair.punch)
-
-    return problem.led(found)
+    pair, cycle = problem.interface.middle.pair, TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
+    return passes(cycle.slip_amplitude(pair.weights, problem.program.half_cycles), pair.punch)
 
 
 HALVINGS = 4  # of a step at most

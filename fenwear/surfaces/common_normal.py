@@ -80,9 +80,7 @@ def _outward_areas(surface: ContactSurface) -> tuple[Array, NDArray[np.int64]]:
     They are as long as the facet is large there; where a node carries no pressure the facet's others say which way is
     outward.
     """
-    number = np.full(len(surface.trace), -1)
-    number[surface.nodes] = np.arange(len(surface.nodes))
-    node = number[surface.facets]
+    node = surface.number[surface.facets]
     area = _area_vectors(surface)
     along = np.einsum("fkc,fkc->fk", area, surface.outward[node]) * (node >= 0)
     area *= np.sign(np.where(node >= 0, along, along.sum(axis=1, keepdims=True)))[:, :, None]

@@ -241,12 +241,12 @@ class Recorder:
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
 
-    def add(self, one: HalfCycle) -> None:
+    def add(self, half_cycle: HalfCycle) -> None:
         """Record one half-cycle."""
         taken = self.system.remedies.take()
         if taken:
             self._remedies += taken
-        self._rows.append(one)
+        self._rows.append(half_cycle)
         self._retries.append(taken.total())
 
     def change(self) -> float:
@@ -257,8 +257,8 @@ class Recorder:
         """Return the periodicity of half-cycles (k,)."""
         if rows[0].steps is not None:  # their numbers need not be equal
             pairs = [(row.steps.pressure, row.steps.before) for row in rows if row.steps is not None]
-            found = np.array([pressure_scales(self.system, now[None])[0] for now, _ in pairs])
-            return np.array([np.abs(now - before).max() for now, before in pairs]) / found
+            scales = np.array([pressure_scales(self.system, now[None])[0] for now, _ in pairs])
+            return np.array([np.abs(now - before).max() for now, before in pairs]) / scales
         pressure = np.array([[p.contact.pressure[0] for p in row.phases] for row in rows])
         before = np.array([[p.before for p in row.phases] for row in rows])
         changes: Array = np.abs(pressure - before).max(axis=(1, 2)) / pressure_scales(self.system, pressure)
@@ -283,7 +283,7 @@ class Recorder:
         optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
         heat, heats = None, [row.heat for row in rows if row.heat is not None]
         if heats:
-            heat = HeatRecord(*map(np.array, zip(*(vars(one).values() for one in heats), strict=True)))
+            heat = HeatRecord(*map(np.array, zip(*(vars(heat).values() for heat in heats), strict=True)))
         block = Block(
             system,
             np.array([row.number for row in rows]),
@@ -346,7 +346,7 @@ class Recorder:
         length = self.system.elastic_length
         if self._rows and self._rows[0].steps is not None:
             steps = [row.steps for row in self._rows if row.steps is not None]
-            return np.array([complementarity_error(one.pressure, one.gap, length).max() for one in steps])
+            return np.array([complementarity_error(step.pressure, step.gap, length).max() for step in steps])
         states = [[record.contact for record in row.phases] for row in self._rows]
         pressure, gap = (
             np.array([[getattr(c, name)[0] for c in row] for row in states]) for name in ("pressure", "gap")

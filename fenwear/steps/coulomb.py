@@ -160,7 +160,9 @@ class Coulomb:
         if before.loading != case.loading:
             bodies = bodies.under(case)
             condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
-        held, asked = ((one.heat, one.punch.boundary_of_heat, one.strip.boundary_of_heat) for one in (before, case))
+        held, asked = (
+            (variant.heat, variant.punch.boundary_of_heat, variant.strip.boundary_of_heat) for variant in (before, case)
+        )
         if held != asked:
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
         moves = unheated_problem(case, bodies, condensed=condensed).interface.moves
@@ -192,12 +194,12 @@ class Coulomb:
                 "no unique final shape exists with a pressure_threshold: the pressure below it that slipping nodes "
                 "keep depends on the run before. Follow the wear by `run`"
             )
-        system, found = on_sufficient_grid(
+        system, shape = on_sufficient_grid(
             system,
-            lambda own: final_shape(own.law_state.problem),
-            lambda found: np.asarray((found.depth > 0) | (found.pressures > 0).any(axis=0)),
+            lambda grown: final_shape(grown.law_state.problem),
+            lambda final: np.asarray((final.depth > 0) | (final.pressures > 0).any(axis=0)),
         )
-        return replace(found, system=system)
+        return replace(shape, system=system)
 
     def on_other_grid(self, memory: Memory, before: Tribosystem, after: Tribosystem) -> Memory:
         """Return the memory of a run on another contact grid; collective. Jumps continue from a cycle made there."""
@@ -257,7 +259,7 @@ def system_of(
             problem, fineness = fine_enough(problem, case)
             ends = fineness.ends
     exchange = system.exchange if problem.heat is None else problem.heat.exchange
-    setup = StickSetup(problem, fineness, _told_apart(case, bodies), ends, heat != "none")
+    setup = StickSetup(problem, fineness, _checksum(case, bodies), ends, heat != "none")
     return replace(system, exchange=exchange, law_state=setup)
 
 
@@ -270,10 +272,10 @@ def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
     return sliding.measured_on(pair).motion.as_single_phase(sliding.field.over(float(rate)))
 
 
-def _told_apart(case: Case, bodies: Bodies) -> float:
+def _checksum(case: Case, bodies: Bodies) -> float:
     """Return a number of the wear that the meshes follow, the warmth of properties and what is done; collective."""
     worn = 0.0 if bodies.followed is None else float(bodies.followed.punch.sum() + bodies.followed.strip.sum())
-    warm = 0.0 if bodies.warmed is None else float(sum(one.sum() for one in bodies.warmed))
+    warm = 0.0 if bodies.warmed is None else float(sum(temperature.sum() for temperature in bodies.warmed))
     done = case.motion, case.stick, case.contact, case.wear, case.heat, case.loading
     return float(crc32(repr((worn, bodies.comm.allreduce(warm), done)).encode()))
 
@@ -326,9 +328,11 @@ class _Run:
             load: Factor of all loads.
         """
         problem, records, middle = self.problem, steps.records, self.middle(steps)
-        own, stroke = slice(middle, middle + 1), (number - 1) % self.strokes
+        at_middle, stroke = slice(middle, middle + 1), (number - 1) % self.strokes
         iterations = int(records.iterations[middle])
-        contact = ContactState(records.pressure[own], records.gap[own], records.rigid[own], iterations)
+        contact = ContactState(
+            records.pressure[at_middle], records.gap[at_middle], records.rigid[at_middle], iterations
+        )
         step = problem.program.steps[steps.first + middle]
         position = problem.interface.position(step.offset)
         pressed = records.pressure[middle] > 0
@@ -362,8 +366,8 @@ class HalfCycles(_Run):
         begin = self.at(state, load)
         at, records = problem.half_cycle(begin)
         first, number = begin.next_step, state.half_cycle + 1
-        own = slice(first, first + len(records))
-        before = begin.pressures[own]
+        rows = slice(first, first + len(records))
+        before = begin.pressures[rows]
         lost = problem.worn(records, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first, lost)
@@ -416,7 +420,7 @@ class Jumps(_Run):
         parts, old = _in_order(problem, then), _in_order(problem, now)
         stuck = np.array([records.stuck for _, records, _ in parts])
         lost = [problem.worn(then.records, then.begin, which) for *_, which in parts]
-        adds = [self.meter(records, first, own) for (first, records, _), own in zip(parts, lost, strict=True)]
+        adds = [self.meter(records, first, loss) for (first, records, _), loss in zip(parts, lost, strict=True)]
         depths, sums, made = counted_back(then.worn, lost), counted_back(totals, adds), []
         for k, ((first, records, _), (_, earlier, _)) in enumerate(zip(parts, old, strict=True)):
             before = records.pressure - (records.pressure - earlier.pressure) / cycles
@@ -467,9 +471,9 @@ class Jumps(_Run):
 
     def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: float) -> Totals:
         """Return the additions of a jump: by the trapezoidal rule, but for the wear, which follows from its depths."""
-        adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
-        found = (adds[0] + adds[1]).times(cycles / 2)
-        return with_worn(self.system, found, then.worn - now.worn)
+        adds = [self.meter(cycle.records, cycle.first_step, cycle.rate) for cycle in (now, then)]
+        totals = (adds[0] + adds[1]).times(cycles / 2)
+        return with_worn(self.system, totals, then.worn - now.worn)
 
 
 def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
@@ -481,11 +485,11 @@ def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
 def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[int, TimeStepRecords, slice]]:
     """Return first step, records and place in the cycle's record of each half-cycle, in the order of the motion."""
     steps, ends = problem.program.steps, np.cumsum([len(records) for records in cycle.half_cycles])
-    found = [
+    half_cycles = [
         ((cycle.first_step + int(end) - len(records)) % len(steps), records, slice(end - len(records), end))
         for records, end in zip(cycle.half_cycles, ends, strict=True)
     ]
-    return sorted(found, key=lambda one: one[0])
+    return sorted(half_cycles, key=lambda part: part[0])
 
 
 class Meter:
@@ -511,8 +515,8 @@ class Meter:
         sums = [distance.sum(), self.thickness * path.sum(), loads @ distance, drags @ distance, work, *np.zeros(4)]
         of = np.array([step.half_cycle for step in steps])
         share = records.duration / np.bincount(of, records.duration)[of]  # of its half-cycle: there may be several
-        found = Totals(np.array(sums), records.dissipated.sum(axis=0), share @ pressure)
-        return with_worn(self.system, found, worn)
+        totals = Totals(np.array(sums), records.dissipated.sum(axis=0), share @ pressure)
+        return with_worn(self.system, totals, worn)
 
     def _carried(self, records: TimeStepRecords, k: int, step: TimeStep) -> tuple[float, float]:
         """Return the force of a time step along the approach of the bodies, and the resultant of its friction, N."""

@@ -53,8 +53,8 @@ def end_temperatures(heat: CycleHeat, begin: Array, pressure: Array, conductance
         pressure: Of the phases (m, n), times what `heat` leaves out of friction.
         conductances: Of their nodes (m, n).
     """
-    states = [heat.exchange.at(one) for one in heat.states(begin, pressure, conductances)[1:]]
-    surfaces = [heat.exchange.contact_temperatures(one, phase) for phase, one in enumerate(states)]
+    states = [heat.exchange.at(coordinates) for coordinates in heat.states(begin, pressure, conductances)[1:]]
+    surfaces = [heat.exchange.contact_temperatures(state, phase) for phase, state in enumerate(states)]
     return np.array(surfaces), states[-1]
 
 
@@ -65,9 +65,9 @@ def check_cycle_memory(system: Tribosystem) -> None:
         CaseError: they do not.
     """
     exchange = with_reduced_heat(system).exchange
-    what = "the map of each heat step in a cycle, which jumps and steady states keep,"
+    subject = "the map of each heat step in a cycle, which jumps and steady states keep,"
     advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
-    check_memory(system.comm, cycle_memory(exchange), "heat", what, advice)
+    check_memory(system.comm, cycle_memory(exchange), "heat", subject, advice)
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ class _Unknowns:
     def close(self, change: Array, x: Array) -> bool:
         """Return whether pressures, and the temperatures and depths behind them, change by rounding only."""
         return all(
-            float(np.abs(part).max()) <= CLOSE * max(float(np.abs(whole).max()), 1e-300)
-            for part, whole in zip(np.split(change, self.cuts), np.split(x, self.cuts), strict=True)
+            float(np.abs(part).max()) <= CLOSE * max(float(np.abs(value).max()), 1e-300)
+            for part, value in zip(np.split(change, self.cuts), np.split(x, self.cuts), strict=True)
             if part.size
         )
 
@@ -217,11 +217,11 @@ class Coupled:
         # Of the contact that was found before: nodes that open and close as edges move would never come to an end.
         for _ in range(EDGES):
             self._touching = start.pressure > 0
-            found = self._at_edges(temperature, cycles, start, solve, passing)
-            start = found.contact
+            solution = self._at_edges(temperature, cycles, start, solve, passing)
+            start = solution.contact
             if np.array_equal(start.pressure > 0, self._touching):
                 break
-        return found
+        return solution
 
     def _at_edges(
         self,
@@ -237,9 +237,9 @@ class Coupled:
         except ConvergenceError:
             if not self.heat.dim:
                 raise
-        found = self._solve(temperature, cycles, start, solve, passing, _grazing)
+        solution = self._solve(temperature, cycles, start, solve, passing, _grazing)
         self.system.remedies.note(GRAZING)
-        return found
+        return solution
 
     def _solve(
         self,
@@ -322,7 +322,7 @@ class Coupled:
         """Return the contact temperatures of both bodies at the start of each phase (m, 2, n), K."""
         exchange, starts = self.heat.exchange, self.through(state, pressure, conductances)[:-1]
         return np.array(
-            [exchange.contact_temperatures(exchange.at(one), phase - 1) for phase, one in enumerate(starts)]
+            [exchange.contact_temperatures(exchange.at(start), phase - 1) for phase, start in enumerate(starts)]
         )
 
     def through(self, state: Array, pressure: Array, conductances: Array) -> list[Array]:
@@ -362,7 +362,9 @@ class Coupled:
         if debris is not None:
             lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries
             facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.pairs]
-            conditions = [replace(one, debris=own) for one, own in zip(conditions, facing, strict=True)]
+            conditions = [
+                replace(condition, debris=debris) for condition, debris in zip(conditions, facing, strict=True)
+            ]
         evolution = replace(system.evolution(conditions, worn), near=self.held)
         conditions = list(self._remembering(evolution, passing))
         evolution = replace(evolution, near=self.held)

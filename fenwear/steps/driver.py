@@ -176,8 +176,8 @@ class _Stretches:
     def _recorded(self, recorded: list[HalfCycle], periodic: int) -> int:
         """Record half-cycles; return how many in a row have repeated, from those before them."""
         recorder, limit, team = self._recorder, self.limits.periodic_within, self.system.team
-        for one in recorded:
-            recorder.add(one)
+        for half_cycle in recorded:
+            recorder.add(half_cycle)
             repeats = limit is not None and team.lead(lambda: recorder.change() < limit)
             periodic = periodic + 1 if repeats else 0
         return periodic

@@ -85,7 +85,7 @@ def jump_within(
 def _on_meshes(system: Tribosystem, step: Jumps, state: RunState, until: int) -> tuple[RunState, list[HalfCycle]]:
     """Return the state and the records of a jump, shortened where it wears far more than meshes are to follow."""
     after, recorded = step(state, until)
-    before, worn = (system.team.lead(partial(system.wear_on_meshes, one.worn)) for one in (state, after))
+    before, worn = (system.team.lead(partial(system.wear_on_meshes, moment.worn)) for moment in (state, after))
     strokes = system.motion.half_cycles
     cycles = (after.half_cycle - state.half_cycle) // strokes
     if worn <= LATE or before > 1 or cycles == 1:  # beyond it already: nobody has them follow
@@ -144,11 +144,11 @@ def integrate(
         tolerance: Of jumps.
     """
     if how == "jump":
-        return _told_of_heat(system, jump_within(system, limits, start, tolerance=tolerance))
+        return _naming_feedback(system, jump_within(system, limits, start, tolerance=tolerance))
     return march_within(system, limits, start, implicit=how == "implicit")
 
 
-def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
+def _naming_feedback(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Block]:
     """Yield the blocks of jumps; name thermoelastic feedback where it makes them fail; collective."""
     pressure: Array = np.zeros((0, 0))
     try:
@@ -158,7 +158,7 @@ def _told_of_heat(system: Tribosystem, blocks: Iterator[Block]) -> Iterator[Bloc
     except ConvergenceError as error:
         system = with_reduced_heat(system)
         at = [None, pressure] if len(pressure) else [None]  # bands of few nodes have less
-        gain = max(heat_gain(system, own) or 0.0 for own in at)
+        gain = max(heat_gain(system, pressure) or 0.0 for pressure in at)
         if gain < 1:
             raise
         raise type(error)(

@@ -102,13 +102,13 @@ class SmallerSteps:
         temperature, worn, ends = state.temperature, state.worn, []
         for phase in phases:
             before, place = state.contacts[phase], phase - phases.start
-            contact, own = before, []
+            contact, part_ends = before, []
             for part, step in enumerate(steps[phase * parts : (phase + 1) * parts]):
                 done = state.half_cycle + (place + (part + 0.5) / parts) / len(phases)
                 end = step.solve(temperature, worn, contact, load, done)
                 contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
-                own.append(end)
-            ends.append(_as_one(own, phase, before, temperature))
+                part_ends.append(end)
+            ends.append(_joined_parts(part_ends, phase, before, temperature))
         return ends
 
     def _prepared(self, parts: int) -> list[PhaseStep]:
@@ -123,7 +123,7 @@ class SmallerSteps:
         self._steps[parts] = [PhaseStep(system, phase, implicit=self.implicit) for phase in phases]
 
 
-def _as_one(ends: list[PhaseEnd], phase: int, before: ContactState, temperature: HeatState | None) -> PhaseEnd:
+def _joined_parts(ends: list[PhaseEnd], phase: int, before: ContactState, temperature: HeatState | None) -> PhaseEnd:
     """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
     middle = ends[len(ends) // 2].record
     adds = reduce(Totals.__add__, [end.record.adds for end in ends])
@@ -152,7 +152,7 @@ class HalfCycles:
         phases = range(first, first + motion.positions)
         load = self.loading(state.half_cycle + 0.5)
         try:
-            ends = self._whole(state, phases, load)
+            ends = self._phase_ends(state, phases, load)
         except ConvergenceError as error:
             ends = self.smaller.half_cycle(state, phases, error, load)
         worn, totals, contacts = state.worn, state.totals, list(state.contacts)
@@ -163,7 +163,7 @@ class HalfCycles:
         after = RunState(number, worn, tuple(contacts), ends[-1].temperature, totals)
         return after, [HalfCycle(number, [end.record for end in ends], worn, totals, heat, load)]
 
-    def _whole(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
+    def _phase_ends(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
@@ -204,8 +204,8 @@ class Jumps:
         assert self._half_cycles is not None
         after, recorded = state, list[HalfCycle]()
         for _ in range(self.system.motion.half_cycles):
-            after, own = self._half_cycles(after, after.half_cycle + 1)
-            recorded += own
+            after, half_cycles = self._half_cycles(after, after.half_cycle + 1)
+            recorded += half_cycles
         return replace(after, finer=None if state.finer is None else after), recorded
 
     def change(self, temperature: HeatState | None) -> float:
@@ -235,9 +235,9 @@ class Jumps:
                 return (None, end, recorded), Estimate(np.inf, np.inf, np.inf)  # it says nothing of the error
             return (jump, stepper.state(jump.end, number), recorded), estimate
 
-        def fits(found: _Made) -> bool:
+        def fits(made: _Made) -> bool:
             """Whether the grid has room, which grows before its rim is reached, and properties have changed little."""
-            _, end, _ = found
+            _, end, _ = made
             if at_rim(stepper.system, carried_by(end)):
                 return False
             return given or stepper.system.team.each(self, "change", end.temperature) <= WARMED
@@ -333,7 +333,7 @@ class GrossSliding:
     def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
         find = partial(steady_state, properties_within=properties_within)
-        return on_sufficient_grid(system, find, lambda found: np.asarray((found.phase_pressure > 0).any(axis=0)))[1]
+        return on_sufficient_grid(system, find, lambda state: np.asarray((state.phase_pressure > 0).any(axis=0)))[1]
 
     def on_other_grid(self, memory: Any, before: Tribosystem, after: Tribosystem) -> Any:  # noqa: ARG002
         """Return the memory of the steps, which does not depend on the grid."""

@@ -105,7 +105,7 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
         message = "each load has its own stick zone, which alone carries the load in the end. Give one load"
         raise CaseError(InputError("--load", message))
     systems = [system if factor == 1.0 else with_case(system, loads_times(system.case, factor)) for factor, _ in loads]
-    states: tuple[SteadyState | FinalShape, ...] = tuple(steady(one) for one in systems)
+    states: tuple[SteadyState | FinalShape, ...] = tuple(steady(loaded) for loaded in systems)
     if system.sticks:
         systems = [state.system for state in states]  # on the grid that the scar has grown to
     shares = np.array([share for _, share in loads]) / sum(share for _, share in loads)
@@ -114,13 +114,13 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     first, uneven = [np.full_like(goal, np.nan) for goal in goals], np.nan
     if system.case.heat is None:
         depth = depth if len(loads) == 1 else _evened(systems, shares, depth)
-        first = [_pressures(one, depth) for one in systems]
+        first = [_pressures(loaded, depth) for loaded in systems]
         uneven = 0.0 if system.sticks else _uneven(systems, shares, first)[0]
     left = [
-        float(np.abs(p - goal).max() / pressure_scale(one, goal))
-        for one, p, goal in zip(systems, first, goals, strict=True)
+        float(np.abs(p - goal).max() / pressure_scale(loaded, goal))
+        for loaded, p, goal in zip(systems, first, goals, strict=True)
     ]
-    tolerance = min(_tolerance(one, goal, depth) for one, goal in zip(systems, goals, strict=True))
+    tolerance = min(_tolerance(loaded, goal, depth) for loaded, goal in zip(systems, goals, strict=True))
     largest = tuple(float(p.max()) for p in first)
     return InitialShape(systems[0].pair.punch, depth, states, largest, tuple(left), uneven, tolerance)
 
@@ -140,10 +140,10 @@ def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
         ConvergenceError: the contact on the shape did not converge.
     """
     if system.sticks or system.case.heat is not None:
-        what = "contact.law" if system.sticks else "heat"
+        key = "contact.law" if system.sticks else "heat"
         raise CaseError(
             InputError(
-                what,
+                key,
                 "--pressure works in gross sliding without heat alone. Leave out --pressure, or change this setting",
             )
         )
@@ -155,10 +155,10 @@ def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
     shape = -(interface.apply(forces)[:, 0] + interface.load_gap + system.gap(0, unworn))
     pressed = goal > 0
     depth = np.maximum(shape - _least_motion(system, shape, pressed), 0.0)
-    found = system.phase_contact((0,)).solve(system.gap(0, replace(unworn, punch=depth))).pressure[0]
-    off = float(np.abs(found - goal).max() / pressure_scale(system, goal[None]))
+    pressures = system.phase_contact((0,)).solve(system.gap(0, replace(unworn, punch=depth))).pressure[0]
+    off = float(np.abs(pressures - goal).max() / pressure_scale(system, goal[None]))
     tolerance = _tolerance(system, goal[None], depth)
-    return InitialShape(system.pair.punch, depth, (), (float(found.max()),), (off,), np.nan, tolerance)
+    return InitialShape(system.pair.punch, depth, (), (float(pressures.max()),), (off,), np.nan, tolerance)
 
 
 def _balanced(system: Tribosystem, pressure: Array, ratio: Array) -> Array:
@@ -234,7 +234,7 @@ def _evened(systems: Sequence[Tribosystem], shares: Array, start: Array) -> Arra
     compliance = system.interface.compliance(np.mean(system.friction_ratios(), axis=0))
 
     def advance(depth: Array) -> tuple[Array, tuple[Array, Mask], bool]:
-        pressures = [_pressures(one, depth) for one in systems]
+        pressures = [_pressures(loaded, depth) for loaded in systems]
         uneven, rest, total = _uneven(systems, shares, pressures)
         carried = shares @ np.array([p.sum(axis=0) for p in pressures])
         off = compliance.apply(rest * (carried.sum() / total.sum()))
@@ -252,13 +252,13 @@ def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
     """
     modes, scale = system.rigid.rigid_normal / system.mode_lengths, float(np.abs(shape[where]).max()) or 1.0
     weights = system.pair.weights / system.pair.weights.sum()
-    found = scipy.optimize.linprog(
+    solution = scipy.optimize.linprog(
         -(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None)
     )
-    if found.x is None:
+    if solution.x is None:
         raise ConvergenceError("no shape to machine exists: material would have to be added somewhere in each")
-    depth = shape - scale * (modes @ found.x)  # to the programme's tolerance, which a clipped depth would show
-    touching = np.flatnonzero(where)[found.ineqlin.marginals < 0]
+    depth = shape - scale * (modes @ solution.x)  # to the programme's tolerance, which a clipped depth would show
+    touching = np.flatnonzero(where)[solution.ineqlin.marginals < 0]
     return np.asarray(shape - depth + modes @ np.linalg.lstsq(modes[touching], depth[touching], rcond=None)[0])
 
 
@@ -280,7 +280,9 @@ def _pressures(system: Tribosystem, depth: Array) -> Array:
 
 def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> tuple[float, Array, Array]:
     """Return the share of the wear in all loads that no rigid motion follows, this part (n,), and the wear (n,)."""
-    worn = [share * one.phases_wear.opening(p)[0] for one, share, p in zip(systems, shares, pressures, strict=True)]
+    worn = [
+        share * loaded.phases_wear.opening(p)[0] for loaded, share, p in zip(systems, shares, pressures, strict=True)
+    ]
     total, pressed = np.sum(worn, axis=0), np.any([p.any(axis=0) for p in pressures], axis=0)
     modes, rest = systems[0].rigid.rigid_normal[pressed], np.zeros_like(total)
     rest[pressed] = total[pressed] - modes @ np.linalg.lstsq(modes, total[pressed], rcond=None)[0]
@@ -291,9 +293,9 @@ def _tolerance(system: Tribosystem, goal: Array, depth: Array) -> float:
     """Return the amplitude of a wave over the contact that changes the pressure by a share of its scale, mm."""
     scale = pressure_scale(system, goal)
     small = PROBE * system.contact_law.elastic_length(system) * scale
-    before, surface, found = _pressures(system, depth), system.pair.punch, []
+    before, surface, amplitudes = _pressures(system, depth), system.pair.punch, []
     for s in surface.places.T:
         wave = np.cos(2 * np.pi * (s - s.min()) / np.ptp(s))
         change = _pressures(system, depth + small * (1 + wave)) - before
-        found.append(small * ALLOWED * scale / float(np.abs(change).max()))
-    return min(found)
+        amplitudes.append(small * ALLOWED * scale / float(np.abs(change).max()))
+    return min(amplitudes)

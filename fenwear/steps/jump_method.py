@@ -74,9 +74,9 @@ class JumpLaw(Protocol[M]):
     def settled(self, end: M) -> M:
         """Return the end of a step, which may have overshot."""
 
-    def apart(self, base: M, one: M, other: M, share: float) -> M:
+    def apart(self, base: M, first: M, other: M, share: float) -> M:
         """Return base + share (one - other)."""
-        return replace(base, worn=base.worn + (one.worn - other.worn).times(share))
+        return replace(base, worn=base.worn + (first.worn - other.worn).times(share))
 
     def halfway(self, half: M, cycles: float) -> M:  # noqa: ARG002
         """Return the state halfway through so many cycles, with R there; by default none."""
@@ -104,7 +104,7 @@ class Trend:
         if len(moment.contact.pressure):
             self._contacts.setdefault(moment.time, moment.contact)
 
-    def from_one(self, moment: Moment, to: float) -> ContactState:
+    def expected_from(self, moment: Moment, to: float) -> ContactState:
         """Return the contact expected at a time from that of a moment; where it has none, from the next one known."""
         contact, since = moment.contact, moment.time
         if not len(contact.pressure) and self._contacts:
@@ -123,9 +123,9 @@ class Trend:
         """Return the shares at a time of the two contacts next to it, and them; of one alone that is of that time."""
         if time in self._contacts:
             return [(1.0, self._contacts[time])]
-        one, other = sorted(self._contacts, key=lambda known: abs(known - time))[:2]
-        share = (time - one) / (other - one)
-        return [(1 - share, self._contacts[one]), (share, self._contacts[other])]
+        nearest, other = sorted(self._contacts, key=lambda known: abs(known - time))[:2]
+        share = (time - nearest) / (other - nearest)
+        return [(1 - share, self._contacts[nearest]), (share, self._contacts[other])]
 
 
 def two_stages(law: JumpLaw[M], before: M, cycles: float, since: float, near: Trend, digits: float = ROUGH) -> M:
@@ -141,10 +141,10 @@ def two_stages(law: JumpLaw[M], before: M, cycles: float, since: float, near: Tr
     """
     share = GAMMA * cycles
     near.add(before)
-    first = law.stage(before, share, since + share, near.from_one(before, since + share), ROUGH)
+    first = law.stage(before, share, since + share, near.expected_from(before, since + share), ROUGH)
     near.add(first)
     between = law.after(before, first, cycles - share)
-    end = law.stage(between, share, since + cycles, near.from_one(first, since + cycles), digits)
+    end = law.stage(between, share, since + cycles, near.expected_from(first, since + cycles), digits)
     near.add(end)
     return law.settled(end)
 
@@ -164,7 +164,7 @@ class Attempt(Generic[M]):
     begin: M
     half: M
     end: M
-    whole: M
+    full: M
     cycles: float
     comes: bool
     near: Trend
@@ -172,7 +172,7 @@ class Attempt(Generic[M]):
     @property
     def bent(self) -> WornDepths:
         """The error of the last step, which is of first order: h^2 y'' / 2 by 4 (d_2 - d_1) / N^2."""
-        first, second = self.half.worn - self.begin.worn, self.whole.worn - self.half.worn
+        first, second = self.half.worn - self.begin.worn, self.full.worn - self.half.worn
         return (second - first).times(2 * LAST**2 if self.comes else 0.0)
 
     def finer(self, law: JumpLaw[M], fine: M) -> M:
@@ -182,14 +182,14 @@ class Attempt(Generic[M]):
         - f, continues as a whole step takes it, to y_w - f_w. So they lead to f_w + 4/3 (y_h - y_w). Where nodes have
         come into contact y_h has the error of its last step, of first order, too, which is taken from it.
         """
-        moved = self.whole
+        moved = self.full
         if fine is not self.begin:  # of the first jump it is
             try:
                 moved = two_stages(law, fine, self.cycles, 0.0, self.near.copy())
             except ConvergenceError:  # it may lie where no contact is: then what was off stays
-                moved = law.apart(self.whole, fine, self.begin, 1.0)
+                moved = law.apart(self.full, fine, self.begin, 1.0)
         halves = replace(self.end, worn=self.end.worn - self.bent)
-        return law.apart(moved, halves, self.whole, 1 + HALVES)
+        return law.apart(moved, halves, self.full, 1 + HALVES)
 
 
 def attempt(law: JumpLaw[M], begin: M, cycles: float) -> Attempt[M]:
@@ -202,17 +202,17 @@ def attempt(law: JumpLaw[M], begin: M, cycles: float) -> Attempt[M]:
     half = two_stages(law, begin, cycles / 2, 0.0, near)
     half = law.halfway(half, cycles)
     early = _comes(begin, half, half)  # then begun near the halves, whose steps are not as long
-    whole = half if early else two_stages(law, begin, cycles, 0.0, near.copy())
-    comes = _comes(begin, half, whole)
+    full = half if early else two_stages(law, begin, cycles, 0.0, near.copy())
+    comes = _comes(begin, half, full)
     last = LAST * cycles if comes else 0.0
     end = two_stages(law, half, cycles / 2 - last, cycles / 2, near, ROUGH if comes else FINE)
     if comes:
-        end = law.settled(law.stage(end, last, cycles, near.from_one(end, cycles), FINE))
+        end = law.settled(law.stage(end, last, cycles, near.expected_from(end, cycles), FINE))
         near.add(end)
     law.ended(end, cycles)
     if early:
-        whole = two_stages(law, begin, cycles, 0.0, near.copy())
-    return Attempt(begin, half, end, whole, cycles, comes, near)
+        full = two_stages(law, begin, cycles, 0.0, near.copy())
+    return Attempt(begin, half, end, full, cycles, comes, near)
 
 
 def _comes(begin: Moment, half: Moment, end: Moment) -> bool:
@@ -254,8 +254,8 @@ class Estimate:
         Depths are measured by what the jump wears, and err with the square of its length; the others with its cube.
         """
         by_wear = tolerance / max(self.depth, 1e-300)
-        whole = tolerance / max(self.pressure, self.temperature, self.state, 1e-300)
-        return float(min(by_wear ** (1 / ORDER), whole ** (1 / (ORDER + 1))))
+        by_state = tolerance / max(self.pressure, self.temperature, self.state, 1e-300)
+        return float(min(by_wear ** (1 / ORDER), by_state ** (1 / (ORDER + 1))))
 
 
 @dataclass(frozen=True)
@@ -367,13 +367,13 @@ class Sizes:
 
     def _carried(self, worn: WornDepths) -> float:
         carried = worn.carried[:1] if self.layers.strip_carries else ()  # none where depths alone are measured
-        return float(sum(self.pair.strip.weights @ np.abs(own) for own in carried))
+        return float(sum(self.pair.strip.weights @ np.abs(depth) for depth in carried))
 
     def _states(self, worn: WornDepths) -> Array:
         """Return the integrals of the size of all states."""
         held, lies = self.layers.held(worn), worn.between[:1] if self.layers.lies_here else ()
-        on_contact = [float(self.pair.weights @ np.abs(one)) for one in (*held.contact, *lies)]
-        return np.array([*on_contact, *(float(self.pair.strip.weights @ np.abs(one)) for one in held.strip)])
+        on_contact = [float(self.pair.weights @ np.abs(state)) for state in (*held.contact, *lies)]
+        return np.array([*on_contact, *(float(self.pair.strip.weights @ np.abs(state)) for state in held.strip)])
 
     def estimate(
         self, worn: Sequence[WornDepths], made: Attempt[M], parts: Sequence[WornDepths], of_heat: float
@@ -386,8 +386,8 @@ class Sizes:
             parts: Errors of its depths, which add up.
             of_heat: That of temperatures.
         """
-        first, second = made.whole.contact.pressure, made.end.contact.pressure
-        bent = _relative(self.area, self.rest, made.bent, made.begin.worn, made.whole.worn)
+        first, second = made.full.contact.pressure, made.end.contact.pressure
+        bent = _relative(self.area, self.rest, made.bent, made.begin.worn, made.full.worn)
         return Estimate(
             max(float(bent), sum(self.of_depth(part, *worn) for part in parts)),
             HALVES * max(force_difference(self.pair, first[k], second[k]) for k in range(len(first))),
@@ -413,14 +413,14 @@ def force_difference(pair: ContactPair, first: Array, second: Array) -> float:
     """
     x, weights = pair.punch.x, pair.weights
     forces = [weights * first, weights * second]
-    one, other = (float(force.sum()) for force in forces)
-    if min(one, other) <= 0:
-        return float(max(one, other) > 0)
+    first_force, other = (float(force.sum()) for force in forces)
+    if min(first_force, other) <= 0:
+        return float(max(first_force, other) > 0)
     touched = x[(first > 0) | (second > 0)]
     width = max(float(np.ptp(touched, axis=0).max()), float(weights.min()))
-    apart = forces[0] / one - forces[1] / other
+    apart = forces[0] / first_force - forces[1] / other
     moved = 0.0
     for along in x.T:  # each axis; scipy's function for it would take half a second of imports
         order = along.argsort()
         moved = max(moved, float(np.abs(apart[order].cumsum())[:-1] @ np.diff(along[order])))
-    return moved / width + abs(one - other) / max(one, other)
+    return moved / width + abs(first_force - other) / max(first_force, other)

@@ -88,7 +88,7 @@ class Stepper(JumpLaw[JumpMoment]):
         self.wear = system.phases_wear
         self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]
         self.evolution = system.evolution(self.conditions)
-        self._mu = [system.friction.values(one) for one in self.conditions]
+        self._mu = [system.friction.values(condition) for condition in self.conditions]
         self._meters = [PhaseMeter(system, k) for k in range(len(self.ratios))]
         self.coupled = Coupled(system, self.take)
         self._flowed: Array | float = 0.0  # beyond the hardness, in the stage solved last
@@ -132,24 +132,24 @@ class Stepper(JumpLaw[JumpMoment]):
             moment = made.finer(self, made.begin if fine.worn is self._begin.worn else before)
         return self.state(moment, end.half_cycle)
 
-    def apart(self, base: JumpMoment, one: JumpMoment, other: JumpMoment, share: float) -> JumpMoment:
+    def apart(self, base: JumpMoment, first: JumpMoment, other: JumpMoment, share: float) -> JumpMoment:
         """Return a moment, and a share of the difference of two others."""
         contact = base.contact
-        if len(contact.pressure) and len(one.contact.pressure) and len(other.contact.pressure):
-            pressure = contact.pressure + share * (one.contact.pressure - other.contact.pressure)
-            rigid = contact.rigid + share * (one.contact.rigid - other.contact.rigid)
+        if len(contact.pressure) and len(first.contact.pressure) and len(other.contact.pressure):
+            pressure = contact.pressure + share * (first.contact.pressure - other.contact.pressure)
+            rigid = contact.rigid + share * (first.contact.rigid - other.contact.rigid)
             contact = replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
         return JumpMoment(
-            self.system.layers.settled(base.worn + (one.worn - other.worn).times(share)),
+            self.system.layers.settled(base.worn + (first.worn - other.worn).times(share)),
             contact,
             base.time,
-            base.temperature + share * (one.temperature - other.temperature),
-            base.totals + (one.totals - other.totals).times(share),
+            base.temperature + share * (first.temperature - other.temperature),
+            base.totals + (first.totals - other.totals).times(share),
         )
 
     def _estimate(self, made: Attempt[JumpMoment]) -> Estimate:
         """Return the error of a jump."""
-        worn, wrong = (made.begin.worn, made.end.worn), (made.whole.worn - made.end.worn).times(HALVES)
+        worn, wrong = (made.begin.worn, made.end.worn), (made.full.worn - made.end.worn).times(HALVES)
         estimate = self._sizes.estimate(worn, made, [wrong], HALVES * self._heat_difference(made))
         missed = self._missed(made) if self._wear_follows else 0.0
         return replace(estimate, depth=max(estimate.depth, self._through_difference(made), missed))
@@ -159,18 +159,18 @@ class Stepper(JumpLaw[JumpMoment]):
 
         Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
         """
-        found = 0.0
+        largest = 0.0
         for body, thickness in zip(("punch", "strip"), self.system.coatings, strict=True):
-            first, one, other = (getattr(moment.worn, body) for moment in (made.begin, made.whole, made.end))
-            ended = (first < thickness) & (np.maximum(one, other) >= thickness)
-            apart = float(np.abs(one - other).max(where=ended, initial=0.0))
-            found = max(found, apart / max(float((other - first).max()), 1e-300))
-        return found
+            first, full, other = (getattr(moment.worn, body) for moment in (made.begin, made.full, made.end))
+            ended = (first < thickness) & (np.maximum(full, other) >= thickness)
+            apart = float(np.abs(full - other).max(where=ended, initial=0.0))
+            largest = max(largest, apart / max(float((other - first).max()), 1e-300))
+        return largest
 
     def _heat_difference(self, made: Attempt[JumpMoment]) -> float:
         """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
         exchange = self.system.exchange
-        states = (*(exchange.at(one.temperature) for one in (made.whole, made.end)), exchange.on_bases(None))
+        states = (*(exchange.at(moment.temperature) for moment in (made.full, made.end)), exchange.on_bases(None))
         first, second, initial = (np.array(exchange.contact_temperatures(state)) for state in states)
         weights = self.system.pair.weights
         apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
@@ -186,8 +186,8 @@ class Stepper(JumpLaw[JumpMoment]):
             return 0.0
         done, strokes = self._begin.half_cycle, self.system.motion.half_cycles
         begin, middle, end = (
-            self._rate(one, done + share * made.cycles * strokes)
-            for one, share in ((made.begin, 0.0), (made.half, 0.5), (made.end, 1.0))
+            self._rate(moment, done + share * made.cycles * strokes)
+            for moment, share in ((made.begin, 0.0), (made.half, 0.5), (made.end, 1.0))
         )
         simpson = (begin + middle.times(4.0) + end).times(made.cycles / 6)
         worn = replace(made.end.worn - made.begin.worn, between=NOTHING, carried=NOTHING)
@@ -230,8 +230,11 @@ class Stepper(JumpLaw[JumpMoment]):
         assert rate is not None
         lost, adds = rate.worn.times(cycles), rate.adds.times(cycles)
         if rate.wear.coated:
-            own = rate.wear.begun(before.worn, cycles).worn(contact.pressure).times(cycles)
-            lost, adds = replace(lost, punch=own.punch, strip=own.strip), with_coated(self.system, adds, own)
+            worn_off = rate.wear.begun(before.worn, cycles).worn(contact.pressure).times(cycles)
+            lost, adds = (
+                replace(lost, punch=worn_off.punch, strip=worn_off.strip),
+                with_coated(self.system, adds, worn_off),
+            )
         temperature = before.temperature + cycles * rate.heated
         return JumpMoment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
 
@@ -283,7 +286,9 @@ class Stepper(JumpLaw[JumpMoment]):
         alone = self.system.phase_contact([0])
         alone.press(self._load)
         first = alone.solve(gap[0])
-        pressure, open_, rigid = (np.repeat(own, len(gap), axis=0) for own in (first.pressure, first.gap, first.rigid))
+        pressure, open_, rigid = (
+            np.repeat(values, len(gap), axis=0) for values in (first.pressure, first.gap, first.rigid)
+        )
         return ContactState(pressure, open_, rigid, first.iterations)
 
     def _solve(
@@ -301,8 +306,8 @@ class Stepper(JumpLaw[JumpMoment]):
             near = self.contact.solve(gap + flowed, near, step, coupling)
             return near
 
-        found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
-        return found
+        solved, self._flowed = self.system.layers.flowing(solve, lambda contact: contact.pressure)
+        return solved
 
     def _creep(self, worn: WornDepths, cycles: float) -> CreepStage:
         """Return the creep of a stage."""
@@ -312,7 +317,7 @@ class Stepper(JumpLaw[JumpMoment]):
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
         self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
-        self._mu = [system.friction.values(one) for one in conditions]
+        self._mu = [system.friction.values(condition) for condition in conditions]
         if system.friction.constant:
             return
         self.ratios = system.friction_ratios(conditions)
@@ -332,7 +337,7 @@ class Stepper(JumpLaw[JumpMoment]):
         heats, adds = self._last_cycle_heat(end), self._adds(pressure)
         if self.wear.coated:
             own_worn = [self._worn([k], contacts, end.worn) for k in range(len(contacts))]
-            adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
+            adds = [with_coated(self.system, addition, lost) for addition, lost in zip(adds, own_worn, strict=True)]
         self._last_cycle = []
         for phases in reversed(np.arange(len(contacts)).reshape(-1, motion.positions).tolist()):
             records = [PhaseRecord(k, contacts[k], earlier[k], adds[k], self.ratios[k]) for k in phases]

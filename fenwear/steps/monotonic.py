@@ -62,12 +62,12 @@ def monotonic(system: Tribosystem, *, properties_within: float | None = None) ->
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
     unheated = replace(system, exchange=system.isothermal)  # the heat of its motion is not asked for
-    found = [
-        with_own_properties(unheated, partial(_one_way, d), lambda one: one.end, properties_within)[0]
+    states = [
+        with_own_properties(unheated, partial(_one_way, d), lambda state: state.end, properties_within)[0]
         for d in DIRECTIONS
     ]
-    punch, strip = (np.array(both) for both in zip(*(one.surfaces for one in found), strict=True))
-    return Monotonic(np.array([one.pressure for one in found]), punch, strip)
+    punch, strip = (np.array(both) for both in zip(*(state.surfaces for state in states), strict=True))
+    return Monotonic(np.array([state.pressure for state in states]), punch, strip)
 
 
 def _one_way(direction: int, system: Tribosystem) -> _Sliding:

@@ -224,17 +224,17 @@ class Onwards:
         count = self._count
         if count < 2 or before is not self._last:
             return before
-        own, every = before.pressure[0], ONWARDS[count - 1, :count] @ self._known[:count]
+        recent, every = before.pressure[0], ONWARDS[count - 1, :count] @ self._known[:count]
         further, rigid = every[: self._nodes], every[None, self._nodes :]
         if self._law is None:
             if self._alike < count:
                 self._as_long_as_they_touch(further)
-            further = np.where((own > 0) & (further > 0), further, own)
+            further = np.where((recent > 0) & (further > 0), further, recent)
         else:
             last = self._values[0]
             further = self._law.pressure_of(np.minimum(np.maximum(further, last - MOST), last + MOST))
         if self._hardness < np.inf:
-            further = np.where((own < self._hardness) & (further < self._hardness), further, own)
+            further = np.where((recent < self._hardness) & (further < self._hardness), further, recent)
         return ContactState(further[None], before.gap, rigid, before.iterations)
 
     def _as_long_as_they_touch(self, further: Array) -> None:
@@ -312,8 +312,10 @@ class PhaseStep:
         self._thermal = ThermalContact(system, phase, self._contact)
         conditions = system.conditions(phase)
         # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
-        more = system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
-        self._staying = None if more else conditions
+        changing = (
+            system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+        )
+        self._staying = None if changing else conditions
         self._mu = system.friction.values(conditions)
         self._friction_ratio = system.phase_friction(phase, self._mu)
         wear = system.wear.phases([conditions], [phase])
@@ -517,12 +519,12 @@ class PhaseStep:
 
         def solve(flowed: Array) -> _Contact:
             nonlocal near
-            found = thermal.solve(at.temperature, gap + flowed, near, wearing)
-            near = found[0]
-            return found
+            solution = thermal.solve(at.temperature, gap + flowed, near, wearing)
+            near = solution[0]
+            return solution
 
-        found, self._flowed = self.system.layers.flowing(solve, lambda found: found[0].pressure)
-        return found
+        solved, self._flowed = self.system.layers.flowing(solve, lambda solution: solution[0].pressure)
+        return solved
 
     def _end(
         self,

@@ -62,8 +62,8 @@ def follow_program(
         if larger is not base:
             base = larger
             again.forget()
-        own = again.at_stage(base, stage)
-        for block in follow(own, integrate, within, with_phases(state, len(own.motion.phases)), adapt):
+        staged = again.at_stage(base, stage)
+        for block in follow(staged, integrate, within, with_phases(state, len(staged.motion.phases)), adapt):
             yield block
             state = block.end
             if state.half_cycle >= until:  # what it asks for by now the next stage has
@@ -82,12 +82,12 @@ def _with_larger_grid(
         load: Factor of all loads.
     """
     while state is not None and state.half_cycle == stage.begin and grows(base):
-        own = at_stage(base, stage)
-        grid = with_room(own, state.worn, carried_by(state), load)
+        staged = at_stage(base, stage)
+        grid = with_room(staged, state.worn, carried_by(state), load)
         if grid is None:
             break
-        base, before = regridded(base, grid), with_phases(state, len(own.motion.phases)) or state
-        state = on_other_grid(before, own, at_stage(base, stage))
+        base, before = regridded(base, grid), with_phases(state, len(staged.motion.phases)) or state
+        state = on_other_grid(before, staged, at_stage(base, stage))
     return base, state
 
 
@@ -173,16 +173,17 @@ def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str]:
         CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
             contact carry the loads.
     """
-    found = held_at(placed.case, step)
-    if found is None:
+    held_stage = held_at(placed.case, step)
+    if held_stage is None:
         return placed.case, ""
-    factor = found.load_factor
-    if found.load is not None:
-        factor = found.load / _nominal(placed, f"{found.key}.load")
+    factor = held_stage.load_factor
+    if held_stage.load is not None:
+        factor = held_stage.load / _nominal(placed, f"{held_stage.key}.load")
     force = placed.normal_force * factor
     acts = f"normal force {force:,.6g} N" if force else f"all loads times {factor:.6g}"
-    text = f"step {found.step + 1} of {found.steps} of the program ({found.key}), as it ends, held for ever: {acts}"
-    return loads_times(found.case, factor), text
+    step_text = f"step {held_stage.step + 1} of {held_stage.steps} of the program ({held_stage.key})"
+    text = f"{step_text}, as it ends, held for ever: {acts}"
+    return loads_times(held_stage.case, factor), text
 
 
 def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
@@ -223,6 +224,6 @@ def at_loads(system: Tribosystem, factor: float) -> Tribosystem:
         return system
     case = loads_times(system.case, factor)
     loaded = tuple(
-        own.under(case, phase.fraction) for own, phase in zip(system.loaded, system.motion.phases, strict=True)
+        bodies.under(case, phase.fraction) for bodies, phase in zip(system.loaded, system.motion.phases, strict=True)
     )
     return replace(system, loaded=loaded)

@@ -68,8 +68,8 @@ class Totals(Added):
 
     def of(self, name: str) -> Array:
         """Return the sum () or (k,) of this name in `SUMS`."""
-        found: Array = self.sums[..., SUMS.index(name)]
-        return found
+        values: Array = self.sums[..., SUMS.index(name)]
+        return values
 
 
 def none_yet(system: ContactSetup) -> Totals:
@@ -92,8 +92,8 @@ class PhaseMeter:
         self._path = system.motion.phases[phase].distance * slid
         positions, phases = system.motion.positions, system.motion.phases
         first = phase // positions * positions
-        whole = sum(one.distance for one in phases[first : first + positions])
-        self._share = phases[phase].distance / whole if whole else 1 / positions  # at rest by the time
+        length = sum(phase.distance for phase in phases[first : first + positions])
+        self._share = phases[phase].distance / length if length else 1 / positions  # at rest by the time
         speed = np.linalg.norm(system.field_of(phase).velocity(pair.opposite), axis=1)
         self._weights, self._moved = pair.weights, pair.weights * system.motion.phases[phase].distance * speed
         self._mean_distance = float(self._moved.sum() / pair.weights.sum())  # where nothing presses
@@ -107,7 +107,7 @@ class PhaseMeter:
         bare = system.friction_in_space(phase, none)
         along = system.friction_in_space(phase, none + 1) - bare  # of a unit of mu
         pressing, dragging = normal + in_model(bare, normal.shape[1]), in_model(along, normal.shape[1])
-        carried, dragged = (np.einsum("id,id->i", one, self._approach) for one in (pressing, dragging))
+        carried, dragged = (np.einsum("id,id->i", force, self._approach) for force in (pressing, dragging))
         path, areas = self._areas * self._path, self._areas
         # What is linear in the pressure, and in mu times it: each with what friction drags along the three axes.
         self._by_pressure = np.array([self._weights, self._moved, path, areas * carried, *(areas * bare.T)])
@@ -123,8 +123,8 @@ class PhaseMeter:
         """
         rubbed = mu * pressure
         parts = [*map(float, self._by_pressure @ pressure), *map(float, self._by_friction @ rubbed)]
-        for own, weigh in zip((wear.punch, wear.strip), self._weigh, strict=True):
-            parts += (weigh @ own.depth(pressure[None])[0]).tolist()
+        for body_wear, weigh in zip((wear.punch, wear.strip), self._weigh, strict=True):
+            parts += (weigh @ body_wear.depth(pressure[None])[0]).tolist()
         force, moved, path, carried, x, y, z, work, dragged, by_x, by_y, by_z, *worn = parts
         distance = moved / force if force else self._mean_distance
         drag = math.hypot(x + by_x, y + by_y, z + by_z)
@@ -166,15 +166,15 @@ def approach(rigid: RigidEquilibrium) -> Array:
     as around a whole bore.
     """
     along, pair = rigid.approach, rigid.pair
-    found = np.zeros_like(pair.normal) if along is None else along.copy()
+    directions = np.zeros_like(pair.normal) if along is None else along.copy()
     for k in range(pair.punch.part.max() + 1):
-        own = pair.punch.part == k
-        if np.abs(found[own]).max() > 0:
+        in_part = pair.punch.part == k
+        if np.abs(directions[in_part]).max() > 0:
             continue
-        mean = pair.weights[own] @ pair.normal[own] / pair.weights[own].sum()
+        mean = pair.weights[in_part] @ pair.normal[in_part] / pair.weights[in_part].sum()
         size = np.linalg.norm(mean)
-        found[own] = mean / size if size > AROUND else pair.normal[own]
-    return found
+        directions[in_part] = mean / size if size > AROUND else pair.normal[in_part]
+    return directions
 
 
 def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> list[Totals]:
@@ -275,8 +275,12 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     nodes, _ = node_maps(before, after)
     none, totals = np.zeros(len(nodes)), state.totals
     contacts = [
-        replace(one, pressure=on_nodes(one.pressure, nodes, none), gap=on_nodes(one.gap, nodes, after.pair.initial_gap))
-        for one in state.contacts
+        replace(
+            contact,
+            pressure=on_nodes(contact.pressure, nodes, none),
+            gap=on_nodes(contact.gap, nodes, after.pair.initial_gap),
+        )
+        for contact in state.contacts
     ]
     return replace(
         state,

@@ -94,7 +94,7 @@ def follow(
         if state is not None and renewal is not None:
             on_renewal(state.half_cycle, renewal)
             system, state = _renewed(system, state, renewal, adapt)
-            given = None if given is None else {k: one for k, one in given.items() if k > state.half_cycle}
+            given = None if given is None else {k: renewal for k, renewal in given.items() if k > state.half_cycle}
             leave = _Leaving(system, given)
         for block in integrate(system, replace(limits, leave=leave), state):
             yield block
@@ -155,8 +155,8 @@ class _Leaving:
 
     def is_warm(self, state: RunState) -> bool:
         """Return whether a whole cycle ends at temperatures for which properties need an update; collective."""
-        whole = state.half_cycle % self.system.motion.half_cycles == 0
-        return whole and properties_outdated(self.system, state.temperature)
+        ended = state.half_cycle % self.system.motion.half_cycles == 0
+        return ended and properties_outdated(self.system, state.temperature)
 
 
 def _moved_along(state: RunState, moved: Tribosystem) -> RunState:
@@ -204,7 +204,7 @@ PASSES = 30
 
 def with_own_properties(
     system: Tribosystem,
-    found: Callable[[Tribosystem], T],
+    solve: Callable[[Tribosystem], T],
     temperatures: Callable[[T], HeatState | None],
     within: float | None = None,
 ) -> tuple[T, int]:
@@ -222,7 +222,7 @@ def with_own_properties(
         CaseError: a property is not positive at a temperature.
         ConvergenceError: the properties do not come to rest.
     """
-    state, key = found(system), warming_key(system)
+    state, key = solve(system), warming_key(system)
     if not key or system.heat is None:
         return state, 0
     share = LEFT if within is None else within / system.heat.property_tolerance
@@ -240,7 +240,7 @@ def with_own_properties(
             between = [followed * new + (1 - followed) * old for new, old in pairs]
             end = HeatState.nodal(system.bodies.heat, between, end.track)
         system = warmed_system(system, end)
-        state = found(system)
+        state = solve(system)
     raise ConvergenceError(
         f"the temperatures of the steady state and the properties that depend on them, {key}, did not converge "
         f"in {PASSES} passes: follow them by `run`"

@@ -120,7 +120,9 @@ def _parts(
     Raises:
         CaseError: no state of the system grows or decays, or the pressures are of other phases or nodes.
     """
-    pressure, own = (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
+    pressure, state_conductances = (
+        (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
+    )
     if system.passing_laws:
         raise CaseError(
             InputError(system.passing_laws[0], "changes as long as it slides, so that no state grows or decays")
@@ -129,7 +131,7 @@ def _parts(
     if pressure.shape != shape:
         message = f"expected pressures of {shape[0]} phases at {shape[1]} nodes, as `SteadyState.phase_pressure`"
         raise CaseError(InputError("state", f"{message}, got {pressure.shape}"))
-    return pressure, own if conductances is None else conductances
+    return pressure, state_conductances if conductances is None else conductances
 
 
 def _factors(
@@ -203,9 +205,9 @@ def _stationary_growth(
     except (CaseError, ConvergenceError) as error:
         return None, str(error)
     if states:
-        found = np.array(heat.exchange.contact_temperatures(states[phase], phase - 1))
-        away = float(np.abs(found - surfaces).max())
-        scale = float(np.abs(found - heat.exchange.heat.initial).max())
+        temperatures = np.array(heat.exchange.contact_temperatures(states[phase], phase - 1))
+        away = float(np.abs(temperatures - surfaces).max())
+        scale = float(np.abs(temperatures - heat.exchange.heat.initial).max())
         if away > APART * scale:
             return None, f"temperatures are still {away:.2g} K from those that repeat at these pressures. {LONGER}"
     drift = change / system.motion.period
@@ -239,7 +241,7 @@ def repeating_temperatures(
         if not system.friction.constant:
             conditions = [system.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
             friction = [system.friction.values(c) for c in conditions]
-            mu = np.array([heating_friction(system, own, phase) for phase, own in enumerate(friction)])
+            mu = np.array([heating_friction(system, ratio, phase) for phase, ratio in enumerate(friction)])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         exchange = heat.exchange
         try:
@@ -250,12 +252,12 @@ def repeating_temperatures(
         for phase in range(len(pressure) - 1):
             states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
         surfaces = [exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
-        found = np.array(surfaces)
+        temperatures = np.array(surfaces)
         if system.friction.constant:
             return heat, states
-        if before is not None and np.abs(found - before).max() <= CLOSE * max(1.0, float(np.ptp(found))):
+        if before is not None and np.abs(temperatures - before).max() <= CLOSE * max(1.0, float(np.ptp(temperatures))):
             return heat, states
-        before = found
+        before = temperatures
     raise ConvergenceError(
         f"friction and the temperatures that it depends on did not converge in {MAX_ITERATIONS} iterations at "
         "these pressures. No state exists whose growth rate can be computed"
@@ -275,7 +277,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
     if states:
         warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
     conditions = [
-        system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
+        system.conditions(k, np.asarray(p), warmth) for k, (p, warmth) in enumerate(zip(pressure, warm, strict=True))
     ]
     rest = system.rested(conditions)
     if not layers.debris.present:
@@ -284,7 +286,7 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
     for _ in range(MAX_ITERATIONS):
         lying = layers.with_thickness(rest, thickness)
         pairs = zip(conditions, system.pairs, strict=True)
-        now = [replace(one, debris=layers.facing(pair, lying)) for one, pair in pairs]
+        now = [replace(condition, debris=layers.facing(pair, lying)) for condition, pair in pairs]
         passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
         thickness = passing.resting_at_debris(pressure)
         if not layers.varies and not system.asks("debris"):
@@ -405,7 +407,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
     exchange, positions = system.exchange, system.motion.positions
     if not exchange.conducts or system.sticks:  # there every time step tells whether its answer is the only one near
         return None
-    found = [0.0]
+    gains = [0.0]
     for phase in range(positions // 2, len(system.motion.phases), positions):
         if pressure is None:
             carried = system.phase_contact((phase,)).solve(system.gap(phase, system.unworn())).pressure[0]
@@ -419,8 +421,8 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
         sliding = SlidingContact(system.interfaces[phase], system.phase_friction(phase, slope))
         contact = CondensedContact([sliding], team=system.team)
         modes = contact.size - len(closed)
-        found.append(contact.on_closed_contact(partial(_gain, opened, modes), closed))
-    return max(found)
+        gains.append(contact.on_closed_contact(partial(_gain, opened, modes), closed))
+    return max(gains)
 
 
 def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: HeatState | None) -> Array:

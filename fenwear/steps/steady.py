@@ -178,8 +178,8 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
             properties of the temperatures.
     """
     system = at_step(system)
-    found: SteadyState = system.contact_law.end(system, properties_within)
-    return found
+    state: SteadyState = system.contact_law.end(system, properties_within)
+    return state
 
 
 def steady_state(system: Tribosystem, properties_within: float | None = None) -> SteadyState:
@@ -201,13 +201,13 @@ def _of_these_bodies(system: Tribosystem) -> SteadyState:
     _check_sinks(prepared)
     end = _End(prepared, system.layers.hardness)
 
-    def found() -> SteadyState:
+    def state_of_bodies() -> SteadyState:
         try:
-            return end.found()
+            return end.state()
         except ConvergenceError as error:
             raise ConvergenceError(_why_none(prepared, error)) from error
 
-    return replace(prepared.team.lead(found), system=system)
+    return replace(prepared.team.lead(state_of_bodies), system=system)
 
 
 def _elastic(system: Tribosystem) -> Tribosystem:
@@ -291,7 +291,7 @@ def _loads_oppose(system: Tribosystem) -> bool:
     each phase that wears, on the motions H of the middle position.
     """
     pairs = zip(system.interfaces, rigid_of_phases(system), strict=True)
-    loads = np.array([-own.rigid.resultant @ np.linalg.pinv(turned) for own, turned in pairs])
+    loads = np.array([-interface.rigid.resultant @ np.linalg.pinv(turned) for interface, turned in pairs])
     loads = loads[system.path.max(axis=1) > 0]
     loads = loads / system.mode_lengths
     sizes = np.linalg.norm(loads, axis=1)
@@ -340,7 +340,7 @@ class _End:
         even = np.full((len(system.motion.phases), len(system.pair.weights)), system.interface.pressure_scale + above)
         self._rate = float(system.phases_wear.opening(even).max()) / len(even)
 
-    def found(self) -> SteadyState:
+    def state(self) -> SteadyState:
         """Return the state.
 
         Raises:
@@ -450,9 +450,9 @@ def rigid_of_phases(system: Tribosystem) -> Array:
     Raises:
         ConvergenceError: they open other gaps: to follow the wear takes H_k lambda_k of one shape in all phases.
     """
-    middle, found = system.rigid.rigid_normal, []
-    for own in system.rigids:
-        here = own.rigid_normal
+    middle, matrices = system.rigid.rigid_normal, []
+    for rigid in system.rigids:
+        here = rigid.rigid_normal
         turned = np.linalg.lstsq(middle, here, rcond=None)[0]
         back = here @ np.linalg.lstsq(here, middle, rcond=None)[0]
         if max(np.abs(middle @ turned - here).max(), np.abs(back - middle).max()) > APART * np.abs(middle).max():
@@ -461,8 +461,8 @@ def rigid_of_phases(system: Tribosystem) -> Array:
                 "position of the strip open the contact in another. This happens where only a strip on a hinge "
                 "moves. Follow the wear by `run`"
             )
-        found.append(turned)
-    return np.array(found)
+        matrices.append(turned)
+    return np.array(matrices)
 
 
 def _uniform_wear_exists(system: Tribosystem) -> bool:
@@ -471,9 +471,9 @@ def _uniform_wear_exists(system: Tribosystem) -> bool:
     m, lengths = len(system.motion.phases), system.mode_lengths
     balances: list[Array] = []
     target: list[Array] = [np.zeros(n)]
-    for own, friction_ratio in zip(system.interfaces, system.friction_ratios(), strict=True):
-        balances.append(own.rigid.equilibrium(friction_ratio) / lengths[:, None])
-        target.append(-own.rigid.resultant / lengths)
+    for interface, friction_ratio in zip(system.interfaces, system.friction_ratios(), strict=True):
+        balances.append(interface.rigid.equilibrium(friction_ratio) / lengths[:, None])
+        target.append(-interface.rigid.resultant / lengths)
     motion = -system.rigid.rigid_normal / lengths
     uniform = hstack([eye_array(n)] * m + [motion])
     equality = vstack([uniform, hstack([block_diag(balances), csr_array((m * r, r))])], format="csr")
@@ -509,8 +509,8 @@ class RunningIn:
 
 def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> int | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end, see `running_in`."""
-    found = running_in(system, state, fraction, limit)
-    return None if found is None else round(found.cycles)
+    running = running_in(system, state, fraction, limit)
+    return None if running is None else round(running.cycles)
 
 
 def running_in(
@@ -560,7 +560,7 @@ def running_in(
     reached = way.leads(passed[-2].meets, passed[-1])
     if not np.isfinite(reached):
         return RunningIn(cycles, uncertainty)
-    return RunningIn(reached, uncertainty, tuple(one.cycles for one in (*before, *passed)))
+    return RunningIn(reached, uncertainty, tuple(moment.cycles for moment in (*before, *passed)))
 
 
 @dataclass(frozen=True)

@@ -116,20 +116,22 @@ class StickCreep:
 
     def displaced(self, state: Array, elastic: Array | None = None, duration: float = 0.0) -> Displaced:
         """Return the displacements of punch, strip and layer at the end of a step, by a state and by v at its begin."""
-        found = []
+        displacements = []
         ends = self.after(state, self.unloaded() if elastic is None else elastic, self.unloaded(), duration)
         for part, (law, y) in enumerate(zip(self.laws, self.parted(ends), strict=True)):
-            found.append(self.displacement(part, law.compliances @ y) if law.creeps else np.zeros(self.shapes[part]))
-        return found[0], found[1], found[2]
+            displacements.append(
+                self.displacement(part, law.compliances @ y) if law.creeps else np.zeros(self.shapes[part])
+            )
+        return displacements[0], displacements[1], displacements[2]
 
     def after(self, state: Array, begin: Array, end: Array, duration: float) -> Array:
         """Return the state after a step over which v of all parts (size,) changes evenly."""
-        found, cuts = [], np.cumsum(self._numbers)[:-1]
+        parts, cuts = [], np.cumsum(self._numbers)[:-1]
         for law, y, u, v in zip(self.laws, self.parted(state), np.split(begin, cuts), np.split(end, cuts), strict=True):
             at_begin, at_end = law.shares(duration)
             left = np.exp(-duration / law.times)[:, None] * y
-            found.append((left + at_begin[:, None] * u + at_end[:, None] * v).ravel())
-        return np.concatenate(found)
+            parts.append((left + at_begin[:, None] * u + at_end[:, None] * v).ravel())
+        return np.concatenate(parts)
 
     def factors(self, duration: float) -> list[float]:
         """Return the compliance of each part in a step, over that at once; in the end for an infinite duration."""
@@ -140,25 +142,27 @@ class StickCreep:
         kept: dict[tuple[int, float], tuple[Position, Position]] = self.__dict__["_kept"]
         key = id(position), duration
         if key not in kept:
-            own, times = position.interface, self.factors(duration)
+            interface, times = position.interface, self.factors(duration)
             if times == [1.0] * len(times):
                 kept[key] = position, position
             else:
                 punch, strip = (
                     scaled(body, factor, moved)
-                    for body, factor, moved in zip((own.punch, own.strip), times[:2], self.moved, strict=True)
+                    for body, factor, moved in zip(
+                        (interface.punch, interface.strip), times[:2], self.moved, strict=True
+                    )
                 )
-                other = replace(own, punch=punch, strip=strip, layer=times[2] * own.layer, like=None)
+                other = replace(interface, punch=punch, strip=strip, layer=times[2] * interface.layer, like=None)
                 kept[key] = position, replace(position, interface=other)
         return kept[key][1]
 
     def lasting(self, begin: Array, end: Array, period: float) -> Array:
         """Return the state that cycles end with which repeat, if each does to its state what one cycle did: E y + g."""
-        found = []
-        for law, one, other in zip(self.laws, self.parted(begin), self.parted(end), strict=True):
+        parts = []
+        for law, first, other in zip(self.laws, self.parted(begin), self.parted(end), strict=True):
             x = period / law.times[:, None]
-            found.append((one + (other - one) / -np.expm1(-x)).ravel())
-        return np.concatenate(found)
+            parts.append((first + (other - first) / -np.expm1(-x)).ravel())
+        return np.concatenate(parts)
 
     def rate(self, begin: Array, end: Array, period: float) -> Array:
         """Return the rate by which the state changes with the cycles, from its change in one cycle."""
@@ -169,8 +173,8 @@ class StickCreep:
         """Return a contact whose bodies have crept to another state, their surfaces where they were."""
         before, now = self.displaced(contact.crept), self.displaced(state)
         on_punch, on_strip = (
-            own + one - other
-            for own, one, other in zip((contact.on_punch, contact.on_strip), before, now, strict=False)
+            displacement + earlier - other
+            for displacement, earlier, other in zip((contact.on_punch, contact.on_strip), before, now, strict=False)
         )
         return replace(contact, on_punch=on_punch, on_strip=on_strip, crept=state)
 
@@ -224,22 +228,22 @@ class CreepNear:
 
     def after(self, before: Array, cycles: float, pressure: Array) -> Array:
         """Return the state z = before + cycles M(z) at a change of the mean pressure (n,), MPa."""
-        found = []
+        parts = []
         for part, away in enumerate(self._creep.parted(before - self._begin)):
             x = cycles * self._paces[part][:, None]
             along, across = self._split(part, away + cycles * self._rate[part])
             along = along + x * self._displaced(part, pressure)
-            found.append(along / (1 + x) + across / (1 + self._growth(part) * x))
-        return self._begin + np.concatenate([own.ravel() for own in found])
+            parts.append(along / (1 + x) + across / (1 + self._growth(part) * x))
+        return self._begin + np.concatenate([part.ravel() for part in parts])
 
     def rate(self, now: Array, pressure: Array) -> Array:
         """Return M(now) at a change of the mean pressure (n,), MPa."""
-        found = []
+        parts = []
         for part, away in enumerate(self._creep.parted(now - self._begin)):
             along, across = self._split(part, away)
             moved = self._displaced(part, pressure) - along - self._growth(part) * across
-            found.append(self._rate[part] + self._paces[part][:, None] * moved)
-        return np.concatenate([own.ravel() for own in found])
+            parts.append(self._rate[part] + self._paces[part][:, None] * moved)
+        return np.concatenate([part.ravel() for part in parts])
 
     def _growth(self, part: int) -> float:
         return 1 + float(self._creep.laws[part].compliances.sum())
@@ -278,8 +282,8 @@ class CreepNear:
 
 def _normals_of_strip(position: Position) -> Array:
     """Return the normals at the nodes of the strip's operator (q, d): those of the contact nodes that read them."""
-    found = position.reaction(position.frame[:, 0])
-    lengths = np.linalg.norm(found, axis=1)
+    normals = position.reaction(position.frame[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
     mean = position.pair.placement.back(position.frame[:, 0]).mean(axis=0)
-    found[lengths == 0] = mean
-    return found / np.linalg.norm(found, axis=1)[:, None]
+    normals[lengths == 0] = mean
+    return normals / np.linalg.norm(normals, axis=1)[:, None]

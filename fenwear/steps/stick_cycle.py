@@ -106,8 +106,8 @@ class PartialSlipProblem:
 
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, and the initial layers."""
-        found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
-        return replace(found, crept=self.interface.creep.beginning())
+        depths = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
+        return replace(depths, crept=self.interface.creep.beginning())
 
     def shaped(self, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
         """Return a state on another shape, whose bodies have crept as it says; sticking nodes stay in place."""
@@ -299,7 +299,7 @@ class PartialSlipProblem:
         if interface.creep.creeps:
             crept = zip(*map(interface.creep.displaced, (state.crept, before.crept)), strict=True)
             on_punch, on_strip, closed = (
-                own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
+                elastic + now - had for elastic, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
             )
         stored = float(np.vdot(force, on_punch) - np.vdot(back, on_strip))
         lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
@@ -406,7 +406,7 @@ class PartialSlipProblem:
         chosen = range(len(records))[which]
         conditions, pairs = conditions[which], self.pairs(records, begin)[which]
         slid, durations = records.slip_magnitude[which], records.duration[which]
-        wears = [self.wear] * len(chosen) if laws is None else [laws.wear_at(one) for one in conditions]
+        wears = [self.wear] * len(chosen) if laws is None else [laws.wear_at(condition) for condition in conditions]
         wear = self._wear(wears, slid, durations, pairs)
         evolution = None if evolution is None else evolution.some(chosen)
         return LayerEvolution.over(self.interface.layers, wear, slid, evolution, conditions)
@@ -427,8 +427,8 @@ class PartialSlipProblem:
         pairs = self.pairs(records, begin)
 
         def wearing(k: int, at: ContactConditions) -> Array:
-            own, wears = slice(k, k + 1), [laws.wear_at(at)]
-            wear = self._wear(wears, records.slip_magnitude[own], records.duration[own], pairs[own])
+            row, wears = slice(k, k + 1), [laws.wear_at(at)]
+            wear = self._wear(wears, records.slip_magnitude[row], records.duration[row], pairs[row])
             return np.asarray(wear.begun(begin.worn, 0.0).taken(at.pressure[None])[0] / records.duration[k])
 
         conditions = self.of_steps(records, begin)
@@ -456,11 +456,11 @@ class PartialSlipProblem:
         return self.led(partial(self._cycle, at))
 
     def _cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, list[TimeStepRecords]]:
-        found = []
+        recorded = []
         for _ in range(self.program.half_cycles):
             at, records = self.half_cycle(at)
-            found.append(records)
-        return at, found
+            recorded.append(records)
+        return at, recorded
 
 
 def on_other_grid(
@@ -539,5 +539,5 @@ def _affine(x: Array, values: Array, there: Array) -> Array:
     def terms(points: Array) -> Array:
         return np.column_stack([np.ones(len(points)), points])
 
-    found, *_ = np.linalg.lstsq(terms(x), values, rcond=None)
-    return np.asarray(terms(there) @ found)
+    motion, *_ = np.linalg.lstsq(terms(x), values, rcond=None)
+    return np.asarray(terms(there) @ motion)

@@ -186,13 +186,13 @@ class Step:
         punch, strip = punch + (factors[0] - 1) * loaded.forced_punch, strip + (factors[1] - 1) * loaded.forced_strip
         return (punch, strip, layer), creep.displaced(state)
 
-    def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
+    def jumps(self, solution: StatusSolution) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
-        position, known = self.position, found.jump if found.moved is None else found.moved.jump
-        j = position.compliance.apply(found.f) if known is None else known
-        j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
+        position, known = self.position, solution.jump if solution.moved is None else solution.moved.jump
+        j = position.compliance.apply(solution.f) if known is None else known
+        j = j + position.modes @ solution.rigid - position.drive * solution.displacement + self.free
         if self.closure is not None:
-            j[: self.n] += self.closure.closure(found.f[: self.n])
+            j[: self.n] += self.closure.closure(solution.f[: self.n])
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
     def forget(self) -> None:
@@ -207,8 +207,8 @@ class Step:
         n, m, r, mu = self.n, self.m, self.position.modes.shape[1], self.mu
         closed = np.flatnonzero(status.closed)
         tied = status.slipping[closed] if m == 1 else np.zeros(len(closed), dtype=bool)  # t = +-mu p
-        own = closed[~tied]
-        columns = np.concatenate([closed, (n * (1 + np.arange(m)) + own[:, None]).ravel()])
+        untied = closed[~tied]
+        columns = np.concatenate([closed, (n * (1 + np.arange(m)) + untied[:, None]).ravel()])
         ratio = np.sign(status.trial[closed[tied], 0]) * mu[closed[tied]]
         k, loose = len(columns), self.imposed.force is not None
         A, b = np.zeros((k + r + loose, k + r + loose)), np.zeros(k + r + loose)
@@ -231,7 +231,7 @@ class Step:
         if self.closure is not None:
             self._give_way(A, b, status, closed)
         if m > 1:
-            self._slide(A, b, status, own, len(closed))
+            self._slide(A, b, status, untied, len(closed))
         flows = np.flatnonzero(status.flowing[closed])
         A[flows], A[flows, flows], b[flows] = 0.0, 1.0, self.hardness
         balance = self.units / (self.length * self.area)
@@ -259,10 +259,10 @@ class Step:
         A[rows] /= size[:, None]
         b[rows] /= size
 
-    def _slide(self, A: Array, b: Array, status: ContactStatus, own: NDArray[np.int64], k: int) -> None:
+    def _slide(self, A: Array, b: Array, status: ContactStatus, untied: NDArray[np.int64], k: int) -> None:
         """Turn the rows c s = 0 of nodes that slip in two directions into t - P(t - c s) = 0, linearised."""
-        m, places = self.m, np.flatnonzero(status.slipping[own])
-        nodes = own[places]
+        m, places = self.m, np.flatnonzero(status.slipping[untied])
+        nodes = untied[places]
         K, direction = derivative(status.trial[nodes], status.radius[nodes])
         rows = k + m * places[:, None] + np.arange(m)
         A[rows] = K @ A[rows]
@@ -271,11 +271,11 @@ class Step:
         pressures = np.searchsorted(np.flatnonzero(status.closed), nodes)
         A[rows, pressures[:, None]] -= self.mu[nodes, None] * direction
 
-    def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
+    def status_of(self, solution: StatusSolution) -> tuple[ContactStatus, float]:
         """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
         n = self.n
-        gap, slip = self.jumps(found)
-        pressure, traction = found.f[:n], found.f[n:].reshape(self.m, n).T
+        gap, slip = self.jumps(solution)
+        pressure, traction = solution.f[:n], solution.f[n:].reshape(self.m, n).T
         pushed = pressure - gap / self.scale[0]
         trial = traction - slip / self.scale[1:].T
         kept = np.clip(pushed, 0.0, self.hardness)
@@ -286,21 +286,21 @@ class Step:
         status = ContactStatus(pushed > 0, slipping, trial, radius, np.maximum(pressure, 0.0), flowing)
         return status, float(wrong / max(pressure.max(), 1e-300))
 
-    def state(self, found: StatusSolution, iterations: int, *, unique: bool) -> StickState:
+    def state(self, solution: StatusSolution, iterations: int, *, unique: bool) -> StickState:
         """Return the state at the end of the step, without rounding errors in the laws."""
         n, position = self.n, self.position
-        status, _ = self.status_of(found)
-        gap, slip = self.jumps(found)
-        pressure = np.where(status.closed, np.clip(found.f[:n], 0.0, self.hardness), 0.0)
+        status, _ = self.status_of(solution)
+        gap, slip = self.jumps(solution)
+        pressure = np.where(status.closed, np.clip(solution.f[:n], 0.0, self.hardness), 0.0)
         pressure[status.flowing] = self.hardness
-        traction = project(found.f[n:].reshape(self.m, n).T, self.mu * pressure)
+        traction = project(solution.f[n:].reshape(self.m, n).T, self.mu * pressure)
         flowed = np.where(status.flowing, np.maximum(-gap, 0.0), 0.0)
         gap = np.where(status.closed, 0.0, gap)
         rounding = ROUNDING * pressure.max() * self.scale[1:].T
         stuck = status.closed & (~status.slipping | (np.abs(slip) <= rounding).all(axis=1))
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
-        moved = found.moved or self._moved(f, found.jump)
+        moved = solution.moved or self._moved(f, solution.jump)
         crept, elastic = self.before.crept, self.before.elastic
         if self.creep.creeps:
             elastic = self.creep.of_contact(self.position, f, (moved.on_punch, moved.on_strip), self.imposed.loaded)
@@ -311,8 +311,8 @@ class Step:
             gap,
             slip,
             self.approached + gap - flowed,
-            found.rigid,
-            found.displacement,
+            solution.rigid,
+            solution.displacement,
             float(position.pull @ f),
             self.free_punch + moved.on_punch,
             self.free_strip + moved.on_strip,

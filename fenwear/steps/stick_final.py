@@ -87,10 +87,10 @@ def stick_edges(x: Array, stick: Mask, slid: Array, closed: Mask) -> list[Edge]:
         closed: Nodes that carry pressure at any time of it (n,).
     """
     step = np.diff(np.concatenate([[0], stick.astype(np.int8), [0]]))
-    found = []
+    edges = []
     for first, last in zip(np.flatnonzero(step == 1), np.flatnonzero(step == -1) - 1, strict=True):
-        found += [_edge(x, int(first), -1, slid, closed), _edge(x, int(last), 1, slid, closed)]
-    return found
+        edges += [_edge(x, int(first), -1, slid, closed), _edge(x, int(last), 1, slid, closed)]
+    return edges
 
 
 def _edge(x: Array, node: int, side: int, slid: Array, closed: Mask) -> Edge:
@@ -120,9 +120,9 @@ def beside(surface: ContactSurface, zone: Mask) -> Mask:
     """Return the nodes beside a zone of pressure nodes: they share a facet with it (n,)."""
     facets = surface.number[surface.facets]
     touched = (zone[facets] & (facets >= 0)).any(axis=1)
-    found = np.zeros(len(zone), dtype=bool)
-    found[facets[touched][facets[touched] >= 0]] = True
-    return found & ~zone
+    neighbours = np.zeros(len(zone), dtype=bool)
+    neighbours[facets[touched][facets[touched] >= 0]] = True
+    return neighbours & ~zone
 
 
 FAR = 1e3  # times the largest gap: never closes
@@ -202,9 +202,9 @@ def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
         )
 
     def advance(crept: Array) -> tuple[Array, WornDepths, bool]:
-        own = replace(shape, crept=crept)
-        at, _ = problem.cycle(problem.beginning(own))
-        return creep.lasting(crept, at.contact.crept, problem.program.period), own, False
+        crept_shape = replace(shape, crept=crept)
+        at, _ = problem.cycle(problem.beginning(crept_shape))
+        return creep.lasting(crept, at.contact.crept, problem.program.period), crept_shape, False
 
     def close(change: Array, crept: Array) -> bool:
         return float(np.abs(change).max()) <= SAME * max(float(np.abs(crept).max()), 1e-300)
@@ -235,9 +235,9 @@ def _without_flow(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape
         return _with_heat(problem, stick)
     at, _ = problem.cycle(problem.beginning())
     if not at.worn.between[layers.row(PLASTIC)].any():
-        found = _with_heat(problem.elastic(), stick)
-        if found.pressures.max() <= layers.hardness:
-            return found
+        shape = _with_heat(problem.elastic(), stick)
+        if shape.pressures.max() <= layers.hardness:
+            return shape
     raise ConvergenceError(
         f"no final shape without plastic flow exists: pressures reach contact.hardness = {layers.hardness:.4g} MPa, "
         "and the plastic flow until then depends on the way there. Follow it by `run`"
@@ -253,10 +253,10 @@ def _with_heat(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
     for _ in range(MOST_TIMES):
         conductance = np.array([heat.exchange.conductance(pressure) for pressure in pressures])
         warm = heat.through(np.zeros_like(pressures), conductance).at_rest()
-        found, now = _final_shape(problem.kept_at(heat, warm), stick), heat.surfaces(warm)
+        shape, now = _final_shape(problem.kept_at(heat, warm), stick), heat.surfaces(warm)
         if np.abs(now - before).max() <= SAME * max(float(np.abs(now).max()), 1e-300):
-            return replace(found, temperature=now)
-        pressures, before = found.pressures, now
+            return replace(shape, temperature=now)
+        pressures, before = shape.pressures, now
     raise ConvergenceError(f"contact and temperatures of the end did not converge in {MOST_TIMES} times")
 
 
@@ -266,22 +266,22 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
         return _of_nodes(problem, stick)
     forces = [step.force or 0.0 for step in problem.program.steps]
     force = max(map(abs, forces))
-    found, factor = _of_cycle(problem, problem), 1.0
+    shape, factor = _of_cycle(problem, problem), 1.0
     friction = float(problem.weights @ problem.friction / problem.weights.sum())
     load = problem.weights @ problem.beginning().contact.pressure if force else 0.0
     for _ in range(MOST_TIMES if force else 0):
-        before, factor = factor, 1 + friction * float(load - (found.pressures @ problem.weights).mean()) / force
+        before, factor = factor, 1 + friction * float(load - (shape.pressures @ problem.weights).mean()) / force
         if factor - before <= KEPT:
-            return found
+            return shape
         try:
-            found = _of_cycle(problem, problem.driven(problem.program.with_force(factor)))
+            shape = _of_cycle(problem, problem.driven(problem.program.with_force(factor)))
         except ConvergenceError as error:
             raise ConvergenceError(
                 "no final shape exists: the approach is prescribed, so that wear unloads the contact until friction "
                 "cannot hold the tangential force. The contact then slides as a whole. Follow it by `run`, or reduce "
                 "stick.force"
             ) from error
-    return found
+    return shape
 
 
 def _of_cycle(problem: PartialSlipProblem, driven: PartialSlipProblem) -> FinalShape:
@@ -289,12 +289,12 @@ def _of_cycle(problem: PartialSlipProblem, driven: PartialSlipProblem) -> FinalS
     records, middle = _second_cycle(driven), problem.interface.middle
     if middle.compliance.on_grid is not None and middle.pair.punch.dim > 2:
         return _of_grid(problem, records)
-    found = None
+    shape = None
     if middle.pair.punch.dim == 2:
         slid = records.slip_magnitude.sum(axis=0)
         edges = stick_edges(middle.pair.x, records.stuck, slid, records.touched)
-        found = _of_edges(problem, edges) if len(edges) == 2 else None
-    return _of_surface(problem, records.stuck) if found is None else found
+        shape = _of_edges(problem, edges) if len(edges) == 2 else None
+    return _of_surface(problem, records.stuck) if shape is None else shape
 
 
 def _of_nodes(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
@@ -304,11 +304,11 @@ def _of_nodes(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
 
 def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
     """Return the shape with a zone of whole nodes, and the shapes with one node more and less at each edge."""
-    found, surface = _of_nodes(problem, zone), problem.interface.middle.pair.punch
+    shape, surface = _of_nodes(problem, zone), problem.interface.middle.pair.punch
     wider, rim = beside(surface, zone), beside(surface, ~zone)
     inner = zone & ~rim
-    other = [_of_nodes(problem, one) if one.any() else found for one in (zone | wider, inner)]
-    return _ranged(problem, found, [one.depth for one in other], float(problem.weights @ wider) / 2)
+    other = [_of_nodes(problem, other_zone) if other_zone.any() else shape for other_zone in (zone | wider, inner)]
+    return _ranged(problem, shape, [ranged.depth for ranged in other], float(problem.weights @ wider) / 2)
 
 
 def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShape:
@@ -332,16 +332,16 @@ def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShap
     if beyond.sum() > FITTED:
         size = float(np.polynomial.polynomial.polyfit(level[beyond], np.sqrt(area[beyond]), 1)[0] ** 2)
 
-    def zone(more: float) -> Mask:
+    def zone(extra: float) -> Mask:
         """Return the nodes that slip least, as many as carry like a zone so many nodes wider."""
-        carried = size + (more + INSIDE) * ring
-        found = np.zeros(len(weights), dtype=bool)
-        found[order[: max(int(np.searchsorted(area, carried)), 1)]] = True
-        return found
+        carried = size + (extra + INSIDE) * ring
+        inside = np.zeros(len(weights), dtype=bool)
+        inside[order[: max(int(np.searchsorted(area, carried)), 1)]] = True
+        return inside
 
-    found = _of_nodes(problem, zone(0.0))
-    other = [_of_nodes(problem, zone(more)) for more in (LEFT, -LEFT)]
-    return replace(_ranged(problem, found, [one.depth for one in other], LEFT * ring), size=size)
+    shape = _of_nodes(problem, zone(0.0))
+    other = [_of_nodes(problem, zone(extra)) for extra in (LEFT, -LEFT)]
+    return replace(_ranged(problem, shape, [ranged.depth for ranged in other], LEFT * ring), size=size)
 
 
 def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape | None:
@@ -359,10 +359,10 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
     for k, edge in enumerate(edges):
 
         def end(node: int, k: int = k, edge: Edge = edge) -> float | None:
-            own = [*nodes[:k], node, *nodes[k + 1 :]]
-            if own[0] >= own[1] or not 0 <= node < len(x):
+            zone_ends = [*nodes[:k], node, *nodes[k + 1 :]]
+            if zone_ends[0] >= zone_ends[1] or not 0 <= node < len(x):
                 return None
-            return _end_of_nodes(problem, own[0], own[1], edge.side)
+            return _end_of_nodes(problem, zone_ends[0], zone_ends[1], edge.side)
 
         here = end(edge.node)
         if here is None:
@@ -389,8 +389,8 @@ def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape 
 
     width, within = zone_width(edges)
     zone = np.asarray((x > edges[0].x) & (x < edges[1].x))
-    found = _shape(problem, zone, blended(0.0), width)
-    return _ranged(problem, found, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)], within)
+    shape = _shape(problem, zone, blended(0.0), width)
+    return _ranged(problem, shape, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)], within)
 
 
 def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int) -> float | None:
@@ -405,7 +405,7 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     position = problem.interface.creep.grown(problem.interface.middle, np.inf)
     x, n, zone = position.pair.x, len(problem.weights), np.arange(first, last + 1)
     end = last if side > 0 else first
-    pairs = [(end + side * one, end + side * other) for one, other in AWAY]
+    pairs = [(end + side * near, end + side * other) for near, other in AWAY]
     inside = [pair for pair in pairs if min(pair) >= 0 and max(pair) < n]
     if not inside:
         return None
@@ -424,8 +424,8 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
         load[:k] = -approach[zone]
     if not load.any():
         return None
-    found = np.linalg.solve(system, load)
-    beside = position.compliance.entries(places, zone) / scale @ found[:k] + position.modes[places] @ found[k:]
+    solution = np.linalg.solve(system, load)
+    beside = position.compliance.entries(places, zone) / scale @ solution[:k] + position.modes[places] @ solution[k:]
     beside += approach[places]
     near, far = -beside
     middle = (x[first] + x[last]) / 2
@@ -443,11 +443,11 @@ def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int)
     return float(middle + side * edge)
 
 
-def _ranged(problem: PartialSlipProblem, found: FinalShape, depths: Sequence[Array], within: float) -> FinalShape:
+def _ranged(problem: PartialSlipProblem, shape: FinalShape, depths: Sequence[Array], within: float) -> FinalShape:
     """Return a shape with the largest depths and worn volumes of two others, the smaller first, and what is left."""
     low, high = sorted(float(depth.max()) for depth in depths)
-    less, more = sorted(float(problem.weights @ depth) for depth in depths)
-    return replace(found, deepest=(low, high), volume=(less, more), within=within)
+    smaller, larger = sorted(float(problem.weights @ depth) for depth in depths)
+    return replace(shape, deepest=(low, high), volume=(smaller, larger), within=within)
 
 
 def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
@@ -512,12 +512,12 @@ def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
     return np.minimum(lost(high)[0], depth)
 
 
-def cycle_of_final(found: FinalShape) -> SteadyCycle:
+def cycle_of_final(shape: FinalShape) -> SteadyCycle:
     """Return the half-cycles of the end of partial-slip wear, with the pressures of their ends: nothing wears on."""
-    system = found.system
+    system = shape.system
     strokes, steps = system.motion.half_cycles, system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
-    adds, rate = stacked([none_yet(system)] * strokes), found.worn.times(0.0)
-    warm = found.temperature
+    adds, rate = stacked([none_yet(system)] * strokes), shape.worn.times(0.0)
+    warm = shape.temperature
     heat = None if warm is None else heat_of(*(np.tile(side, (strokes, 1)) for side in warm))
-    return SteadyCycle(system, found.pressures[ends], found.pressures, adds, rate, {}, heat, moves=False)
+    return SteadyCycle(system, shape.pressures[ends], shape.pressures, adds, rate, {}, heat, moves=False)

@@ -212,11 +212,11 @@ def read_at(surface: ContactSurface, points: Array) -> csr_array:
         corners, shares = order[np.stack([place, place + 1], axis=1)], np.stack([1 - share, share], axis=1)
     else:
         mesh = scipy.spatial.Delaunay(nodes)
-        found = mesh.find_simplex(seen)
-        flat = np.einsum("pij,pj->pi", mesh.transform[found, :2], seen - mesh.transform[found, 2])
+        simplex = mesh.find_simplex(seen)
+        flat = np.einsum("pij,pj->pi", mesh.transform[simplex, :2], seen - mesh.transform[simplex, 2])
         shares = np.column_stack([flat, 1 - flat.sum(axis=1)])
-        corners = np.asarray(mesh.simplices[found])
-        beside = found < 0
+        corners = np.asarray(mesh.simplices[simplex])
+        beside = simplex < 0
         corners[beside] = scipy.spatial.KDTree(nodes).query(seen[beside])[1][:, None]
         shares[beside] = [1.0, 0.0, 0.0]
     rows = np.repeat(np.arange(len(seen)), corners.shape[1])
@@ -234,15 +234,15 @@ def expansions(
     interface: StickInterface, exchange: HeatExchange, bodies: Bodies, initial: float
 ) -> tuple[Functional, Functional]:
     """Return the thermal expansion of both bodies on the bases of their temperatures; collective."""
-    found = []
+    expansions = []
     for elastic, patterns, basis in zip((bodies.punch, bodies.strip), interface.patterns, exchange.bases, strict=True):
         if not isinstance(basis, ReducedBasis):
             raise CaseError(InputError("heat.operator", "expected 'reduced' with contact.law = 'coulomb'"))
         fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
         picked = free_expansion(elastic, basis.body, fields)
         at_patterns = np.einsum("qN,Ndk->qdk", patterns.T.toarray(), picked)
-        found.append(Functional(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
-    return found[0], found[1]
+        expansions.append(Functional(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
+    return expansions[0], expansions[1]
 
 
 def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array:
@@ -254,8 +254,8 @@ def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array
         theta.array[:] = field
         coupling.mult(theta, force)
         forces.append(force.array.copy())
-    for one in (coupling, theta, force):
-        one.destroy()
+    for petsc_object in (coupling, theta, force):
+        petsc_object.destroy()
     right = np.stack(forces, axis=1)
     none = np.zeros((elastic.guides.rotations.shape[1], right.shape[1]))
     return elastic.trace.pick(elastic.held(elastic.solve(right), right, none))  # expansion turns nothing

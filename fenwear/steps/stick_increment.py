@@ -113,7 +113,7 @@ def _advance(
     except ConvergenceError as error:
         if halvings == 0:
             raise
-        whole = error
+        failure = error
     middle = start.towards(end, 0.5)
     try:
         first = _advance(interface, position, before, start, middle, friction, halvings - 1)
@@ -121,13 +121,13 @@ def _advance(
         rest = replace(end, duration=end.duration - middle.duration, opening=end.opening + first.flowed)
         second = _advance(interface, position, first, middle, rest, friction, halvings - 1)
     except ConvergenceError as error:
-        raise (whole if isinstance(whole, ManyAnswersError) else error) from None
+        raise (failure if isinstance(failure, ManyAnswersError) else error) from None
     return replace(
         second,
         slip=first.slip + second.slip,
         approach=first.approach + second.approach,
         iterations=first.iterations + second.iterations,
-        unique=first.unique and second.unique and not isinstance(whole, ManyAnswersError),
+        unique=first.unique and second.unique and not isinstance(failure, ManyAnswersError),
         parts=first.parts + second.parts,
         flowed=first.flowed + second.flowed,
     )
@@ -146,8 +146,8 @@ def _newton(step: Step) -> StickState:
     failure = ConvergenceError("the contact with stick did not converge")
     for status in starts:
         try:
-            found = _from(step, status)
-            return replace(found, unique=found.unique and not isinstance(failure, ManyAnswersError))
+            state = _from(step, status)
+            return replace(state, unique=state.unique and not isinstance(failure, ManyAnswersError))
         except ConvergenceError as error:
             failure = failure if isinstance(failure, ManyAnswersError) else error
     if step.hardness < np.inf:  # a curved layer, linearised where it hardly presses, would have all nodes flow
@@ -174,19 +174,19 @@ def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:
         ConvergenceError: it does not converge.
     """
     step.forget()
-    found, iterations, unique = _iterate(step, status, most)
-    return step.state(found, iterations, unique=unique)
+    solution, iterations, unique = _iterate(step, status, most)
+    return step.state(solution, iterations, unique=unique)
 
 
 def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[StatusSolution, int, bool]:
     wrong, signs, course = np.inf, set[int](), list[float]()
     for iteration in range(1, most + 1):
-        found = _solve(step, status)
-        signs.add(found.sign)
-        status, wrong = step.status_of(found)
+        solution = _solve(step, status)
+        signs.add(solution.sign)
+        status, wrong = step.status_of(solution)
         course.append(wrong)
         if wrong < step.close:
-            return found, iteration, min(signs) > 0
+            return solution, iteration, min(signs) > 0
         if iteration > step.patience and min(course[-step.patience :]) > IDLE * min(course[: -step.patience]):
             break
         if not status.closed.any():
@@ -208,14 +208,14 @@ def _solve(step: Step, status: ContactStatus) -> StatusSolution:
     if step.imposed.force is None or (status.closed & ~status.slipping).any():
         return step.solve(status)
     if step.m == 1:
-        return step.solve(_one_stuck(status))
+        return step.solve(_with_nearest_stuck(status))
     try:
         return step.solve(status)
     except ConvergenceError:
-        return step.solve(_one_stuck(status))
+        return step.solve(_with_nearest_stuck(status))
 
 
-def _one_stuck(status: ContactStatus) -> ContactStatus:
+def _with_nearest_stuck(status: ContactStatus) -> ContactStatus:
     """Return the status with the node stuck that is nearest to it: under an imposed force something must hold."""
     excess = np.linalg.norm(status.trial, axis=1) - status.radius
     nearest = np.argmin(np.where(status.closed, excess, np.inf))

@@ -118,16 +118,16 @@ class StickInterface:
         bodies, operators = (self.bodies.punch, self.bodies.strip), (self.punch, self.strip)
         layer = getattr(self.case.contact.layer, "creep", None)
         punch, strip, between = (Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer))
-        found = replace(stiff(*operators), laws=(punch, strip, between))
-        if not found.creeps:
-            return found
+        creep = replace(stiff(*operators), laws=(punch, strip, between))
+        if not creep.creeps:
+            return creep
         moved = [
             operator.under(body.with_loads(())).by_load if body.moved else np.zeros_like(operator.by_load)
             for operator, body in zip(operators, bodies, strict=True)
         ]
-        closure = found.closure + self.layers.winkler
+        closure = creep.closure + self.layers.winkler
         behind = None if bodies[0].reach is None else operators
-        return replace(found, moved=(moved[0], moved[1]), closure=closure, behind=behind)
+        return replace(creep, moved=(moved[0], moved[1]), closure=closure, behind=behind)
 
     @cached_property
     def bulk(self) -> Array:
@@ -137,12 +137,12 @@ class StickInterface:
         """
         pair = self.middle.pair
         x = pair.strip.trace if self.moves else pair.transfer @ pair.strip.trace
-        found = np.zeros_like(x)
-        found[:, 0] = x[:, 0]
+        displacements = np.zeros_like(x)
+        displacements[:, 0] = x[:, 0]
         if self.dim == 3:
             names = set(self.case.strip.regions.values())
-            found[:, 1] = -x[:, 1] * (self.case.materials[names.pop()].poisson if len(names) == 1 else 0.0)
-        return found
+            displacements[:, 1] = -x[:, 1] * (self.case.materials[names.pop()].poisson if len(names) == 1 else 0.0)
+        return displacements
 
     def position(self, offset: float | Placement) -> Position:
         """Return the place of the strip moved by this amount of its motion; collective, or for rank 0 that leads."""
@@ -183,10 +183,10 @@ class StickInterface:
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        found = position_of(
+        position = position_of(
             rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.winkler
         )
-        return along_tangents(found) if self.far else found
+        return along_tangents(position) if self.far else position
 
 
 def untouched(interface: StickInterface) -> StickState:

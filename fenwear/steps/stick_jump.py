@@ -69,7 +69,7 @@ class Groups:
     def summed(self, slopes: Array) -> Array:
         """Return derivatives to the pressures of the time steps (k, ..., n) as those to the contacts' (m, ..., n)."""
         members = [self.of == contact for contact in range(len(self.first))]
-        return np.array([np.einsum("k...n,kn->...n", slopes[own], self.share[own]) for own in members])
+        return np.array([np.einsum("k...n,kn->...n", slopes[group], self.share[group]) for group in members])
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ class GroupedStep:
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
-        found = self.step.local(self.groups.pressure(pressure))
-        return None if found is None else self.groups.summed(found)
+        opened = self.step.local(self.groups.pressure(pressure))
+        return None if opened is None else self.groups.summed(opened)
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return the openings by unit pressures at the punch's nodes, and on the strip's (m, n), mm/MPa."""
         both = self.step.by_body(self.groups.pressure(pressure))
-        punch, strip = (None if one is None else self.groups.summed(one) for one in both)
+        punch, strip = (None if opened is None else self.groups.summed(opened) for opened in both)
         return punch, strip
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
@@ -106,8 +106,8 @@ class GroupedStep:
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own contact alone (m, n)."""
-        found, first = self.step.layer(self.groups.pressure(pressure)), self.groups.first
-        return None if found is None else found[first] * self.groups.share[first]
+        opened, first = self.step.layer(self.groups.pressure(pressure)), self.groups.first
+        return None if opened is None else opened[first] * self.groups.share[first]
 
 
 class Frozen:
@@ -189,10 +189,10 @@ class Frozen:
 def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Position], Groups, ContactState]:
     """Return the places of contacts, which time steps share them, and the contacts: means of the steps."""
     interface, records = problem.interface, cycle.records
-    own = problem.program.following(cycle.first_step, len(records))
+    time_steps = problem.program.following(cycle.first_step, len(records))
     keys = [
         (step.offset if interface.moves else 0.0, id(interface.loaded(step.fraction)), None if step.way is None else k)
-        for k, step in enumerate(own)
+        for k, step in enumerate(time_steps)
     ]
     pressure = np.maximum(records.pressure, 0.0)
     touching: NDArray[np.bool_] = np.any(pressure, axis=1)
@@ -207,7 +207,7 @@ def _grouped(problem: PartialSlipProblem, cycle: FrettingCycle) -> tuple[list[Po
     gap = np.where(mean > 0, 0.0, [records.gap[some].mean(axis=0) for some in members])
     share = np.divide(pressure, mean[of], out=np.ones_like(pressure), where=mean[of] > 0)
     share[~touching] = 0.0
-    places = [interface.position(own[k].offset if interface.moves else 0.0) for k in first]
+    places = [interface.position(time_steps[k].offset if interface.moves else 0.0) for k in first]
     rigid = np.zeros((len(first), interface.middle.modes.shape[1]))
     return places, Groups(of, first, share), ContactState(mean, gap, rigid, 0)
 
@@ -280,9 +280,9 @@ def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths,
     Slip and distance are those of a cycle whose middle is `at`. Where the strip passes, the contact runs in from cycle
     to cycle until they close. Elsewhere it forgets within one, or half a one where nothing else changes in a cycle.
     """
-    program, own, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
-    at = problem.shaped(at, own.layers.flown_as(worn, at.worn))
-    if own.moves:
+    program, interface, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
+    at = problem.shaped(at, interface.layers.flown_as(worn, at.worn))
+    if interface.moves:
         for _ in range(min(cycles - 1, MOST_RUN_IN)):
             before = at
             at, _ = problem.cycle(at)
@@ -292,7 +292,7 @@ def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths,
                 break
         return replace(at, slid=slid - half)
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    constant = not own.layers.memory.names and not own.creep.creeps and not problem.asks_cycle
+    constant = not interface.layers.memory.names and not interface.creep.creeps and not problem.asks_cycle
     if program.half_cycles == 2 and constant and problem.heat is None:
         at, _ = problem.half_cycle(at)
         return replace(at, slid=2 * slid - at.slid)
@@ -329,13 +329,13 @@ def _cycle_after(
         return _recorded(problem, replace(led, temperature=before.warm + since * rate), slid, worn, number)
     warm = _through(heat, before).after(before.warm, since)
     for _ in range(MOST_HEATINGS):
-        found = _recorded(problem, replace(led, temperature=warm), slid, worn, number)
-        over = _through(heat, found)
+        cycle = _recorded(problem, replace(led, temperature=warm), slid, worn, number)
+        over = _through(heat, cycle)
         again = over.after(before.warm, since)
         warmest = float(np.abs(heat.surfaces(again)).max())
         if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
             wrong = heat.exchange.contact_changes(over.error(before.warm, again, rate, since))
-            return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
+            return replace(cycle, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
         warm = again
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
@@ -373,9 +373,9 @@ class _Jump(JumpLaw[_Moment]):
     """Data of the law for a jump from a cycle; temperatures continue from those of the last whole cycle."""
 
     def __init__(
-        self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], whole: FrettingCycle
+        self, problem: PartialSlipProblem, now: FrettingCycle, load: Callable[[float], float], full: FrettingCycle
     ) -> None:
-        self.problem, self._now, self._load, self._whole = problem, now, load, whole
+        self.problem, self._now, self._load, self._full = problem, now, load, full
         self._layers, self._frozen = problem.interface.layers, Frozen(problem, now)
         self.begin = _Moment(now.worn, self._frozen.contact, 0.0, now.worn)
         self._first = self._beside(now, self.begin)
@@ -429,8 +429,8 @@ class _Jump(JumpLaw[_Moment]):
         start = replace(end, worn=end.begin - self._at(end.time).times(end.length) + curved.times(made.cycles / 6))
         missed = end.worn - self.stage(start, end.length, end.time, end.contact, FINE).worn
         opened = partial(opened_by_creep, interface.middle, interface.creep)
-        begin, whole, last = (self.depths(one.worn) for one in (made.begin, made.whole, end))
-        parts = (whole - last).times(HALVES), missed
+        begin, full, last = (self.depths(moment.worn) for moment in (made.begin, made.full, end))
+        parts = (full - last).times(HALVES), missed
         sizes = Sizes(self._layers, interface.middle.pair, opened, REST)
         of_heat = max(self._middle.error, self.then.error)
         return sizes.estimate((begin, last), made, parts, of_heat), missed
@@ -445,12 +445,12 @@ class _Jump(JumpLaw[_Moment]):
         Raises:
             ConvergenceError: it is beyond all numbers.
         """
-        found = cycle.rate
+        rate = cycle.rate
         if not all(
-            np.isfinite(part).all() for part in (found.punch, found.strip, found.between, found.carried, found.crept)
+            np.isfinite(part).all() for part in (rate.punch, rate.strip, rate.between, rate.carried, rate.crept)
         ):
             raise ConvergenceError(TOO_LARGE)
-        return found - self._frozen.rate(at.contact, cycle.worn)
+        return rate - self._frozen.rate(at.contact, cycle.worn)
 
     def _cycle(self, end: _Moment, done: float) -> FrettingCycle:
         """Return the cycle so many later, at the end of a step.
@@ -458,14 +458,14 @@ class _Jump(JumpLaw[_Moment]):
         It continues from the last one of the jump; but where not a whole cycle lies between them, from the last whole
         one, as all its parts do.
         """
-        now, whole, last = self._now, self._whole, self._middle
+        now, full, last = self._now, self._full, self._middle
         worn = _balanced(self.problem, now.worn, self.depths(end.worn))
         number = now.number + done
-        cycles = max(1, int(number - whole.number)) - max(int(last.number - whole.number), int(last is not whole))
-        after = last if cycles else whole
+        cycles = max(1, int(number - full.number)) - max(int(last.number - full.number), int(last is not full))
+        after = last if cycles else full
         slid = now.end.slid + done * now.records.slip_magnitude.sum(axis=0)
         at = replace(after.end, slid=slid, load=self._load(number))
-        return _cycle_after(self.problem, whole, at, worn, number, max(cycles, 1))
+        return _cycle_after(self.problem, full, at, worn, number, max(cycles, 1))
 
 
 def _attempt(

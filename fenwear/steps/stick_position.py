@@ -137,10 +137,10 @@ class Position:
 
     def beside(self, moved: Array) -> Array:
         """Return the strip's displacement beside its motion (n, d), of all nodes or alike, in the frame (d n,)."""
-        found = self.in_frame(moved)
+        displacements = self.in_frame(moved)
         if self.far:
-            found[: len(self.pair.weights)] = 0.0
-        return found
+            displacements[: len(self.pair.weights)] = 0.0
+        return displacements
 
     def in_space(self, components: Array) -> Array:
         """Return vectors (n, d) of components (d n,)."""

@@ -99,8 +99,8 @@ class GridStep(Step):
             displacement = float(self.imposed.displacement or 0.0)
         x = piece.known(f)
         f = piece.tractions(x) + piece.fixed
-        found = StatusSolution(f.ravel(), rigid, displacement, 1, jump=self.on.apply(f.ravel()))
-        rest, forces = piece.residual(x, self._opened(found)), self._missing(found)
+        solution = StatusSolution(f.ravel(), rigid, displacement, 1, jump=self.on.apply(f.ravel()))
+        rest, forces = piece.residual(x, self._opened(solution)), self._missing(solution)
         closed = piece.closed
         moved, held = (part[:, :, closed] for part in self._rigid)
         solver = _Solver(self, piece, moved, held)
@@ -119,9 +119,9 @@ class GridStep(Step):
         self._last = StatusSolution(f.ravel(), rigid, displacement, 1, jump=jump)
         return self._last
 
-    def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
+    def status_of(self, solution: StatusSolution) -> tuple[ContactStatus, float]:
         """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
-        status, self._wrong = super().status_of(found)
+        status, self._wrong = super().status_of(solution)
         return status, self._wrong
 
     def _begun(self, status: ContactStatus) -> Array:
@@ -131,18 +131,18 @@ class GridStep(Step):
         inside = np.where(size > limit, limit / np.maximum(size, 1e-300), 1.0)
         return np.concatenate([status.pressure[None], (status.trial * inside[:, None]).T])
 
-    def _opened(self, found: StatusSolution) -> Array:
+    def _opened(self, solution: StatusSolution) -> Array:
         """Return gap and slip over the length (d, n)."""
-        gap, slip = self.jumps(found)
+        gap, slip = self.jumps(solution)
         return np.asarray(np.concatenate([gap[None], slip.T]) / self.length)
 
-    def _missing(self, found: StatusSolution) -> Array:
+    def _missing(self, solution: StatusSolution) -> Array:
         """Return the residuals of the balances (r,), as means over the area."""
-        forces = self.position.balance @ found.f + self.imposed.loaded.resultant
+        forces = self.position.balance @ solution.f + self.imposed.loaded.resultant
         forces = forces * (self.units / (self.length * self.area))
         if self.imposed.force is None:
             return np.asarray(forces)
-        return np.append(forces, (self.position.pull @ found.f - self.imposed.force) / self.area)
+        return np.append(forces, (self.position.pull @ solution.f - self.imposed.force) / self.area)
 
     def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
         """Return the immediate displacements by tractions (d n,); the strip's follow from the punch's and the jump."""
@@ -205,7 +205,8 @@ class _Piece:
         """The same over the places of a box, the nodes that touch at these of them."""
         arrays = (self.across, self.slides, self.stiff, self.fixed)
         masks, fields = (
-            [_spread(one[..., self.closed], at, size) for one in some] for some in ((self.pressed, self.kept), arrays)
+            [_spread(values[..., self.closed], at, size) for values in some]
+            for some in ((self.pressed, self.kept), arrays)
         )
         return _Piece(at, *masks, *fields)
 
@@ -217,24 +218,24 @@ class _Piece:
     def _projector(self) -> Array:
         """Q of the normal, and of the tangents with themselves, and in two directions with each other (d or 4, n)."""
         kept, across = self.kept.astype(float), self.across
-        found = [self.pressed.astype(float), *(kept + part * part for part in across)]
-        return np.array(found if len(across) == 1 else [*found, across[0] * across[1]])
+        projector = [self.pressed.astype(float), *(kept + part * part for part in across)]
+        return np.array(projector if len(across) == 1 else [*projector, across[0] * across[1]])
 
     def unknown(self, fields: Array) -> Array:
         """Return Q of fields (d, n)."""
         Q, d = self._projector, len(fields)
-        found = Q[:d] * fields
+        unknowns = Q[:d] * fields
         if d == 3:
-            found[1] += Q[3] * fields[2]
-            found[2] += Q[3] * fields[1]
-        return found
+            unknowns[1] += Q[3] * fields[2]
+            unknowns[2] += Q[3] * fields[1]
+        return unknowns
 
     def tractions(self, x: Array) -> Array:
         """Return N x (d, n)."""
-        found = x.copy()
+        tractions = x.copy()
         if x[0].any():
-            found[1:] += self.slides * x[0]
-        return found
+            tractions[1:] += self.slides * x[0]
+        return tractions
 
     def residual(self, x: Array, opened: Array) -> Array:
         """Return Q of gap and slip, with D of slipping nodes; the compliance of layers is in the gap."""
@@ -243,9 +244,9 @@ class _Piece:
 
 def _spread(values: NDArray[Any], at: NDArray[np.int64], size: int) -> NDArray[Any]:
     """Return values (..., k) at their places of a box, zero elsewhere (..., size)."""
-    found = np.zeros((*values.shape[:-1], size), dtype=values.dtype)
-    found[..., at] = values
-    return found
+    spread = np.zeros((*values.shape[:-1], size), dtype=values.dtype)
+    spread[..., at] = values
+    return spread
 
 
 class _Solver:
@@ -270,10 +271,10 @@ class _Solver:
         self.piece = piece.on_box(self.at, self.fields[1])
         scale = step.scale[:, piece.closed].mean(axis=1)[:, None]
         self._share(self.piece.stiff * (step.length / scale))
-        moved, held = (_spread(one, self.at, self.fields[1]) for one in (moved, held))
-        self.moved = np.array([self.piece.unknown(one) for one in moved]).reshape(len(moved), -1)
-        self.held = np.array([self._weighed(one) for one in held]).reshape(len(held), -1)
-        self.by_moved = np.array([self._inverse(one) for one in self.moved]).reshape(self.moved.shape)
+        moved, held = (_spread(fields, self.at, self.fields[1]) for fields in (moved, held))
+        self.moved = np.array([self.piece.unknown(field) for field in moved]).reshape(len(moved), -1)
+        self.held = np.array([self._weighed(force) for force in held]).reshape(len(held), -1)
+        self.by_moved = np.array([self._inverse(field) for field in self.moved]).reshape(self.moved.shape)
         self.schur = self.held @ self.by_moved.T
         if len(held):
             singular = np.linalg.svd(self.schur, compute_uv=False)
@@ -292,9 +293,9 @@ class _Solver:
 
     def _weighed(self, force: Array) -> Array:
         """Return the products N^T of forces by tractions (d, size), as unknowns."""
-        own = self.piece.unknown(force)
-        own[0] += (self.piece.slides * force[1:]).sum(axis=0) * self.piece.pressed
-        return own
+        unknowns = self.piece.unknown(force)
+        unknowns[0] += (self.piece.slides * force[1:]).sum(axis=0) * self.piece.pressed
+        return unknowns
 
     def _inverse(self, fields: Array) -> Array:
         """Return the unknowns that solve the equations of the endless grid for residuals (d size,)."""
@@ -302,10 +303,10 @@ class _Solver:
         stiff = shrunk * self.shares[:, None]
         stiff[:, 0] = 0.0
         shrunk[1:] *= self.rest
-        found = self.on.solve(shrunk.reshape(counts), stiff.reshape(-1, *counts)).reshape(self.fields)
-        found *= self.shrunk
-        found *= self.length
-        return self.piece.unknown(found).ravel()
+        unknowns = self.on.solve(shrunk.reshape(counts), stiff.reshape(-1, *counts)).reshape(self.fields)
+        unknowns *= self.shrunk
+        unknowns *= self.length
+        return self.piece.unknown(unknowns).ravel()
 
     def _precondition(self, r: Array) -> Array:
         x = self._inverse(r[: self.cut])
@@ -316,8 +317,8 @@ class _Solver:
         x, y = z[: self.cut].reshape(self.fields), z[self.cut :]
         opened = self.on.products(self.piece.tractions(x).reshape(-1, *self.on.counts)).reshape(self.fields)
         opened /= self.length
-        found = self.piece.unknown(opened) + self.piece.stiff * x
-        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[: self.cut]])
+        product = self.piece.unknown(opened) + self.piece.stiff * x
+        return np.concatenate([product.ravel() + y @ self.moved, self.held @ z[: self.cut]])
 
     def solve(self, rest: Array, forces: Array, accuracy: float) -> tuple[Array, Array]:
         """Return unknowns (d, k) and rigid motions (r,) for what misses at nodes that touch, to so much of it.

@@ -121,16 +121,16 @@ def make_program(case: Case, steps: int | None = None) -> Program:
         )
 
     begin = motion.phases[0].offset - motion.phases[0].direction * motion.phases[0].distance / 2
-    found, time, place = [], 0.0, begin
+    program_steps, time, place = [], 0.0, begin
     for number, phase in enumerate(motion.phases):
         time += phase.duration
         place += phase.direction * phase.distance
         place = 0.0 if abs(place) < 1e-12 * largest else place
-        found.append(step(number // count, time / motion.period, phase.duration, phase.offset, place))
+        program_steps.append(step(number // count, time / motion.period, phase.duration, phase.offset, place))
     ways = math.ceil(count * abs(begin) / (2 * largest)) if begin else 0
     ends = begin * np.arange(1, ways + 1) / max(ways, 1)
     lead = tuple(step(-1, None, motion.period, float(e), float(e)) for e in ends)
-    return Program(settings.load_steps, lead, tuple(found), motion.half_cycles, motion.period)
+    return Program(settings.load_steps, lead, tuple(program_steps), motion.half_cycles, motion.period)
 
 
 def steps_of(case: Case) -> int:
@@ -155,15 +155,15 @@ def _table(case: Case, motion: Motion) -> Program:
         share = _bulk_share(case.stick, end / largest, fraction)
         return TimeStep(half_cycle, fraction, duration, way.at(0.5), end, None, bulk * share, way)
 
-    time, found = 0.0, []
+    time, program_steps = 0.0, []
     for phase, way, end in zip(motion.phases, ways, ends, strict=True):
         time += phase.duration
-        found.append(step(0, time / motion.period, phase.duration, way, end))
+        program_steps.append(step(0, time / motion.period, phase.duration, way, end))
     to_begin = Screw(HERE, ways[0].first)
     lead = [] if to_begin.rests else to_begin.parts(max(1, math.ceil(len(ways) * _part(to_begin, ways))))
     lead_in = [step(-1, None, motion.period, way, _along(motion.longest, way.last)) for way in lead]
-    lead_in = [replace(one, offset=way.last) for one, way in zip(lead_in, lead, strict=True)]
-    return Program(case.stick.load_steps, tuple(lead_in), tuple(found), 1, motion.period)
+    lead_in = [replace(step, offset=way.last) for step, way in zip(lead_in, lead, strict=True)]
+    return Program(case.stick.load_steps, tuple(lead_in), tuple(program_steps), 1, motion.period)
 
 
 def _along(field: SlidingField, place: Placement) -> float:
@@ -175,7 +175,7 @@ def _part(way: Screw, ways: list[Screw]) -> float:
     """Return the share of a way in the length of all ways, by turns or by shifts, whichever is larger."""
     parts = []
     for which in ("turn", "shift"):
-        ends = [(getattr(one.first, which), getattr(one.last, which)) for one in (way, *ways)]
+        ends = [(getattr(screw.first, which), getattr(screw.last, which)) for screw in (way, *ways)]
         sizes = [float(np.linalg.norm(np.array(last) - first)) for first, last in ends]
         parts.append(sizes[0] / max(sum(sizes[1:]), 1e-300) if sizes[0] else 0.0)
     return max(parts)

@@ -224,8 +224,8 @@ def fine_enough(problem: PartialSlipProblem, case: Case) -> tuple[PartialSlipPro
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    whole, finest = WHOLE, _finest(case)
-    ends = np.arange(whole - 1, len(finest.steps), whole)
+    count, finest = WHOLE, _finest(case)
+    ends = np.arange(count - 1, len(finest.steps), count)
     while True:
         halves, of = _halved(ends)
         fine = _driven(problem, case, finest, halves)
@@ -245,9 +245,9 @@ def with_ends(problem: PartialSlipProblem, case: Case, ends: Ends) -> PartialSli
     return _driven(problem, case, _finest(case), ends)
 
 
-def same_steps(one: Case, other: Case) -> bool:
+def same_steps(case: Case, other: Case) -> bool:
     """Return whether time steps chosen for one case are steps of the other: both ask for as many, as fine."""
-    return one.stick == other.stick and len(_finest(one).steps) == len(_finest(other).steps)
+    return case.stick == other.stick and len(_finest(case).steps) == len(_finest(other).steps)
 
 
 def _finest(case: Case) -> Program:
@@ -270,7 +270,7 @@ def _judged(
 
 def merged(finest: Program, ends: Ends) -> Program:
     """Return a program whose steps end where these of another one do."""
-    found, steps = [], finest.steps
+    merged_steps, steps = [], finest.steps
     for begin, end in zip(np.append(0, ends[:-1] + 1), ends, strict=True):
         first, last, place = steps[begin].way, steps[end], steps[begin - 1].displacement
         if first is not None and last.way is not None:
@@ -278,8 +278,8 @@ def merged(finest: Program, ends: Ends) -> Program:
             last = replace(last, offset=way.at(0.5), way=way)
         elif place is not None and last.displacement is not None:
             last = replace(last, offset=(place + last.displacement) / 2)
-        found.append(replace(last, duration=sum(step.duration for step in steps[begin : end + 1])))
-    return replace(finest, steps=tuple(found))
+        merged_steps.append(replace(last, duration=sum(step.duration for step in steps[begin : end + 1])))
+    return replace(finest, steps=tuple(merged_steps))
 
 
 def _driven(problem: PartialSlipProblem, case: Case, finest: Program, ends: Ends) -> PartialSlipProblem:

@@ -105,9 +105,9 @@ def answered(interface: Interface, opened: Array, balance: Array, closed: Mask, 
     matrix: Array = np.zeros((k + len(balance),) * 2)
     matrix[:k, :k], matrix[:k, k:] = opened[np.ix_(closed, closed)] / scale, modes[closed]
     matrix[k:, :k] = balance[:, closed]
-    found: Array = np.zeros(gap.shape)
-    found[closed] = -np.linalg.solve(matrix, np.vstack([gap[closed] / scale, missing]))[:k]
-    return found
+    pressures: Array = np.zeros(gap.shape)
+    pressures[closed] = -np.linalg.solve(matrix, np.vstack([gap[closed] / scale, missing]))[:k]
+    return pressures
 
 
 def lies_after(
@@ -224,9 +224,9 @@ def _laws(
     rate = heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
-    found = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+    laws = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
     if not lies:
-        return found
+        return laws
     debris, taken = system.layers.debris, depths(*around).sum(axis=0)
     by_lost = _slopes(lambda *values: debris.lost(at(*values)), around)
     left, (lies_p, *lies_t, lies_here), reads = _lying(
@@ -234,7 +234,7 @@ def _laws(
     )
     lies_s: Array = np.hstack([(np.array(lies_t) @ picked).sum(axis=0), left + lies_here @ reads])
     mu_s, worn_s = np.hstack([mu_s, mu_t[2][:, None] * reads]), np.hstack([worn_s, worn_t[2] @ reads])
-    return replace(found, mu_s=mu_s, worn_s=worn_s, lies=(lies_p, lies_s, reads))
+    return replace(laws, mu_s=mu_s, worn_s=worn_s, lies=(lies_p, lies_s, reads))
 
 
 def _lying(
@@ -266,10 +266,10 @@ def _lying(
         reads, puts = pair.wear_interpolation.toarray(), pair.wear_projection.toarray()
     over, thickness = layers.debris.over(path[None], [conditions], layers.places([pair])), layers.lies(worn)
     fed = over.slope(None)[0][:, None] * puts
-    ends = [fed * own.sum(axis=0) for own in by_depths]
+    ends = [fed * by_depth.sum(axis=0) for by_depth in by_depths]
     if layers.varies:
         by_loss = over.by_loss(thickness, (puts @ taken)[None])[:, None] * puts * path
-        ends = [end + by_loss * more for end, more in zip(ends, by_lost, strict=True)]
+        ends = [end + by_loss * lost for end, lost in zip(ends, by_lost, strict=True)]
     return np.diag(np.exp(-over.loss)), ends, reads
 
 
@@ -304,7 +304,7 @@ def _slopes(law: Callable[..., Array], around: Sequence[Array]) -> list[Array]:
 
     Central differences whose step is made smaller until it makes no difference; 0 where p is.
     """
-    found = []
+    slopes = []
     for which, value in enumerate(around):
         step = 0.01 * value if which in (0, 3) else np.full(len(value), STEP)
         if which == 3:
@@ -317,5 +317,5 @@ def _slopes(law: Callable[..., Array], around: Sequence[Array]) -> list[Array]:
             if before is not None and np.abs(slope - before).max() <= SETTLED * np.abs(slope).max():
                 break
             before, step = slope, step / 4
-        found.append(slope)
-    return found
+        slopes.append(slope)
+    return slopes

@@ -95,7 +95,7 @@ def test_sets_follow_each_other_where_cut_off_pressures_stay(monkeypatch: pytest
         mean = pressure.mean() if len(pressure) else 0.0
         return replace(moment.contact, pressure=np.full_like(pressure, mean))
 
-    monkeypatch.setattr(Trend, "from_one", even)  # from near the solution none of them stays there
+    monkeypatch.setattr(Trend, "expected_from", even)  # from near the solution none of them stays there
     agree("heat, one way", "jump", LINEAR, "run.half_cycles=12")
     assert asked
 

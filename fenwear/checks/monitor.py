@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenwear.checks.rules import RULES, Made, Seen, fineness_of, remarks
+from fenwear.checks.rules import RULES, Made, Seen, remarks
 from fenwear.common.arrays import Array, Mask
 from fenwear.heat.temperature import HeatState
 from fenwear.steps import Block, heat_gain, heat_warnings
@@ -24,7 +24,7 @@ KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is sa
 
 def fineness_text(system: Tribosystem) -> str:
     """Return how fine the steps and bases of the heat are, "" without heat."""
-    fineness = fineness_of(system)
+    fineness = system.exchange.fineness
     if fineness is None:
         return ""
     parts = [f"heat: {fineness.steps} steps in a half-cycle"]
@@ -88,7 +88,7 @@ class HeatMonitor:
         Raises:
             ConvergenceError: contact without heat did not converge.
         """
-        gain, fineness = heat_gain(system, pressure, state), fineness_of(system)
+        gain, fineness = heat_gain(system, pressure, state), system.exchange.fineness
         values = {GAIN: gain}
         if fineness is not None:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)

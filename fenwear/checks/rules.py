@@ -31,7 +31,6 @@ from fenwear.steps import Block, SteadyState, critical_speed
 from fenwear.system import ContactSetup, Tribosystem
 
 if TYPE_CHECKING:
-    from fenwear.heat.side import Fineness
     from fenwear.steps.stick_final import FinalShape
 
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
@@ -165,11 +164,6 @@ class Seen:
         touching = (final.pressures > 0) | (final.depth > 0)
         return replace(seen, worn={"punch": final.worn.punch[None]}, end=final.worn, touching=touching, kind="final")
 
-    @cached_property
-    def limits(self) -> Limits:
-        """Where the contact is clipped; collective at the first call."""
-        return self.made.limits
-
     def warnings(self, *kinds: str) -> list[str]:
         """Return the warnings about it, of its own kind or of others; collective."""
         return list(remarks(self, *kinds).values())
@@ -282,7 +276,7 @@ def few_nodes(seen: Seen) -> Fields:
 
 
 def _hertzian(seen: Seen, pressure: Array) -> float:
-    return seen.limits.hertzian(float(seen.system.pair.weights @ pressure))
+    return seen.made.limits.hertzian(float(seen.system.pair.weights @ pressure))
 
 
 def polygon(seen: Seen) -> Fields:
@@ -298,7 +292,7 @@ def beyond_small_strain(seen: Seen) -> Fields:
 
 def clipped(seen: Seen) -> Fields:
     """Return where the contact reaches the end of its surface, and how wide it should be; collective at first."""
-    limits, case = seen.limits, seen.system.case
+    limits, case = seen.made.limits, seen.system.case
     rows = (seen.touching & limits.clips).any(axis=1)
     if not rows.any():
         return {}
@@ -390,7 +384,7 @@ def beside_radius(seen: Seen) -> Fields:
 
 def coarse_heat_steps(seen: Seen) -> Fields:
     """Return by how much halving the steps of the heat changes temperatures, beyond the tolerance."""
-    heat, fineness = seen.system.heat, fineness_of(seen.system)
+    heat, fineness = seen.system.heat, seen.system.exchange.fineness
     if heat is None or fineness is None or fineness.change is None or fineness.change <= heat.step_tolerance:
         return {}
     return {"steps": fineness.steps, "percent": 100 * fineness.change, "limit": heat.step_tolerance}
@@ -398,7 +392,7 @@ def coarse_heat_steps(seen: Seen) -> Fields:
 
 def coarse_heat_basis(seen: Seen) -> Fields:
     """Return by how much the reduced temperatures differ from those of the whole mesh, beyond the tolerance."""
-    heat, fineness = seen.system.heat, fineness_of(seen.system)
+    heat, fineness = seen.system.heat, seen.system.exchange.fineness
     if (
         heat is None
         or fineness is None
@@ -407,11 +401,6 @@ def coarse_heat_basis(seen: Seen) -> Fields:
     ):
         return {}
     return {"percent": 100 * fineness.difference, "limit": heat.reduction_difference}
-
-
-def fineness_of(system: Tribosystem) -> Fineness | None:
-    """Return how fine the steps and the basis of a system's heat are; None without heat."""
-    return system.exchange.fineness
 
 
 def unstable_speed(seen: Seen) -> Fields:

@@ -12,10 +12,10 @@ from scipy.spatial import cKDTree
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.common.arrays import Array
 from fenwear.results.history_surfaces import rim, surface_cells
+from fenwear.results.quantity import BODIES
 from fenwear.steps import Block, SteadyState
 from fenwear.system import ContactSetup
 
-BODIES = ("punch", "strip")
 SAME = 1e-4  # of the surface's extent: nodes that are one
 
 

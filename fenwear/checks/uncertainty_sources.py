@@ -28,10 +28,10 @@ from fenwear.checks.other_discretisations import (
     nodes_across,
     set_up,
 )
-from fenwear.checks.uncertain_values import BODIES, Contribution, Quantity, Value, Values, values_of, values_of_steady
+from fenwear.checks.uncertain_values import Contribution, Quantity, Value, Values, values_of, values_of_steady
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, ConvergenceError
-from fenwear.results.quantity import KELVIN, degrees_of
+from fenwear.results.quantity import BODIES, KELVIN, degrees_of
 from fenwear.results.registry import known
 from fenwear.steps import Block, SteadyState, heat_gain, steady
 from fenwear.steps.run_state import RunState, all_phases, pressure_scale

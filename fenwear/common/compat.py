@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import basix.ufl
 import dolfinx.io
 import dolfinx.mesh
 import numpy as np
@@ -19,28 +18,6 @@ from fenwear.common.stack import check_numbers
 check_numbers()
 
 
-def _share_cells() -> None:
-    """Let elements share one cell of each kind, as cells never change.
-
-    UFL makes it again, with every part of its parts, whenever an element is asked for it: a hexahedron's were a sixth
-    of what a small solid takes to assemble.
-    """
-    element = getattr(basix.ufl, "_ElementBase", None)
-    made = getattr(getattr(element, "cell", None), "fget", None)
-    if made is None:
-        return
-    known: dict[str, Any] = {}
-
-    def cell(self: Any) -> Any:
-        name = str(self.cell_type.name)
-        if name not in known:
-            known[name] = made(self)
-        return known[name]
-
-    element.cell = property(cell, doc=made.__doc__)  # type: ignore[union-attr]
-
-
-_share_cells()
 CORNERS = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8}
 
 

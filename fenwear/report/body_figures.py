@@ -43,11 +43,10 @@ from fenwear.report.style import (
     strip_moves,
     wrapped,
 )
-from fenwear.results.hdf5 import load
+from fenwear.results.hdf5 import load, node_places, side_by_side
+from fenwear.results.quantity import BODIES
 
 FIELDS, FIGURES = "fields", "figures"
-BODIES = ("punch", "strip")
-AXES = ("x", "y", "z")
 # Pale to dark, so that outlines stay visible and grey prints keep the order.
 SHOWN = {"von_mises": ("von Mises stress", "MPa", "YlGnBu"), "temperature": ("temperature", "K", "YlOrRd")}
 FLAT = 1e-4  # of the contact's length: how far a surface that counts as flat may be from a plane
@@ -291,18 +290,9 @@ def draw_pictures(directory: Path, formats: Sequence[str] = ("png",), *, complet
     return paths
 
 
-def points(data: xarray.Dataset, body: str, kind: str = "") -> Array:
-    """Return coordinates of a body's nodes, or of its contact nodes (n, 3), mm; planes and rings lie at y = 0."""
-    return _columns(data, [f"{body}{kind}_{axis}" for axis in AXES])
-
-
 def displacement(data: xarray.Dataset, body: str) -> Array:
     """Return the displacement of a body's nodes (n, 3), mm."""
-    return _columns(data, [f"{body}_displacement_{axis}" for axis in AXES])
-
-
-def _columns(data: xarray.Dataset, names: Sequence[str]) -> Array:
-    return np.column_stack([data[name].values if name in data else 0 * data[names[0]].values for name in names])
+    return side_by_side(data, [f"{body}_displacement_{axis}" for axis in "xyz"])
 
 
 def common_view(datasets: Sequence[xarray.Dataset]) -> View:
@@ -311,20 +301,20 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
     solid = first.attrs.get("model") == "solid"
     along = np.array(first.attrs["along"] if solid else [1.0, 0.0, 0.0])
     normal = np.array(first.attrs["normal"] if solid else [0.0, 0.0, 1.0])
-    x = points(first, "punch", "_contact")
+    x = node_places(first, "punch", "_contact")
     length, centre = float(np.ptp(x @ along)), (x.max(axis=0) + x.min(axis=0)) / 2
     centre = centre + ((x - centre) @ normal).min() * normal
-    heights = [(points(first, body) - centre) @ normal for body in BODIES]
+    heights = [(node_places(first, body) - centre) @ normal for body in BODIES]
     room = MARGIN * length  # thin bodies do not fill the section
     below, above = min(NEAR[1] * length, room - heights[1].min()), min(NEAR[2] * length, room + heights[0].max())
     above = max(above, room + ((x - centre) @ normal).max())  # a round contact reaches higher
     middle, level, wide = float(centre @ along), float(centre @ normal), NEAR[0] * length
     box = (middle - wide, middle + wide, level - float(below), level + float(above))
     view = View(centre, along, normal, length, box, 1.0, {})
-    inside = {body: view.inside(points(first, body)) for body in BODIES}
+    inside = {body: view.inside(node_places(first, body)) for body in BODIES}
     moved = [np.linalg.norm(displacement(d, b), axis=1)[inside[b]].max(initial=0.0) for d in datasets for b in BODIES]
     # Displacement that is magnified fits surfaces which lie on each other, not the gap between curved ones.
-    surfaces = [(points(first, body, "_contact") - centre) @ normal for body in BODIES]
+    surfaces = [(node_places(first, body, "_contact") - centre) @ normal for body in BODIES]
     curved = any(np.abs(surface).max() > FLAT * length for surface in surfaces)
     factor = 1.0 if curved else magnification(float(max(moved)), length)
     ranges = {}
@@ -340,7 +330,7 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
 
 def deformed(data: xarray.Dataset, body: str, view: View) -> Array:
     """Return a body's nodes (n, 3) after displacement and wear, magnified; wear fades out away from the contact."""
-    x, u, contact = points(data, body), displacement(data, body), points(data, body, "_contact")
+    x, u, contact = node_places(data, body), displacement(data, body), node_places(data, body, "_contact")
     plane = np.eye(3) - np.outer(view.normal, view.normal)
     tree = cKDTree(contact @ plane)
     count = min(NEIGHBOURS, len(contact))
@@ -385,7 +375,7 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View) -> Figure:
         seen, triangles, values, outlines = section(data, body, field, view)
         drawn: Any = ax.tripcolor(*seen.T, triangles, values, shading="gouraud", cmap=colours, vmin=low, vmax=high)
         ax.add_collection(LineCollection(list(outlines), colors="black", linewidths=1.2))
-        most = max(most, float(data[f"{body}_{field}"].values[view.inside(points(data, body))].max(initial=low)))
+        most = max(most, float(data[f"{body}_{field}"].values[view.inside(node_places(data, body))].max(initial=low)))
     ax.set(aspect="equal", xlim=view.box[:2], ylim=view.box[2:])
     model, half_cycle = data.attrs.get("model", "plane"), int(data.attrs["half_cycle"])
     axes = {"axisymmetric": ("r (mm)", "z (mm)"), "solid": ("place along the sliding (mm)", "height (mm)")}

@@ -34,6 +34,7 @@ from fenwear.heat.flash_partition import NO_BULK, Bulk, HeatedSide, bulk_of, mea
 from fenwear.heat.moving_sources import Instants, Periodic, Response, cell_integrals, history_kernel
 from fenwear.results.flash_source import Heating, Past, heating_of
 from fenwear.results.history import CASE
+from fenwear.results.quantity import BODIES
 from fenwear.system import ContactSetup, build_conduction
 
 NEEDED = ("conductivity", "heat_capacity", "density")
@@ -144,7 +145,6 @@ def conductors(placed: ContactSetup, case: Case, heat: Heat, touching: Mask) -> 
 
 
 HALF_SPACE = "half-space"
-BODIES = ("punch", "strip")
 FEW = 12  # nodes across what touches, below which temperatures are rough
 FELT = 0.1  # share of a pressure that its bulge gives back, from which on it is told
 QUICK = 1.0  # of the time in which heat spreads over the contact, over that of a stroke: beyond, instants feel others

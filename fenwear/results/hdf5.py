@@ -26,6 +26,7 @@ from scipy.spatial import KDTree
 
 from fenwear.common.arrays import Array
 from fenwear.results.disk import check_room, replacing
+from fenwear.results.quantity import BODIES
 
 if TYPE_CHECKING:
     import xarray
@@ -252,7 +253,6 @@ def _set(group: Any, name: str, row: int, values: NDArray[Any]) -> None:
     _extend(group, name, values)
 
 
-BODIES = ("punch", "strip")
 TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON = 5, 9, 10, 12  # as VTK numbers them
 NEAR = 1e-9  # of the body's size: nodes at the same place
 # Name in the series: the parts of its name in the file of a half-cycle. A slash has a meaning in HDF5.
@@ -268,7 +268,7 @@ OF_CONTACT = {"contact pressure (MPa)": "pressure", "worn depth (mm)": "depth"}
 
 def step_of(data: xarray.Dataset) -> Step:
     """Return the step of the fields of a half-cycle, as its file has them; zero stands for what a body has not."""
-    points = [_points(data, body) for body in BODIES]
+    points = [node_places(data, body) for body in BODIES]
     starts = (0, len(points[0]))
     cells = [
         _kind(data[f"{body}_cells"].values, begin, solid=f"{body}_y" in data)
@@ -286,11 +286,14 @@ def step_of(data: xarray.Dataset) -> Step:
     return Step(float(data.attrs["time"]), np.concatenate(points), cells, values)
 
 
-def _points(data: xarray.Dataset, body: str) -> Array:
-    """Return the nodes of a body in space (n, 3), mm; a plane lies at y = 0."""
-    x, z = data[f"{body}_x"].values, data[f"{body}_z"].values
-    y = data[f"{body}_y"].values if f"{body}_y" in data else np.zeros_like(x)
-    return np.column_stack([x, y, z])
+def node_places(data: xarray.Dataset, body: str, kind: str = "") -> Array:
+    """Return coordinates of a body's nodes, or of its contact nodes (n, 3), mm; planes and rings lie at y = 0."""
+    return side_by_side(data, [f"{body}{kind}_{axis}" for axis in "xyz"])
+
+
+def side_by_side(data: xarray.Dataset, names: Sequence[str]) -> Array:
+    """Return variables side by side, zero where there is none; there is the first one."""
+    return np.column_stack([data[name].values if name in data else 0 * data[names[0]].values for name in names])
 
 
 def _kind(cells: NDArray[np.int64], begin: int, *, solid: bool) -> tuple[int, NDArray[np.int64]]:

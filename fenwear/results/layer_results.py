@@ -25,7 +25,7 @@ from fenwear.laws.coating import CoatedBody, left_of
 from fenwear.laws.layers import DEBRIS, PLASTIC
 from fenwear.laws.wear import coefficient
 from fenwear.results.history_surfaces import EDGE
-from fenwear.results.quantity import RECORD, Quantity
+from fenwear.results.quantity import BODIES, RECORD, Quantity
 from fenwear.steps import Block
 from fenwear.steps.run_state import RunState
 from fenwear.system import ContactSetup, Tribosystem
@@ -133,9 +133,6 @@ def _extent(weights: Array, values: Array) -> dict[str, float]:
     return {"mean": mean, "smallest": float(values.min()), "largest": float(values.max())}
 
 
-BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
-
-
 def of_coated(body: str) -> list[Quantity]:
     """Return the quantities of a coated body."""
     end = BODIES[body]
@@ -191,17 +188,13 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
         first, key = int(np.where(ended, at, np.inf).argmin()), f"{body}_coating_first_through"
         surface = system.pair.punch if row == 0 else system.pair.strip
         if f"{key}_half_cycle" not in known:
-            names = (f"{key}_at_{axis}_mm" for axis in _axes(surface.dim))
+            names = (f"{key}_at_{axis}_mm" for axis in system.case.model.axes)
             events |= {
                 f"{key}_half_cycle": float(at[first]),
                 **dict(zip(names, surface.x[first].tolist(), strict=True)),
             }
         events[f"{body}_coating_last_through_half_cycle"] = float(np.where(ended, at, -np.inf).max())
     return events
-
-
-def _axes(dim: int) -> tuple[str, ...]:
-    return ("x", "z") if dim == 2 else ("x", "y", "z")
 
 
 def _coated(system: ContactSetup, body: str, thickness: Array) -> CoatedBody:
@@ -231,7 +224,7 @@ def _ends(coated: CoatedBody, depths: Array, cycles: Array) -> tuple[Mask, Array
     return ended, at
 
 
-ENDS = {"punch": "", "strip": "_strip", "layer": "_layer"}  # how the names of variables end
+ENDS = {**BODIES, "layer": "_layer"}  # how the names of variables end
 
 
 def of_creeping(name: str) -> list[Quantity]:

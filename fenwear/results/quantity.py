@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import xarray  # with pandas, half a second that commands without tables spare themselves
 
 RECORD = ("half_cycle",)
+BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SUFFIXES = {
     "1": "",
     "degree": "deg",

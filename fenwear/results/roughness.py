@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.common.arrays import Array
 from fenwear.results.history_surfaces import Column
-from fenwear.results.quantity import RECORD, InTable, Quantity
+from fenwear.results.quantity import BODIES, RECORD, InTable, Quantity
 from fenwear.steps import Block
 from fenwear.system import Tribosystem
 
@@ -25,7 +25,6 @@ NAMES = {
     "roughness_Sa": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
     "roughness_Sq": ("mm", "root mean square of the same heights (Sq) of the {}"),
 }
-ENDS = {"punch": "", "strip": "_strip"}
 
 
 def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
@@ -38,8 +37,8 @@ def columns(system: Tribosystem) -> dict[str, Column]:
     """Return the topographies before anything has worn, by name."""
     plane = system.case.model.kind == "plane"
     return {
-        f"topography{ENDS[body]}": Column(
-            (f"{'x' if plane else 'node'}{ENDS[body]}",),
+        f"topography{BODIES[body]}": Column(
+            (f"{'x' if plane else 'node'}{BODIES[body]}",),
             np.asarray(surface.heights),
             {"units": "mm", "long_name": f"height of the unworn {body} over its smooth shape, out of it"},
         )
@@ -57,7 +56,7 @@ def of_body(body: str) -> list[Quantity]:
     """Return the quantities of a rough body."""
     table = partial(_values, body=body)
     return [
-        Quantity(f"{name}{ENDS[body]}", RECORD, unit, text.format(body), InTable(table, name), of=body)
+        Quantity(f"{name}{BODIES[body]}", RECORD, unit, text.format(body), InTable(table, name), of=body)
         for name, (unit, text) in NAMES.items()
     ]
 

@@ -25,11 +25,10 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.body_names import Names
 from fenwear.common.arrays import Array
 from fenwear.results.history_surfaces import ScarGeometry, scar_geometry, without_noise
-from fenwear.results.quantity import RECORD, InTable, Quantity, numbers
+from fenwear.results.quantity import BODIES, RECORD, InTable, Quantity, numbers
 from fenwear.steps import Block
 from fenwear.system import ContactSetup
 
-BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end
 ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and width differ by a tenth at most
 PLACES = {**{axis: axis for axis in "rxyz"}, "across": "place across the sliding"}

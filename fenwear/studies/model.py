@@ -31,7 +31,6 @@ from fenwear.studies.numeric_keys import with_values
 from fenwear.system import Tribosystem, assemble, with_case
 
 T = TypeVar("T")
-BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
 KEPT = 32  # runs whose ends are kept
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop

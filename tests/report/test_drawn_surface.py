@@ -13,7 +13,7 @@ import xarray
 from matplotlib.text import Text
 
 from fenwear import load_case
-from fenwear.report.body_figures import common_view, deformed, displacement, draw_pictures, points
+from fenwear.report.body_figures import common_view, deformed, displacement, draw_pictures
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.drawn_surface import Surface, along_contact, centre_of_wear, model_of, surface_of
 from fenwear.report.figures import all_figures
@@ -21,6 +21,7 @@ from fenwear.report.lines import fields_of
 from fenwear.report.maps import LEVELS, map_figure
 from fenwear.report.page import numbers_of
 from fenwear.report.run_figures import is_conforming
+from fenwear.results.hdf5 import node_places
 from fenwear.results.stored_history import read_history
 from fenwear.studies.run import run_case
 
@@ -208,7 +209,7 @@ def test_deformed_bodies_touch(folders: dict[str, Path]) -> None:
     np.testing.assert_allclose(view.along, [0, 1, 0], atol=1e-9)
     heights = {}
     for body in ("punch", "strip"):
-        x = points(data, body)
+        x = node_places(data, body)
         assert displacement(data, body).shape == x.shape
         face = np.flatnonzero((np.abs(x[:, 2]) < 1e-9) & (np.hypot(x[:, 0] - 15, x[:, 1]) < 3.01))
         order = np.lexsort(x[face, :2].T.round(6))

@@ -175,7 +175,7 @@ def fitted(feature: str, law: str, _: Path) -> None:
     made = float(model_value(case, key))
     volumes = [evaluate(model, parse_quantity(f"volume after {n:g} cycles"), {key: made})[0] for n in cycles]
     series = Series(
-        "volume", "punch", None, np.array(cycles), "cycles", np.array(volumes), 1e-3 * np.array(volumes), (1, 2)
+        "volume", "punch", np.zeros(0), np.array(cycles), "cycles", np.array(volumes), 1e-3 * np.array(volumes), (1, 2)
     )
     start = case_of(feature, law, f"{key}={1.02 * made!r}")
     assert calibrate(start, [DataSet("twin", (), (series,))], [key]).values[key] == pytest.approx(made, rel=5e-3)

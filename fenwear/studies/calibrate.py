@@ -31,7 +31,7 @@ from fenwear.studies.least_squares import (
     not_determined,
     without_baselines,
 )
-from fenwear.studies.measured_data import FEW, SMOOTH, DataSet, Noise, Series, in_order, neighbours_ratio
+from fenwear.studies.measured_data import FEW, NONE, SMOOTH, DataSet, Noise, Series, in_order, neighbours_ratio
 from fenwear.studies.numeric_keys import ScaledUnknown, Unknown, nearest_possible
 from fenwear.studies.quantities import GROWING, unit_of
 from fenwear.studies.scatter import Scatter
@@ -323,7 +323,7 @@ def _scatter_remarks(result: OptimizeResult, traces: Sequence[Trace], free: Mask
             continue
         if not series.is_profile and series.quantity in GROWING and (len(series.values) < FEW or ratio < SMOOTH):
             added.append(series.quantity)
-            both[rows] = Noise("adds up").whitened(both[rows], None, None, series.after)
+            both[rows] = Noise("adds up").whitened(both[rows], NONE, NONE, series.after)
         elif series.is_profile and ratio < SMOOTH:
             alike = 1 - ratio / 2
             length = -float(np.median(in_order(series.places)[1])) / np.log(alike)

@@ -44,6 +44,7 @@ from fenwear.results.registry import names_known
 from fenwear.studies.quantities import GROWING, Quantity, of_case, parse_amount, registered_name, unit_of
 
 TIED = 0.1  # of the usual spacing: how far apart places count that are the same
+NONE: Array = np.zeros(0)  # of what a file does not give
 FEW, SMOOTH = 20, 1.5  # rows that say little of their scatter; von Neumann's ratio below which they are correlated
 
 
@@ -86,23 +87,23 @@ class Noise:
         if self.kind == "alike" and not profile:
             raise ValueError("expected a profile, with a column x")
 
-    def whitened(self, values: Array, sigma: Array | None, x: Array | None, after: Array) -> Array:
+    def whitened(self, values: Array, sigma: Array, x: Array, after: Array) -> Array:
         """Return residuals or columns of their Jacobian (n, ...) as those of independent errors of one size.
 
         Args:
             values: In the unit of the measurement (n, ...).
-            sigma: (n,), or none.
-            x: Places of a profile (n,), mm.
+            sigma: (n,); `NONE` where none is known.
+            x: Places of a profile (n,), mm; else `NONE`.
             after: Sliding before each row (n,).
         """
-        over = np.ones(len(values)) if sigma is None else sigma
+        over = sigma if len(sigma) else np.ones(len(values))
         wide = (slice(None),) + (None,) * (values.ndim - 1)
         if self.kind == "adds up":
             steps = in_order(np.concatenate([[0.0], after]))[1]
-            over = np.sqrt(steps / steps.mean()) if sigma is None else sigma
+            over = sigma if len(sigma) else np.sqrt(steps / steps.mean())
             return np.diff(values, axis=0, prepend=0.0) / over[wide]
         scaled = values / over[wide]
-        if self.kind != "alike" or x is None:
+        if self.kind != "alike":
             return np.asarray(scaled)
         order, gaps = in_order(x)
         alike, rest, ordered = np.exp(-gaps / self.length), np.sqrt(-np.expm1(-2 * gaps / self.length)), scaled[order]
@@ -145,44 +146,44 @@ class Series:
     Attributes:
         quantity: Its name, as of a quantity of interest.
         body: punch or strip.
-        x: Places of a profile (k,), mm; None for what is one number at a time.
+        x: Places of a profile (k,), mm; `NONE` for what is one number at a time.
         after: Amount of sliding of each measurement (k,): cycles, mm or s.
         counted: Its meaning: cycles, distance or time.
         values: (k,), in the internal unit.
-        sigma: Standard deviations (k,); None where the file gives none.
+        sigma: Standard deviations (k,); `NONE` where the file gives none.
         rows: Lines of the file (k,).
         noise: Dependence of the errors on each other.
     """
 
     quantity: str
     body: str
-    x: Array | None
+    x: Array
     after: Array
     counted: str
     values: Array
-    sigma: Array | None
+    sigma: Array
     rows: tuple[int, ...]
     noise: Noise = field(default_factory=Noise)
 
     @property
     def is_profile(self) -> bool:
         """Whether it has places."""
-        return self.x is not None
+        return len(self.x) > 0
 
     @property
     def has_sigma(self) -> bool:
         """Whether the file gives standard deviations."""
-        return self.sigma is not None
+        return len(self.sigma) > 0
 
     @property
     def places(self) -> Array:
         """Its horizontal axis: the places of a profile, else the amounts of sliding (k,)."""
-        return self.after if self.x is None else self.x
+        return self.x if self.is_profile else self.after
 
     @property
     def scale(self) -> Array:
         """Standard deviations (k,); ones where the file gives none."""
-        return np.ones(len(self.values)) if self.sigma is None else self.sigma
+        return self.sigma if self.has_sigma else np.ones(len(self.values))
 
     def whitened(self, values: Array) -> Array:
         """Return residuals, or columns of their Jacobian (k, ...), as those of independent errors."""
@@ -287,10 +288,9 @@ class _Reader:
             quantity = "wear" if "x" in names else _name(name)
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", unit_of(quantity), body)
             of_case(wanted, case, str(self.path))
-            x = self._column("x", "mm") if "x" in names else None
-            of_file = Series(quantity, body, None, after, counted, values, sigma, lines, self._noise(quantity))
-            if x is not None:
-                series += self._profiles(of_file, x)
+            of_file = Series(quantity, body, NONE, after, counted, values, sigma, lines, self._noise(quantity))
+            if "x" in names:
+                series += self._profiles(of_file, self._column("x", "mm"))
             else:
                 self._check_rising(after, strictly=True)
                 series.append(of_file)
@@ -381,7 +381,7 @@ class _Reader:
         steps = np.diff(after, prepend=-np.inf)
         self._check(steps > 0 if strictly else steps >= 0, "after", "expected amounts that rise from row to row")
 
-    def _measured(self, name: str, *, only: bool) -> tuple[Array, Array | None]:
+    def _measured(self, name: str, *, only: bool) -> tuple[Array, Array]:
         """Return values and standard deviations."""
         unit, factor = _unit(name), -1.0 if name == "height" else 1.0
         if name == "mass":
@@ -393,12 +393,11 @@ class _Reader:
         values = factor * self._column(name, unit)
         if name == "friction":
             self._check(values >= 0, "friction", "expected zero or more")
-        sigma = self._sigma(unit, only=only)
-        return values, None if sigma is None else np.abs(factor) * sigma
+        return values, np.abs(factor) * self._sigma(unit, only=only)
 
-    def _sigma(self, unit: str, *, only: bool) -> Array | None:
+    def _sigma(self, unit: str, *, only: bool) -> Array:
         if "sigma" not in {*self.table.names, *self.directives}:
-            return None
+            return NONE
         if not only:
             raise self._fail("sigma", "belongs to one measured column; expected a file for each of several")
         if "sigma" in self.table.names:
@@ -424,7 +423,7 @@ class _Reader:
             if len(at_time) < LEAST_ROWS:
                 message = f"expected at least {LEAST_ROWS} rows of a profile, got {len(at_time)}"
                 raise self._fail(f"row {measured.rows[int(at_time[0])]}", message)
-            sigma = None if measured.sigma is None else measured.sigma[at_time]
+            sigma = measured.sigma[at_time] if measured.has_sigma else NONE
             rows = tuple(measured.rows[int(k)] for k in at_time)
             profiles.append(
                 replace(

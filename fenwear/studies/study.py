@@ -447,15 +447,17 @@ def parse_part(text: str) -> tuple[int, int] | None:
     return int(match[1]), int(match[2])
 
 
-def in_results(how: StudyOptions, name: str) -> tuple[StudyOptions, Path]:
-    """Return the options with a folder, by default results/NAME or with a number behind it, and the folder; collective.
+def in_results(how: StudyOptions, name: str) -> tuple[StudyOptions, Path, MPI.Comm]:
+    """Return the options with a folder, by default results/NAME or with a number behind it, the folder, and the ranks.
+
+    Collective.
 
     Raises:
         CaseError: the options need a folder with a name.
     """
     study = Study(**how)
     folder = study.folder or on_root(study.comm, lambda: free_directory(Path("results") / name))
-    return {**how, "folder": folder}, folder
+    return {**how, "folder": folder}, folder, study.comm
 
 
 def batch_file(arguments: Sequence[str], parts: int) -> str:

@@ -28,7 +28,7 @@ from fenwear.studies.numeric_keys import parse_unknown, with_values
 from fenwear.studies.quantities import Quantity, cycles_of, lives, of_case, parse_amount, parse_quantity, unit_of
 from fenwear.studies.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.studies.sensitivity import Method, Sensitivity, sensitivity
-from fenwear.studies.study import Study, StudyOptions, in_results
+from fenwear.studies.study import StudyOptions, in_results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -160,8 +160,7 @@ def run_sensitivity(
 ) -> tuple[list[Sensitivity], Path]:
     """Compute sensitivities; write sensitivity.json and tornado.png; collective."""
     method: Method | None = "differences" if differences else None
-    how, folder = in_results(how, f"sensitivity-{name}")
-    comm = Study(**how).comm
+    how, folder, comm = in_results(how, f"sensitivity-{name}")
     _tell_of_stick(case, log, comm)
     sensitivities = sensitivity(
         case, quantities, keys, spread=spread, method=method, progress=_counter(log, "keys"), **how
@@ -191,8 +190,7 @@ def run_calibrate(
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
     """
     asked = [parse_unknown(case, text) for text in unknowns]
-    how, folder = in_results(how, f"calibrate-{name}")
-    comm = Study(**how).comm
+    how, folder, comm = in_results(how, f"calibrate-{name}")
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
     for measured in data:
         log(measured.listing)
@@ -250,24 +248,23 @@ def run_life(
     scatter = Scatter() if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         scatter = scatter.and_also(parse_scatter(case, text))
-    how, folder = in_results(how, f"life-{name}")
-    study = Study(**how)
+    how, folder, comm = in_results(how, f"life-{name}")
     if not scatter.keys:
-        options = {"--resume": study.resume, "--collect": study.collect, "--wanted": wanted}
+        options = {"--resume": how.get("resume"), "--collect": how.get("collect"), "--wanted": wanted}
         for option in (option for option, given in options.items() if given):
             message = (
                 f"applies to a distribution of lives. Add --scatter KEY=KIND(A, B) or --from DIR, or leave out {option}"
             )
             raise CaseError(InputError(option, message))
-        return _life_without_scatter(case, quantities, folder, log, study.comm), folder
+        return _life_without_scatter(case, quantities, folder, log, comm), folder
     scatter.check(case)
-    _tell_of_stick(case, log, study.comm)
+    _tell_of_stick(case, log, comm)
     level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
     for line in scatter.text:
         log(line)
     counter = _counter(log, "samples")
     life = lifetime(case, quantities, scatter, samples=samples, seed=seed, wanted=level, progress=counter, **how)
-    _write(folder, study.comm, {"life.json": life.as_json()}, {"life.png": lambda: life_figure(life)})
+    _write(folder, comm, {"life.json": life.as_json()}, {"life.png": lambda: life_figure(life)})
     return life, folder
 
 

@@ -113,8 +113,7 @@ def run_sweep(
     """
     if rows is not None and over:
         raise CaseError(InputError("--table", "given together with --over; expected one of them"))
-    how, folder = in_results(how, f"sweep-{name}")
-    comm = Study(**how).comm
+    how, folder, comm = in_results(how, f"sweep-{name}")
     axes = on_root(comm, lambda: [parse_axis(case, text) for text in over] if rows is None else read_table(rows))
     hidden = quiet or comm.rank != 0 or not sys.stderr.isatty()
     with tqdm(unit=" variants", disable=hidden) as bar:

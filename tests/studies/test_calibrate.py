@@ -26,6 +26,7 @@ from fenwear.studies import (
     measured_folder,
     read_data,
 )
+from fenwear.studies.measured_data import NONE
 from fenwear.studies.numeric_keys import nearest_possible
 from tests.benchmarks.calibration import repeated
 
@@ -36,7 +37,7 @@ RING = measured_folder()
 
 def volumes(after: Sequence[float], values: Sequence[float], sigma: Sequence[float], *settings: str) -> DataSet:
     """Return worn volumes after numbers of cycles."""
-    series = Series("worn_volume", "punch", None, np.array(after), "cycles", np.array(values), np.array(sigma),
+    series = Series("worn_volume", "punch", NONE, np.array(after), "cycles", np.array(values), np.array(sigma),
                     tuple(range(1, 1 + len(after))))  # fmt: skip
     return DataSet("volumes", settings, (series,))
 
@@ -56,7 +57,7 @@ def test_standard_error_of_archards_coefficient_is_exact(small: Callable[..., Ca
     assert (fitted.low, fitted.high) == pytest.approx((fitted.value / ratio, fitted.value * ratio), rel=1e-6)
     assert (found.not_known, found.at_bound, found.degrees_of_freedom) == ((), (), 2)
     unweighted = volumes(after, measured, [1.0] * 3)
-    series = (DataSet("volumes", (), (Series(**{**vars(unweighted.series[0]), "sigma": None}),)),)
+    series = (DataSet("volumes", (), (Series(**{**vars(unweighted.series[0]), "sigma": NONE}),)),)
     rest = measured - fitted.value * work
     expected = np.sqrt(rest @ rest / 2 / (work @ work))
     assert calibrate(case, series, [K]).fitted[0].standard_error == pytest.approx(expected, rel=1e-5)
@@ -81,7 +82,7 @@ def test_scar_widths_give_the_coefficient() -> None:
     case, made, after = make_case(tables), 2.4e-9, np.array([1800.0, 3600.0, 7200.0])
     area = made * 65.0 / 6.0 * 500.0 * after  # k F s / b
     widths = np.sqrt(0.99) * np.cbrt(12 * 20.0 * area)
-    series = Series("scar_width", "punch", None, after, "cycles", widths, np.full(3, 0.01), (1, 2, 3))
+    series = Series("scar_width", "punch", NONE, after, "cycles", widths, np.full(3, 0.01), (1, 2, 3))
     found = calibrate(case, [DataSet("widths", (), (series,))], [K])
     element = 3.6 / 60  # mm, of which the mesh leaves the edge of a scar open by a half; w goes as the cube root of k
     assert found.values[K] == pytest.approx(made, rel=3 * element / 2 / float(widths.mean()))

@@ -34,7 +34,6 @@ def test_profiles_at_two_times_with_their_condition(case: Case, file: Callable[[
     assert found.settings == ('punch.loads.0.force=["0 N", "-5 kN"]',)
     first, second = found.series
     assert first.quantity == "wear"
-    assert first.x is not None
     np.testing.assert_allclose(first.x, [-10, 0, 10])
     np.testing.assert_allclose(first.values, [0.5e-3, 1.5e-3, 2.5e-3])
     np.testing.assert_allclose(first.sigma, 0.2e-3)

@@ -49,7 +49,7 @@ class Geometry(Part):
     file: str = Field(
         default="punch_on_strip.geo",
         description="geometry beside the case file, or a ready one: .geo or .msh of gmsh; a mesh of another program "
-        "(.inp, .med, .unv, .cgns, .bdf, .exo, .vtu); a shape from CAD (.step, .brep)",
+        "(.inp, .med, .unv, .cgns, .bdf, .exo, .vtu, .xdmf); a shape from CAD (.step, .iges, .brep)",
     )
     groups: dict[str, str | tuple[str, ...]] = Field(
         default={},

@@ -185,8 +185,6 @@ def print_case(case: Case) -> None:
 
 
 REMOVED = {
-    "import": "removed. `geometry.file` takes the file itself, `fenwear info FILE` lists it, and `fenwear mesh CASE -o "
-    "FILE.msh` writes its mesh",
     "--posterior": "removed. Sample the posterior with emcee: docs/how-to/calibrate.md has the recipe",
     "--sobol": "removed. Compute Sobol indices with SALib: docs/how-to/calibrate.md has the recipe",
     "--jumped": "removed. Run the case twice, with --set run.integration=implicit and =jump, then compare both folders",

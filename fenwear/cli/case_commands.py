@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from mpi4py import MPI
@@ -298,12 +298,54 @@ def mesh_command(
     from fenwear.bodies.distributed_mesh import write_msh
 
     loaded = load(case, settings)
-    if output.suffix != ".msh":
-        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    _check_msh(output)
     meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion, loaded.names)
     rows, text = on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
+    _show_groups(rows, text, output, as_json=as_json)
+
+
+def _show_groups(rows: list[dict[str, Any]], text: str, output: Path, *, as_json: bool) -> None:
+    """Print the groups of a mesh that was written."""
     if as_json:
         print_json({"mesh": str(output), "groups": rows, "text": text})
     else:
         log(text)
     log(f"mesh in {output}")
+
+
+def _check_msh(path: Path) -> None:
+    if path.suffix != ".msh":
+        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(path)!r}"))
+
+
+@app.command("import")
+def import_command(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="A mesh of Abaqus, Salome, Nastran, Exodus, VTK, ... or a shape from CAD."),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
+    groups: Annotated[
+        list[str],
+        typer.Option(
+            "--group",
+            metavar="GROUP=SET",
+            help="Name in the file of a group, such as punch_contact=PAD_LOW; repeatable.",
+        ),
+    ] = [],  # noqa: B006
+    unit: Annotated[str | None, typer.Option(help="Unit of the file's lengths, such as m; by default mm.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a mesh of another program, or a shape from CAD, as a .msh file; geometry.file takes both without it."""
+    from fenwear.bodies.distributed_mesh import write_msh
+    from fenwear.case import Geometry
+
+    _check_msh(output)
+    pairs = [text.partition("=") for text in groups]
+    wrong = next((text for text, (name, equals, _) in zip(groups, pairs, strict=True) if not (name and equals)), None)
+    if wrong is not None:
+        raise CaseError(InputError("--group", f"expected GROUP=SET, got {wrong!r}"))
+    named = {name.strip(): of.strip() for name, _, of in pairs}
+    geometry = Geometry(file=str(source), groups=named, unit=unit)  # type: ignore[arg-type]
+    rows, text = on_root(MPI.COMM_WORLD, lambda: write_msh(geometry, None, output, None))
+    _show_groups(rows, text, output, as_json=as_json)

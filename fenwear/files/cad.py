@@ -1,4 +1,4 @@
-"""Shapes from CAD (STEP, BREP), read by OpenCASCADE within gmsh: their parts get names, their meshes sizes.
+"""Shapes from CAD (STEP, IGES, BREP), read by OpenCASCADE within gmsh: their parts get names, their meshes sizes.
 
 A part is named as the file names it (the last word of a path such as Shapes/Disc/top), or by its kind and number in
 gmsh: "volume 1", "surface 3", "curve 7". Lengths are in mm: OpenCASCADE takes the file's unit from its header.
@@ -56,7 +56,7 @@ def entities_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def read_shapes(gmsh: Any, path: Path, scale: float) -> None:
-    """Read shapes into gmsh's current model, in mm.
+    """Read shapes into gmsh's current model, in mm; of IGES the closed surfaces as solids.
 
     Raises:
         CaseError: OpenCASCADE cannot read them.
@@ -71,11 +71,40 @@ def read_shapes(gmsh: Any, path: Path, scale: float) -> None:
         with _quiet():
             shapes = gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
             gmsh.model.occ.synchronize()
+            if path.suffix.lower() in (".iges", ".igs") and shapes and _has_depth(gmsh):
+                gmsh.model.occ.remove(gmsh.model.occ.getEntities(), recursive=True)
+                gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
+                gmsh.model.occ.importShapes(str(path), highestDimOnly=True)
+                gmsh.model.occ.synchronize()
+                shapes = _solids(gmsh)
     except Exception as error:  # gmsh raises bare Exception only
         message = f"cannot be read by OpenCASCADE: {str(error)[:160] or 'no reason given'}. Write the file again."
         raise CaseError(InputError(path.name, message)) from None
     if not shapes:
         raise CaseError(InputError(path.name, "holds no shapes. Export the solids or surfaces of both bodies."))
+
+
+def _has_depth(gmsh: Any) -> bool:
+    """Return whether surfaces without volumes lie in no plane of x and y."""
+    box = gmsh.model.getBoundingBox(-1, -1)
+    return not gmsh.model.getEntities(3) and box[5] - box[2] > FLAT * (box[3] - box[0])
+
+
+def _solids(gmsh: Any) -> list[tuple[int, int]]:
+    """Make a solid of the surfaces that hang together by their curves, and return the solids."""
+    loose = {tag: set(gmsh.model.getAdjacencies(2, tag)[1].tolist()) for _, tag in gmsh.model.getEntities(2)}
+    solids = []
+    while loose:
+        first = min(loose)
+        shell, edges = [first], loose.pop(first)
+        while near := [tag for tag, curves in loose.items() if curves & edges]:
+            for tag in near:
+                edges |= loose.pop(tag)
+            shell += near
+        loop = gmsh.model.occ.addSurfaceLoop(shell, sewing=True)
+        solids.append((3, gmsh.model.occ.addVolume([loop])))
+    gmsh.model.occ.synchronize()
+    return solids
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from fenwear.files.groups import MEASURES
 from fenwear.files.height_maps import MAPS, read_heights
 from fenwear.files.mesh_file import ENTITIES, KINDS, MeshFile, read_as, sound
 
-CAD = (".step", ".stp", ".brep")
+CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".inp": ("Abaqus, CalculiX", read_deck),
     ".med": ("Salome", mesh_formats.read_med),
@@ -30,6 +30,7 @@ READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".e": ("Exodus", mesh_formats.read_exodus),
     ".ex2": ("Exodus", mesh_formats.read_exodus),
     ".vtu": ("VTK", mesh_formats.read_vtu),
+    ".xdmf": ("XDMF", mesh_formats.read_xdmf),
 }
 MESHES = tuple(READERS)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
+from xml.etree import ElementTree
 
 import basix
 import numpy as np
@@ -429,7 +430,7 @@ def in_plane(mesh: MeshFile) -> MeshFile:
 
 
 BROKEN = (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError, MemoryError,
-          ArithmeticError)  # fmt: skip
+          ArithmeticError, ElementTree.ParseError)  # fmt: skip
 
 
 @contextmanager

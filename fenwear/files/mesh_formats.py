@@ -1,6 +1,6 @@
-"""Meshes in HDF5, NetCDF and XML: MED of Salome, Exodus of Cubit and MOOSE, VTU of VTK.
+"""Meshes in HDF5, NetCDF and XML: MED of Salome, Exodus of Cubit and MOOSE, VTU of VTK, and XDMF with its HDF5 file.
 
-Of VTU the values of a whole-numbered array of cells become sets.
+Of VTU and XDMF the values of a whole-numbered array of cells become sets.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,6 +189,12 @@ def _name(names: list[str], ids: Any, number: int, word: str) -> str:
 
 
 VTK_KINDS = {1: 15, 3: 1, 21: 8, 5: 2, 22: 9, 9: 3, 23: 16, 28: 10, 10: 4, 24: 11, 12: 5, 25: 17, 13: 6, 14: 7}
+XDMF_KINDS = {"polyvertex": 15, "polyline": 1, "edge_3": 8, "triangle": 2, "tri_6": 9, "triangle_6": 9,
+              "quadrilateral": 3, "quad_8": 16, "quadrilateral_8": 16, "quad_9": 10, "quadrilateral_9": 10,
+              "tetrahedron": 4, "tet_10": 11, "tetrahedron_10": 11, "hexahedron": 5, "hex_20": 17, "hexahedron_20": 17,
+              "wedge": 6, "pyramid": 7}  # fmt: skip
+TYPES = {"Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4", "Int64": "i8",
+         "UInt64": "u8", "Float32": "f4", "Float64": "f8"}  # fmt: skip
 MOST_VALUES = 1000  # of an array of cells that names sets
 
 
@@ -228,3 +235,48 @@ def _sets(arrays: Mapping[str, NDArray[Any]]) -> Iterator[MeshSet]:
             distinct = np.unique(values)
             for value in distinct if len(distinct) <= MOST_VALUES else []:
                 yield MeshSet(f"{name} {int(value)}", "elements", np.flatnonzero(values == value))
+
+
+def read_xdmf(path: Path) -> MeshFile:
+    """Return the mesh of the first grid of an XDMF file, with sets by its cell arrays as of `read_vtu`.
+
+    Raises:
+        Exception: it cannot be read.
+    """
+    root = ElementTree.parse(path).getroot()
+    grid = next(grid for grid in root.iter("Grid") if grid.find("Topology") is not None)
+    geometry, topology = grid.find("Geometry"), grid.find("Topology")
+    if geometry is None or topology is None:
+        raise ValueError("has no grid with points and cells")
+    points = in_space(_item(path, geometry.find("DataItem")))
+    kind = (topology.get("TopologyType") or topology.get("Type") or "").casefold()
+    if kind not in XDMF_KINDS:
+        raise ValueError(f"has cells of the kind {kind!r}; expected one of {', '.join(XDMF_KINDS)}")
+    number = XDMF_KINDS[kind]
+    nodes: Ints = _item(path, topology.find("DataItem")).astype(np.int64).reshape(-1, KINDS[number].nodes)
+    known_nodes(nodes, len(points), "a cell")
+    blocks = (Block.of(number, nodes[:, ORDERS.get(number, slice(None))]),)
+    arrays = {
+        attribute.get("Name", ""): _item(path, attribute.find("DataItem")).ravel()
+        for attribute in grid.iterfind("Attribute")
+        if attribute.get("Center") == "Cell"
+    }
+    sets = _sets({name: values for name, values in arrays.items() if len(values) == len(nodes)})
+    return MeshFile(path.name, points, blocks, tuple(sets))
+
+
+def _item(path: Path, item: ElementTree.Element | None) -> NDArray[Any]:
+    """Return the numbers of a DataItem: as text, or in an HDF5 file beside."""
+    if item is None:
+        raise ValueError("lacks a DataItem")
+    shape = [int(n) for n in re.findall(r"\d+", item.get("Dimensions", ""))] or [-1]
+    text = (item.text or "").strip()
+    if item.get("Format", "XML") == "XML":
+        return np.array(text.split(), dtype=np.float64).reshape(shape)
+    if item.get("Format") != "HDF":
+        raise ValueError(f"keeps numbers as {item.get('Format')}; expected XML or HDF")
+    import h5py
+
+    name, _, place = text.partition(":")
+    with h5py.File(path.parent / name) as file:
+        return np.asarray(file[place]).reshape(shape)

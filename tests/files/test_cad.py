@@ -40,7 +40,7 @@ def sizes(path: Path, **keys: Any) -> dict[str, tuple[int, float]]:
     return {row["group"]: (row["elements"], row["size"]) for row in rows}
 
 
-@pytest.mark.parametrize("suffix", [".step", ".brep"])
+@pytest.mark.parametrize("suffix", [".step", ".iges", ".brep"])
 def test_faces_by_number_and_by_plane(tmp_path: Path, suffix: str) -> None:
     """Areas and lengths are those of the shapes, elements at the contact those asked for."""
     found = sizes(shapes(tmp_path / f"flat{suffix}"), groups=FLAT, size=2.0, sizes={"punch_contact": 0.5})
@@ -50,10 +50,11 @@ def test_faces_by_number_and_by_plane(tmp_path: Path, suffix: str) -> None:
     assert found["punch_top"][0] < 12
 
 
-def test_solids(tmp_path: Path) -> None:
-    """Volumes and areas are those of the shapes."""
+@pytest.mark.parametrize("suffix", [".step", ".iges"])
+def test_solids(tmp_path: Path, suffix: str) -> None:
+    """Of IGES, too, whose surfaces are closed to solids."""
     groups = {"punch_body": "volume 1", "strip_body": "solid 2", "punch_contact": "z = 0 mm", "strip_contact": "z=0 mm"}
-    path = shapes(tmp_path / "solid.step", solid=True)
+    path = shapes(tmp_path / f"solid{suffix}", solid=True)
     _, content = listed_file(path)
     first = next(part for part in content["parts"] if part["name"] == "volume 1")
     if first["size"] == pytest.approx(800):

@@ -64,7 +64,7 @@ class _Entry:
 
     line: int
     names: tuple[str, ...] = ()
-    labels: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    labels: Ints | None = None
     scope: str = ""
     ranges: bool = False
     sides: str = ""
@@ -74,12 +74,14 @@ class _Entry:
 class _Set:
     name: str
     line: int
+    of_elements: bool = False  # a node set that is given by elements
     entries: list[_Entry] = field(default_factory=list)
 
 
 @dataclass
 class _Elements:
     kind: int
+    type: str
     nodes: Ints
     labels: Ints
     lines: Ints
@@ -160,13 +162,15 @@ class _Deck:
         self.system = GLOBAL
         self.passed: Counter[str] = Counter()
         self.shapeless: Counter[str] = Counter()
+        self.notes: list[str] = []
         self.in_step = 0
         self.depth = 0
+        self.after: _Instance | None = None
         self.grammar: Mapping[str, Callable[[int, dict[str, str], list[tuple[int, str]]], None]] = {
-            "NODE": self.node, "ELEMENT": self.element, "NSET": self.nset, "ELSET": self.elset,
-            "SURFACE": self.surface, "PART": self.part, "END PART": self.end, "ASSEMBLY": self.end,
-            "END ASSEMBLY": self.end, "INSTANCE": self.instance, "END INSTANCE": self.end,
-            "SYSTEM": self.set_system, "INCLUDE": self.include,
+            "NODE": self.node, "ELEMENT": self.element, "NSET": self.nset, "ELSET": self.elset, "NGEN": self.ngen,
+            "NFILL": self.nfill, "ELGEN": self.elgen, "SURFACE": self.surface, "PART": self.part,
+            "END PART": self.end, "ASSEMBLY": self.end, "END ASSEMBLY": self.end, "INSTANCE": self.instance,
+            "END INSTANCE": self.end, "SYSTEM": self.set_system, "INCLUDE": self.include,
         }  # fmt: skip
 
     def fail(self, line: int, message: str) -> CaseError:
@@ -280,12 +284,21 @@ class _Deck:
         system = given.get("SYSTEM", "R").upper() or "R"
         if system not in ("R", "C", "S"):
             raise self.fail(line, f"*NODE: SYSTEM={system} is not known. Expected R, C or S.")
-        if not len(table):
+        self.add_nodes(
+            table[:, 0].astype(np.int64), self.placed(_cartesian(points, system)), np.array([n for n, _ in data], int),
+            given, line,
+        )  # fmt: skip
+
+    def placed(self, points: Array) -> Array:
+        """Return points of the local system in the global one."""
+        return points @ self.system[0].T + self.system[1]
+
+    def add_nodes(self, labels: Ints, points: Array, lines: Ints, given: Mapping[str, str], line: int) -> None:
+        if not len(labels):
             return
-        labels = table[:, 0].astype(np.int64)
         self.scope.labels.append(labels)
-        self.scope.points.append(_cartesian(points, system) @ self.system[0].T + self.system[1])
-        self.scope.lines.append(np.array([n for n, _ in data], int))
+        self.scope.points.append(points)
+        self.scope.lines.append(lines)
         self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(line, labels=labels))
 
     def enter(self, sets: dict[str, _Set], name: str | None, line: int, entry: _Entry) -> None:
@@ -309,6 +322,35 @@ class _Deck:
         except ValueError:
             return None
 
+    def known_nodes(self, line: int) -> tuple[Ints, Array]:
+        """Return the nodes of the scope so far."""
+        if not self.scope.labels:
+            raise self.fail(line, "expected nodes before this keyword")
+        return np.concatenate(self.scope.labels), np.concatenate(self.scope.points)
+
+    def point(self, line: int, label: int) -> Array:
+        labels, points = self.known_nodes(line)
+        found = np.flatnonzero(labels == label)
+        if not len(found):
+            raise self.fail(line, f"node {label} is not defined before this line")
+        return points[found[-1]]
+
+    def ngen(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
+        self.only(line, "NGEN", given, ("NSET", "LINE", "SYSTEM"))
+        if given.get("LINE", "").upper() not in ("", "S") or given.get("SYSTEM", "RC").upper() != "RC":
+            raise self.fail(line, "*NGEN along a curve or in another system is not supported. Write the nodes out.")
+        for number, text in data:
+            row = _split(text)
+            first, last = self.integer(number, row[0]), self.integer(number, row[1] if len(row) > 1 else "")
+            step = self.integer(number, row[2]) if len(row) > 2 and row[2] else 1
+            labels = self.range(number, first, last, step)
+            ends = self.point(number, first), self.point(number, last)
+            share = np.linspace(0, 1, len(labels))[:, None]
+            points = ends[0] * (1 - share) + ends[1] * share
+            inner = slice(1, -1)
+            self.add_nodes(labels[inner], points[inner], np.full(len(labels), number)[inner], {}, line)
+            self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(number, labels=labels))
+
     def range(self, line: int, first: int, last: int, step: int) -> Ints:
         """Return the numbers from the first to the last."""
         if step == 0 or (last - first) % step or (last - first) // step < 0 or (last - first) // step > 10**8:
@@ -316,6 +358,38 @@ class _Deck:
                 line, f"expected numbers from {first} to {last} in steps that reach it, got a step of {step}"
             )
         return np.arange(first, last + (1 if step > 0 else -1), step, dtype=np.int64)
+
+    def nfill(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
+        self.only(line, "NFILL", given, ("NSET", "BIAS"))
+        if self.number(line, given.get("BIAS", "1")) != 1:
+            raise self.fail(line, "*NFILL with BIAS is not supported. Write the nodes out.")
+        for number, text in data:
+            row = _split(text)
+            if len(row) < 4:
+                raise self.fail(number, f"*NFILL: expected two sets, rows and an increment, got {text!r}")
+            low, high = (self.nodes_now(number, name) for name in row[:2])
+            rows, step = self.integer(number, row[2]), self.integer(number, row[3])
+            if len(low) != len(high) or not 1 <= rows <= 10**6:
+                raise self.fail(number, f"*NFILL: expected two sets of as many nodes, got {len(low)} and {len(high)}")
+            ends = [np.array([self.point(number, label) for label in labels]) for labels in (low, high)]
+            every = [low, high]
+            for k in range(1, rows):
+                labels, share = low + k * step, k / rows
+                points = ends[0] * (1 - share) + ends[1] * share
+                self.add_nodes(labels, points, np.full(len(labels), number), {}, line)
+                every.append(labels)
+            self.enter(self.scope.nsets, given.get("NSET"), line, _Entry(number, labels=np.concatenate(every)))
+
+    def nodes_now(self, line: int, name: str) -> Ints:
+        """Return the numbers of a node set that is complete, in their order."""
+        found = self.scope.nsets.get(_key(name))
+        if found is None:
+            raise self.fail(line, f"the node set {name!r} is not defined before this line; known are "
+                            f"{listed(s.name for s in self.scope.nsets.values())}")  # fmt: skip
+        labels = [entry.labels for entry in found.entries if entry.labels is not None]
+        if len(labels) < len(found.entries) or not labels:
+            raise self.fail(line, f"the node set {name!r} is one of sets, which is not supported here")
+        return np.concatenate(labels)
 
     def set_system(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         """Take the local coordinate system of the nodes that follow."""
@@ -348,15 +422,18 @@ class _Deck:
         if kind == 0:
             self.shapeless[name] += len(data)
             labels = np.array([self.integer(number, _split(text)[0]) for number, text in data], dtype=np.int64)
-            lines = np.array([n for n, _ in data], int)
-            block = _Elements(0, np.zeros((len(labels), 0), np.int64), labels, lines)
+            block = _Elements(
+                0, name, np.zeros((len(labels), 0), np.int64), labels, np.array([n for n, _ in data], int)
+            )
         else:
             count = 15 if kind == -15 else KINDS[kind].nodes
             rows, lines = self.rows(line, data, count, name)
             nodes = rows[:, 1:]
             if kind in ORDERS:
                 nodes = nodes[:, ORDERS[kind]]
-            block = _Elements(6 if kind == -15 else kind, nodes[:, :6] if kind == -15 else nodes, rows[:, 0], lines)
+            block = _Elements(
+                6 if kind == -15 else kind, name, nodes[:, :6] if kind == -15 else nodes, rows[:, 0], lines
+            )
         self.scope.elements.append(block)
         self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(line, labels=block.labels))
 
@@ -415,6 +492,32 @@ class _Deck:
             raise self.fail(line, "has numbers of nodes beyond what the reader holds")
         return np.array(values, dtype=np.int64).reshape(-1, wide), np.array(lines, dtype=np.int64)
 
+    def elgen(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
+        self.only(line, "ELGEN", given, ("ELSET", "ALL NODES"))
+        for number, text in data:
+            values = [self.integer(number, cell) if cell else 1 for cell in _split(text)]
+            master = self.one_element(number, values[0])
+            rest = values[1:] + [1] * (-len(values[1:]) % 3)
+            labels, shifts = np.array([values[0]], np.int64), np.zeros(1, np.int64)
+            for count, of_nodes, of_elements in (rest[k : k + 3] for k in range(0, min(len(rest), 9), 3)):
+                if not 1 <= count <= 10**7 or count * len(labels) > 10**8:
+                    raise self.fail(number, f"*ELGEN: expected a number of elements, got {count}")
+                steps = np.arange(count)
+                labels = (labels[None, :] + of_elements * steps[:, None]).ravel()
+                shifts = (shifts[None, :] + of_nodes * steps[:, None]).ravel()
+            block, row = master
+            nodes = block.nodes[row] + shifts[1:, None]
+            made = _Elements(block.kind, block.type, nodes, labels[1:], np.full(len(labels) - 1, number))
+            self.scope.elements.append(made)
+            self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(number, labels=labels))
+
+    def one_element(self, line: int, label: int) -> tuple[_Elements, int]:
+        for block in self.scope.elements:
+            found = np.flatnonzero(block.labels == label)
+            if len(found) and block.kind:
+                return block, int(found[0])
+        raise self.fail(line, f"element {label} is not defined before this line")
+
     # ------------------------------------------------------------------------------------------------- sets
 
     def set_of(self, sets: dict[str, _Set], name: str, line: int) -> _Set:
@@ -426,8 +529,9 @@ class _Deck:
         self.only(line, "NSET", given, ("NSET", "GENERATE", "ELSET", "INSTANCE", "INTERNAL", "UNSORTED", "INPUT"))
         self.any_set(line, "NSET", self.scope.nsets, given, data)
         if given.get("ELSET"):
-            entry = _Entry(line, names=(given["ELSET"],), scope=given.get("INSTANCE", ""), sides="nodes")
-            self.enter(self.scope.nsets, given["NSET"], line, entry)
+            found = self.scope.nsets[_key(given["NSET"])]
+            found.of_elements = True
+            found.entries.append(_Entry(line, names=(given["ELSET"],), scope=given.get("INSTANCE", ""), sides="nodes"))
 
     def elset(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         self.only(line, "ELSET", given, ("ELSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "INPUT"))
@@ -638,7 +742,8 @@ def _assembled(deck: _Deck) -> MeshFile:
     mesh = MeshFile(deck.path.name, points, tuple(assembly.blocks), ())
     resolve = _Resolver(deck, assembly, mesh)
     sets = resolve.all_sets()
-    notes = resolve.notes + [f"no shape: {count:,} elements of type {name}" for name, count in deck.shapeless.items()]
+    notes = [*deck.notes, *resolve.notes]
+    notes += [f"no shape: {count:,} elements of type {name}" for name, count in deck.shapeless.items()]
     used = np.zeros(len(points), dtype=bool)
     for block in assembly.blocks:
         if block.kind != 15:
@@ -710,7 +815,7 @@ class _Resolver:
                 elements = self.members("elset", of, entry.names[0], entry.line, (*within, path))
                 parts += [cells.ravel() for kind, cells in self.mesh.cells(elements).items() if kind != 15]
                 continue
-            if len(entry.labels):
+            if entry.labels is not None and len(entry.labels):
                 parts.append(self.labelled(word, of, entry, deck_set))
             for other in entry.names:
                 instance, dot, number = other.partition(".")
@@ -726,7 +831,7 @@ class _Resolver:
         """Return the numbers of the labelled nodes or elements."""
         placed = self.assembly.placed.get(scope)
         kind = "node" if word == "nset" else "element"
-        labels = entry.labels
+        labels = np.zeros(0, np.int64) if entry.labels is None else entry.labels
         if placed is None:
             raise self.deck.fail(entry.line, f"the set {deck_set.name!r} names {kind} {labels[0]} without its instance")
         known, order = (

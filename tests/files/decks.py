@@ -115,6 +115,10 @@ SAME: dict[str, Callable[[], str]] = {
         N2, "*NODE, SYSTEM=C\n" + "\n".join(
             f"{101 + k}, {(x * x + y * y) ** 0.5!r}, {__import__('math').degrees(__import__('math').atan2(y, x))!r}"
             for k, (x, y) in enumerate(PUNCH))),
+    "NGEN, NFILL and ELGEN": lambda: BASE.replace(N2, "101, -5, 0\n106, 5, 0\n113, -5, 4\n118, 5, 4\n*NGEN, NSET=LO\n"
+        "101, 106, 1\n*NGEN, NSET=HI\n113, 118\n*NFILL\nLO, HI, 2, 6").replace(
+        f"*ELEMENT, TYPE=CPE4, ELSET=PUNCH_BODY\n{E2}",
+        "*ELEMENT, TYPE=CPE4\n101, 101, 102, 108, 107\n*ELGEN, ELSET=PUNCH_BODY\n101, 5, 1, 1, 2, 6, 5"),
     "clockwise elements": lambda: BASE.replace(E2, rows([row[::-1] for row in quads(5, 101)], 101)),
     "in the plane of x and z": lambda: BASE.replace(N1, nodes(STRIP, 1).replace(", -4\n", ", 0, -4\n").replace(
         ", -2\n", ", 0, -2\n").replace("33, 10, 0", "33, 10, 0, 0")).replace(
@@ -127,7 +131,6 @@ SAME: dict[str, Callable[[], str]] = {
 
 # What is wrong: a change, and what the error names.
 WRONG: dict[str, tuple[Callable[[], str], str]] = {
-    "generated nodes": (swapped("*NSET, NSET=PUNCH_TOP", "*NGEN\n101, 106\n*NSET, NSET=PUNCH_TOP"), r"line 89.*NGEN"),
     "an unknown keyword": (swapped("*NSET, NSET=PUNCH_TOP", "*IMPERFECTION\n*NSET, NSET=PUNCH_TOP"), r"line 89.*IMPERFECTION"),
     "an unknown option": (swapped("*NSET, NSET=PUNCH_TOP", "*NSET, PART=Q, NSET=PUNCH_TOP"), r"line 89.*PART"),
     "a type without a shape": (swapped("TYPE=CPE4, ELSET=P", "TYPE=U1, ELSET=P"), r"line 76.*U1"),

@@ -1,17 +1,12 @@
-"""The thermo-elastic stability of a state: how fast its disturbances grow.
+"""Stability: how fast disturbances of a state grow, the critical speed, the limit of explicit steps, uniqueness.
 
-The speed of sliding beyond which full contact is thermo-elastically unstable.
-
-The limit of explicit steps of wear on full contact.
-
-Uniqueness of the contact of a half-cycle with heat.
-
-The friction heat of a change dp of pressure opens the gap by Theta dp by the end of its half-cycle, and where nodes
-stay closed, with the loads balanced, an opened gap takes the pressure X away: the heat of a change feeds back G dp = -X
-Theta dp of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is where R. A.
-Burton's waves neither grow nor decay, for heat that has had one half-cycle to flow. Beyond it a complementarity problem
-with the same nodes in contact is none with a P-matrix: it may have several answers, or none (J. R. Barber, J.
-Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap against it, by much less, and is left out.
+Uniqueness is that of the contact of a half-cycle with heat. The friction heat of a change dp of pressure opens the gap
+by Theta dp by the end of its half-cycle, and where nodes stay closed, with the loads balanced, an opened gap takes the
+pressure X away: the heat of a change feeds back G dp = -X Theta dp of it. Both compliances together, S + Theta, are
+singular where an eigenvalue of G is 1: that is where R. A. Burton's waves neither grow nor decay, for heat that has had
+one half-cycle to flow. Beyond it a complementarity problem with the same nodes in contact is none with a P-matrix: it
+may have several answers, or none (J. R. Barber, J. Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap
+against it, by much less, and is left out.
 
 Where friction depends on the pressure S and Theta are derivatives: of the traction mu p by d(mu p)/dp, and so of its
 heat. One answer is certain where the derivative is one with a P-matrix at every pressure (D. Gale and H. Nikaido, Math.

@@ -16,10 +16,9 @@ from fenwear.common.errors import CaseError, ConvergenceError
 from fenwear.laws.local_laws import BodyRate, LocalWear
 from fenwear.steps.stick_cycle import PartialSlipProblem
 from fenwear.steps.stick_final import final_shape
-from fenwear.steps.stick_increment import _step, advance
+from fenwear.steps.stick_increment import CLOSE, GridStep, _step, advance
 from fenwear.steps.stick_interface import untouched
 from fenwear.steps.stick_jump import first_cycle, jumped
-from fenwear.steps.stick_products import CLOSE, GridStep
 from fenwear.steps.stick_setup import partial_slip_problem
 from fenwear.steps.stick_state import FrettingCycle, Imposed, StickState
 from fenwear.surfaces import compliance

@@ -106,7 +106,7 @@ def test_a_load_on_a_held_group() -> None:
     (text,) = system.bodies.remarks
     assert text.startswith("punch.loads: -1000 of -1000 N along z ")
     with pytest.raises(CaseError, match=r"punch\.supports: .*1000"):
-        system.check_touching()
+        system.law.check_touching(system)
 
 
 def test_supports_that_carry_a_part() -> None:
@@ -114,7 +114,7 @@ def test_supports_that_carry_a_part() -> None:
     found = blocks(None)
     found["punch"]["loads"] = [{"on": "punch_sides", "traction": [0.0, -50.0]}]
     system = assemble(make_case(found))
-    system.check_touching()
+    system.law.check_touching(system)
     contact = system.contact((1,)).solve(system.pair.initial_gap)
     force = 5.0 * float(system.pair.weights @ contact.pressure[0])
     assert 0.0 < force < 50.0 * 2 * 2 * 5.0

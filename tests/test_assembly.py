@@ -61,7 +61,7 @@ def test_own_materials(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(data["pressure"].values @ weights, 200, rtol=1e-10)
     # The stiffness of the fibres' direction is felt: the pad's compliance is that of neither isotropic bound.
     assert system.bodies.punch.law.stress(ufl.Coefficient(system.bodies.punch.space)).ufl_shape == (2, 2)
-    response = system.condensed.punch.response[:, :, :, 0]
+    response = system.elastic.condensed.punch.response[:, :, :, 0]
     sideways, down = np.abs(response[:, 0]).max(), np.abs(response[:, 1]).max()
     assert 0.01 < sideways / down < 1  # pressed fibres at 30 degrees give way sideways, too
 
@@ -158,7 +158,7 @@ def test_a_variant_equals_a_new_system(assembled: Callable[..., Tribosystem]) ->
     ):
         shared, new = vary(base, *settings), assemble(vary(base, *settings).case)
         assert shared.bodies.punch.factor is base.bodies.punch.factor
-        for one, other in zip(shared.interfaces, new.interfaces, strict=True):
+        for one, other in zip(shared.elastic.interfaces, new.elastic.interfaces, strict=True):
             scale = np.abs(other.dense()).max()
             np.testing.assert_allclose(one.dense(), other.dense(), rtol=0, atol=1e-12 * scale)
             np.testing.assert_allclose(one.load_gap, other.load_gap, rtol=0, atol=1e-9 * np.abs(other.load_gap).max())
@@ -181,7 +181,7 @@ def test_a_long_stroke_takes_as_many_positions_as_nodes_ask_for() -> None:
         off.append(np.abs(depth / (2 * 1e-9 * load) - 1).max())
         if not more:
             assert system.motion.positions % 2
-            assert system.position_spacing < 1 < 9 < system.motion.positions
+            assert system.sliding.position_spacing < 1 < 9 < system.motion.positions
             assert vary(system, "motion.amplitude=40").motion.positions == system.motion.positions
             steps = "program={steps=[{time=2, amplitude=5}, {time=2, amplitude=45}]}"
             short = assemble(load_case("example1", [*settings, "motion.amplitude=5", steps, "run.half_cycles=8"]))
@@ -199,8 +199,8 @@ def test_a_variant_takes_the_operator_of_its_own_settings() -> None:
     reduced = vary(full, "heat.operator=reduced")
     again = vary(reduced, "heat.operator=full")
     cycles = vary(with_reduced_heat(full), "motion.amplitude=1")
-    assert cycles.heat is not None
-    assert cycles.heat.operator == "full"
+    assert cycles.case.heat is not None
+    assert cycles.case.heat.operator == "full"
     found = [one.exchange.reduced for one in (full, reduced, again, cycles)]
     assert found == [False, True, False, True]
 

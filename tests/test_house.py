@@ -6,8 +6,11 @@ from collections import Counter
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+from fenwear import Tribosystem
+
 ROOT = Path(__file__).parents[1]
 LONG = 50  # lines of a function
+NAMES = 25  # public names of an assembled system, at most
 ROOMS, FLOORS = 20, 12  # at most; the highest floor is the door: fenwear/__init__.py and __main__.py
 
 
@@ -78,6 +81,11 @@ def test_rooms_import_lower_rooms_alone():
     assert {"case", "bodies", "steps", "cli"} < set(rooms)
     assert len(rooms) <= ROOMS
     assert max(floors.values()) < FLOORS, floors
+
+
+def test_a_system_has_few_names():
+    names = {name for name in {*dir(Tribosystem), *Tribosystem.__dataclass_fields__} if not name.startswith("_")}
+    assert len(names) <= NAMES, sorted(names)
 
 
 def test_no_file_name_stands_in_two_rooms():

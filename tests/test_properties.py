@@ -209,7 +209,7 @@ def check_contact(system: Tribosystem, parameters: Parameters, block: Block) -> 
         arm = -block.direction * parameters.friction * parameters.pins[0]
         np.testing.assert_allclose(force @ x / load, arm, rtol=0, atol=1e-8 * HALF_WIDTH)
     assert (block.pressure >= 0).all()
-    depth = system.interface.elastic_length * load / 60  # of the mean pressure
+    depth = system.elastic.interface.elastic_length * load / 60  # of the mean pressure
     assert (block.gap > -1e-8 * depth).all()
     assert (np.minimum(block.pressure * 60 / load, block.gap / depth) < 1e-8).all()
     worn = parameters.coefficient * load * 2 * parameters.amplitude

@@ -90,7 +90,7 @@ def test_friction_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> No
     system = assembled("pin-on-disc", *COARSE)
     arm = system.pair.punch.x[:, :2]
     for direction in (1, -1):
-        ratio = system.friction_ratio(direction)
+        ratio = system.phases.middle_ratio(direction)
         across = np.column_stack([-arm[:, 1], arm[:, 0]]) / np.linalg.norm(arm, axis=1, keepdims=True)
         np.testing.assert_allclose(ratio[:, :2], direction * 0.05 * across, atol=1e-14)
         np.testing.assert_allclose(ratio[:, 2], 0, atol=1e-15)

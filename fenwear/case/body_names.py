@@ -169,7 +169,7 @@ def with_body_names(function: Callable[P, T]) -> Callable[P, T]:
 
     @wraps(function)
     def named(*args: P.args, **kwargs: P.kwargs) -> T:
-        given = (getattr(argument, "names", None) for argument in (*args, *kwargs.values()))
+        given = (getattr(getattr(argument, "case", argument), "names", None) for argument in (*args, *kwargs.values()))
         names = next((candidate for candidate in given if isinstance(candidate, Names)), BY_ROLE)
         with names.names_in_errors():
             return function(*args, **kwargs)

@@ -80,14 +80,14 @@ def elastic_way(system: Tribosystem) -> float:
     if not system.normal_force:
         return 0.0
     weights = system.pair.weights
-    pressed_in = float(weights @ system.interface.by_even / weights.sum()) * system.rigid.mean_pressure
-    ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
+    pressed_in = float(weights @ system.elastic.interface.by_even / weights.sum()) * system.rigid.mean_pressure
+    ratio = float(weights @ np.linalg.norm(system.phases.middle_ratio(1), axis=1) / weights.sum())
     return SHEARED * ratio * max(pressed_in, 0.0)
 
 
 def stroke_amplitude(system: Tribosystem) -> float:
     """Return the mean amplitude of the sliding to and fro, mm."""
-    slid = float((system.sliding_ratio.mean(axis=1) * system.motion.sliding()).sum())
+    slid = float((system.sliding.ratio.mean(axis=1) * system.motion.sliding()).sum())
     return slid / (2 * system.motion.half_cycles)
 
 
@@ -96,6 +96,6 @@ def elastic_share(system: Tribosystem) -> float | None:
 
     None for sliding one way, and where nodes stick: there it is followed.
     """
-    if system.sticks or len(set(system.motion.directions)) == 1:
+    if system.law.sticks or len(set(system.motion.directions)) == 1:
         return None
     return elastic_way(system) / max(stroke_amplitude(system), 1e-300)

@@ -244,7 +244,7 @@ def heated_layer(system: ContactSetup) -> HeatedLayer | None:
     mesh = system.bodies.strip.body.mesh
     simplex = mesh.basix_cell() in (CellType.triangle, CellType.tetrahedron)
     # Of a simplex the height is what volume over area is times its dimension.
-    heights = system.element_heights.strip[below] * (mesh.topology.dim if simplex else 1)
+    heights = system.bodies.element_heights.strip[below] * (mesh.topology.dim if simplex else 1)
     layers = np.sqrt(_diffusivities(system)[below] * _passing(system, speed))
     worst = int(np.argmax(heights / layers))
     layer, height = float(layers[worst]), float(heights[worst])

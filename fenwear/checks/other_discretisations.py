@@ -161,7 +161,7 @@ def in_few_steps(case: Case, system: Tribosystem, until: int) -> Case:
     run: dict[str, Any] = {"periodic_within": None}
     if case.run.integration != "jump" and until * system.motion.positions > LONGEST:
         run |= {"integration": "jump", "jump_tolerance": TOLERANCE}
-    if not system.sticks and case.leaves_positions and system.track_varies:
+    if not system.law.sticks and case.leaves_positions and case.strip_varies and system.sliding.to_and_fro:
         return changed(case, run=run, motion={"positions": system.motion.positions})
     return changed(case, run=run)
 
@@ -172,7 +172,7 @@ def are_dear(last: Block) -> bool:
     Bodies that answer on any grid are not set up again.
     """
     phases = len(last) * last.system.motion.positions
-    return last.system.sticks or phases > DEAR or answers_anywhere(last.system)
+    return last.system.law.sticks or phases > DEAR or answers_anywhere(last.system)
 
 
 def in_longer_jumps(case: Case) -> Case:

@@ -125,7 +125,7 @@ class Seen:
         """Look at the contact before any wear; collective."""
         made = Made(system)
         contact = made.contact
-        error = complementarity_error(contact.pressure[0], contact.gap[0], system.interface.elastic_length)
+        error = complementarity_error(contact.pressure[0], contact.gap[0], system.elastic.interface.elastic_length)
         return replace(cls.of_pressure(system, contact.pressure, "at the start", float(error)), made=made)
 
     @classmethod
@@ -375,7 +375,7 @@ def beside_radius(seen: Seen) -> Fields:
     program = seen.system.case.program
     if program is None or program.radius is None:
         return {}
-    radii, weights = seen.system.sliding_ratio[0], seen.system.pair.weights
+    radii, weights = seen.system.sliding.ratio[0], seen.system.pair.weights
     if radii.min() <= program.radius <= radii.max():
         return {}
     mean = float(weights @ radii / weights.sum())
@@ -384,7 +384,7 @@ def beside_radius(seen: Seen) -> Fields:
 
 def coarse_heat_steps(seen: Seen) -> Fields:
     """Return by how much halving the steps of the heat changes temperatures, beyond the tolerance."""
-    heat, fineness = seen.system.heat, seen.system.exchange.fineness
+    heat, fineness = seen.system.case.heat, seen.system.exchange.fineness
     if heat is None or fineness is None or fineness.change is None or fineness.change <= heat.step_tolerance:
         return {}
     return {"steps": fineness.steps, "percent": 100 * fineness.change, "limit": heat.step_tolerance}
@@ -392,7 +392,7 @@ def coarse_heat_steps(seen: Seen) -> Fields:
 
 def coarse_heat_basis(seen: Seen) -> Fields:
     """Return by how much the reduced temperatures differ from those of the whole mesh, beyond the tolerance."""
-    heat, fineness = seen.system.heat, seen.system.exchange.fineness
+    heat, fineness = seen.system.case.heat, seen.system.exchange.fineness
     if (
         heat is None
         or fineness is None
@@ -406,7 +406,7 @@ def coarse_heat_basis(seen: Seen) -> Fields:
 def unstable_speed(seen: Seen) -> Fields:
     """Return by how much sliding one way is faster than full contact is thermo-elastically stable."""
     system, motion = seen.system, seen.system.motion
-    if system.heat is None or not isinstance(system, Tribosystem) or not motion.one_way:
+    if system.case.heat is None or not isinstance(system, Tribosystem) or not motion.one_way:
         return {}
     try:
         critical = critical_speed(system, motion.directions[0])

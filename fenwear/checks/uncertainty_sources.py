@@ -35,7 +35,7 @@ from fenwear.results.quantity import BODIES, KELVIN, degrees_of
 from fenwear.results.registry import known
 from fenwear.steps import Block, SteadyState, heat_gain, steady
 from fenwear.steps.run_state import RunState, all_phases, pressure_scale
-from fenwear.system import Tribosystem, with_reduced_heat
+from fenwear.system import Tribosystem, led, with_reduced_heat
 
 
 def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
@@ -57,7 +57,7 @@ def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contributio
     exchange = with_reduced_heat(system).exchange
     if exchange.fineness is None:
         return {}
-    start = {"largest_temperature": system.initial_temperature}
+    start = {"largest_temperature": system.case.initial_temperature}
     return {
         source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
         for source, share in (("heat_steps", exchange.fineness.change), ("heat_basis", exchange.fineness.difference))
@@ -68,8 +68,8 @@ def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contributio
 def _of(last: Block, values: Values, share: float) -> Contribution:
     assert last.heat is not None
     system = last.system
-    rise = float(last.heat.largest_temperature[-1]) - system.initial_temperature
-    pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
+    rise = float(last.heat.largest_temperature[-1]) - system.case.initial_temperature
+    pressure, depth = led(system, lambda: _felt(last, share)) if not system.law.sticks else (share, np.inf)
     contribution: Contribution = {}
     for quantity, value in values.items():
         relative = pressure * abs(value.number)
@@ -226,7 +226,7 @@ def _steps(
         shorter = replace(again.otherwise(motion={"duration": case.motion.duration / 2}), until=2 * again.until)
         other = shorter.values()
         yield "half_cycles", {quantity: FROM_COLD * value.apart(other[quantity]) for quantity, value in before.items()}
-    if last.system.sticks:
+    if last.system.law.sticks:
         fineness = last.system.law_state.fineness
         if fineness is not None:
             yield "slip_steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
@@ -239,7 +239,9 @@ def _steps(
         return
     if last.system.bodies.followed is not None:
         yield "following", _apart(before, again.otherwise(geometry={"follow_wear": 2 * follow}).values(), 1.0)
-    elif (worn := last.system.wear_on_meshes(last.end.worn)) > NOTICED:  # not yet: with meshes that do half-way
+    elif (
+        worn := last.system.bodies.wear_on_meshes(last.end.worn, last.system.case)
+    ) > NOTICED:  # not yet: with meshes that do half-way
         yield "following", _apart(before, again.otherwise(geometry={"follow_wear": follow * worn / 2}).values(), 2.0)
 
 
@@ -403,7 +405,7 @@ def _named(system: Tribosystem, numbers: Contribution) -> dict[str, Any]:
 def _way(system: Tribosystem, quantity: Quantity) -> str:
     motion = system.motion
     stroke = (int(quantity.of) - 1) % motion.half_cycles
-    return system.direction_words[int(motion.phases[stroke * motion.positions].direction)]
+    return system.sliding.words[int(motion.phases[stroke * motion.positions].direction)]
 
 
 def remedies(system: Tribosystem, estimate: Uncertainty) -> dict[str, str]:

@@ -152,8 +152,8 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
     from fenwear.studies.run import explicit_warnings, position_warnings
 
     loaded, size = system.case, f"{system.bodies.unknowns:,} displacement degrees of freedom"
-    system.passing(system.phases_wear)  # with a look at the life of debris, as at all other laws
-    system.check_touching()
+    system.phases.passing(system.phases.mean_wear)  # with a look at the life of debris, as at all other laws
+    system.law.check_touching(system)
     warnings = [
         *position_warnings(system),
         *system.bodies.remarks,
@@ -194,12 +194,12 @@ def _with_heat(system: Tribosystem, seconds: float) -> tuple[Tribosystem, list[s
     from fenwear.steps import heat_gain, heat_warnings
     from fenwear.system import with_reduced_heat
 
-    if system.heat is None:
+    if system.case.heat is None:
         return system, []
     nodes = sum(body.space.dofmap.index_map.size_global for body in system.bodies.heat)
     log(f"heat: reduces {nodes:,} temperatures to a basis, as `run` does, for at most {seconds:g} s")
     try:
-        with time_limit(seconds, system.comm):
+        with time_limit(seconds, system.bodies.comm):
             warm = with_reduced_heat(system, keep=True)
             jumps = system.case.run.integration == "jump"
             seen = Seen.of_system(warm)
@@ -236,7 +236,7 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     from fenwear.results.time_steps import REGIMES, regime_of
     from fenwear.steps.stick_state import TimeStepRecords
 
-    system.check_touching()
+    system.law.check_touching(system)
     problem = system.law_state.problem
     setup = problem.interface.needs.text()
     records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])

@@ -99,7 +99,7 @@ def flash_command(
     from fenwear.results.hdf5 import write
 
     temperatures = flash_temperatures(directory, settings)
-    folder, names = output or directory / "flash", temperatures.heating.placed.names
+    folder, names = output or directory / "flash", temperatures.heating.placed.case.names
 
     def keep() -> None:
         maps = dataset(temperatures)

@@ -64,7 +64,7 @@ def steady_command(
     held_case, of_step = held(system, _number(step))
     if of_step:
         system = with_case(system, held_case)
-    if system.sticks:
+    if system.law.sticks:
         _show_final(case, system, as_json=as_json)
         return
     if of_step:
@@ -185,8 +185,8 @@ def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
     from fenwear.steps.run_state import approach
     from fenwear.surfaces.sliding_chart import sliding_chart
 
-    system.check_touching()
-    final, case = system.contact_law.end(system), system.case
+    system.law.check_touching(system)
+    final, case = system.law.end(system), system.case
     problem = final.system.law_state.problem
     solid = case.model.kind == "solid"
     pair, weights = problem.interface.middle.pair, problem.weights
@@ -289,7 +289,7 @@ def _steady_text(case: str, state: SteadyState, results: dict[str, Any]) -> str:
     of_step = [f"of {results['of']}"] if "of" in results else []
     if state.passes:
         of_step.append(f"material properties updated {state.passes} times to these temperatures")
-    return "\n".join([title, *of_step, columns_text([system.direction_words[d] for d in state.directions], rows)])
+    return "\n".join([title, *of_step, columns_text([system.sliding.words[d] for d in state.directions], rows)])
 
 
 def _way_text(rate: float, followed: bool, cycles: RunningIn | None, seconds: dict[str, float]) -> str:
@@ -350,7 +350,7 @@ def optimum_command(
             "motion and give a load, or use `run`"
         )
         raise CaseError(InputError("punch.supports", reason))
-    optima = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
+    optima = {name: system.optimum(d) for d, name in reversed(system.sliding.words.items())}
     x = system.pair.x.tolist()
     data: dict[str, Any] = {
         name: {**optimum.velocity, "x": x, "pressure": optimum.pressure.tolist(), "chi": optimum.tilt.tolist()}
@@ -415,8 +415,8 @@ def shape_command(
             )
         shape = shape_for_pressure(system, pressure_at(system.pair.punch, pressure))
     else:
-        shape = initial_shape(system if system.sticks else with_reduced_heat(system, keep=True), wanted)
-    on_root(system.comm, lambda: write_shape(output, loaded, shape))
+        shape = initial_shape(system if system.law.sticks else with_reduced_heat(system, keep=True), wanted)
+    on_root(system.bodies.comm, lambda: write_shape(output, loaded, shape))
     rows = zip(shape.largest_pressure, shape.left_to_run_in, strict=True)
     known = [{"largest_pressure": pressure, "left_to_run_in": left} for pressure, left in rows]
     numbers = {"depth": shape.depth.tolist(), "loads": known, "tolerance": shape.tolerance}

@@ -95,6 +95,11 @@ class HeatExchange:
         self._initial = self.on_bases(HeatState.nodal(*self._unheated())) if self.reduced else None
 
     @property
+    def ambient(self) -> float:
+        """The temperature of the surroundings, K."""
+        return self.heat.ambient
+
+    @property
     def team(self) -> Team:
         """The ranks, of which one leads."""
         return Team.of(self.bases[0].body.body.mesh.comm)
@@ -576,6 +581,7 @@ class Isothermal(HeatExchange):
 
     conducts = False
     by_pressure = False
+    ambient = 0.0
 
     def __init__(self, phases: int, nodes: int, temperature: float) -> None:
         self.plans: list[list[StepPlan]] = [[] for _ in range(phases)]

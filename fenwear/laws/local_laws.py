@@ -88,6 +88,11 @@ class LocalLaws:
         """Whether nothing depends on more than the place."""
         return self.friction.constant and not self.changes(of_wear=True)
 
+    @property
+    def any_coating(self) -> bool:
+        """Whether a body is coated."""
+        return any(thickness.any() for thickness in self.coatings)
+
     def changes(self, *, of_wear: bool = False) -> bool:
         """Return whether friction changes with the state, or wear does."""
         if not of_wear:

@@ -78,7 +78,9 @@ def save(directory: Path, system: Tribosystem, state: RunState, extremes: Mappin
         OutputError: it cannot be written; the old one stays.
     """
     temperatures = {name: nodal_table(function) for name, function in _temperatures(system, state).items()}
-    on_root(system.comm, lambda: _write(directory / FILE, {**_arrays_of(system, state, extremes), **temperatures}))
+    on_root(
+        system.bodies.comm, lambda: _write(directory / FILE, {**_arrays_of(system, state, extremes), **temperatures})
+    )
 
 
 def _temperatures(system: Tribosystem, state: RunState) -> dict[str, fem.Function]:
@@ -129,7 +131,7 @@ def load(directory: Path, system: Tribosystem) -> tuple[Tribosystem, RunState, d
     Raises:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
-    comm = system.comm
+    comm = system.bodies.comm
     arrays = on_root(comm, lambda: _checked(directory, system.case))
     kept, grid, temperature = _unpacked(Checkpoint, "", directory, arrays), system.pair.punch.grid, None
     if kept.grid is not None and grid is not None:
@@ -147,7 +149,7 @@ def load(directory: Path, system: Tribosystem) -> tuple[Tribosystem, RunState, d
     if any(name.startswith(f"{MEMORY}.") for name in arrays):
         names = [f"{REMEMBERED}_{k}" for k in range(len(arrays)) if f"{REMEMBERED}_{k}_punch" in arrays]
         warm = tuple(HeatState.nodal(bodies, _read(directory, arrays, name, bodies)) for name in names)
-        memory = replace(_unpacked(system.contact_law.memory, MEMORY, directory, arrays), warm=warm)
+        memory = replace(_unpacked(system.law.memory, MEMORY, directory, arrays), warm=warm)
     state = replace(kept.state, temperature=temperature, memory=memory)
     return system, state, {name: float(value) for name, value in json.loads(str(arrays[EXTREMES])).items()}
 

@@ -98,7 +98,7 @@ def _loaded(
     system: Tribosystem, phase: int, pressure: Array, rigid: Array, traction: Array
 ) -> list[tuple[ElasticBody, Array, Array]]:
     """Return punch and strip with the forces on their trace nodes (N, 3), N/mm, and the amplitudes of their modes."""
-    pair, bodies = system.pairs[phase], system.loaded[phase]
+    pair, bodies = system.sliding.pairs[phase], system.loaded[phase]
     force = in_space(pair.normal) + traction
     force *= (pair.weights * pressure)[:, None]
     count = len(bodies.punch.rigid_modes)
@@ -112,15 +112,15 @@ def _traction(
     system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None, worn: WornDepths | None
 ) -> Array:
     """Return the traction of friction on the punch over this pressure, in space (n, 3); collective."""
-    friction, surfaces = system.friction, None
+    friction, surfaces = system.laws.friction, None
     if not friction.constant and temperatures is not None and system.bodies.heat:
         punch, strip = (
             body.trace.pick(values[:, None])[:, 0, 0]
             for body, values in zip(system.bodies.heat, temperatures, strict=True)
         )
         surfaces = (system.pair.punch.spread.T @ punch, system.pair.transfer @ strip)
-    mu = friction.values(system.conditions(phase, pressure, surfaces, worn))
-    return system.friction_in_space(phase, mu)
+    mu = friction.values(system.phases.conditions(phase, pressure, surfaces, worn))
+    return system.phases.ratio_in_space(phase, mu)
 
 
 def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody, Array] | None) -> Fields:
@@ -245,7 +245,7 @@ def write_fields(
     Raises:
         OutputError: they cannot be written.
     """
-    comm = system.comm
+    comm = system.bodies.comm
     folder = directory / FOLDER
     nodes = sum(body.space.dofmap.index_map.size_global for body in (system.bodies.punch, system.bodies.strip))
     on_root(comm, lambda: _make_folder(folder, BYTES_PER_NODE * nodes + BYTES_PER_RANK * comm.size))
@@ -254,12 +254,12 @@ def write_fields(
     for elastic, body in zip((system.bodies.punch, system.bodies.strip), fields, strict=True):
         data.update(_gathered(elastic, [body[name] for name in MEANINGS if name in body]))
         data.update(_groups(elastic))
-    time = float(system.time(np.array(half_cycle)))
+    time = float(system.sliding.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
-    attributes["directions"] = " ".join(system.direction_words.values())
+    attributes["directions"] = " ".join(system.sliding.words.values())
     data.update(_contact_surfaces(system, worn, pressure))
     _in_degrees(data, system)
-    data = {name: (*values, system.names.meant(attributes)) for name, (*values, attributes) in data.items()}
+    data = {name: (*values, system.case.names.meant(attributes)) for name, (*values, attributes) in data.items()}
     import xarray  # with pandas, half a second that runs without fields spare themselves
 
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))

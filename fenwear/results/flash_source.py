@@ -230,7 +230,7 @@ def heating_of(case: Case, directory: Path) -> Heating:
 def _of_positions(case: Case, directory: Path) -> Heating:
     """Return the heat of surfaces that slide as a whole; collective."""
     placed = place_case(case)
-    kept = on_root(placed.comm, lambda: checkpoint.last_contact(directory))
+    kept = on_root(placed.bodies.comm, lambda: checkpoint.last_contact(directory))
     last = kept.state
     stage = next((stage for stage in stages_of(case) if stage.end >= last.half_cycle), None)
     if stage is not None:
@@ -244,8 +244,8 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         raise CaseError(InputError(str(directory), "expected a run that has done a whole cycle"))
     heat = np.empty_like(reached)
     for k in range(len(heat)):
-        conditions = placed.conditions(k, reached[k], worn=last.worn, half_cycles=last.half_cycle)
-        heat[k] = reached[k] * heating_friction(placed, placed.friction.values(conditions), k)
+        conditions = placed.phases.conditions(k, reached[k], worn=last.worn, half_cycles=last.half_cycle)
+        heat[k] = reached[k] * heating_friction(placed, placed.laws.friction.values(conditions), k)
     along = _along(placed, reached)
     window = Window.around(grid_of(placed), reached)
     heat *= placed.pair.weights / window.cell
@@ -260,7 +260,7 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     course = Course.of(motion)
     steps, pasts, way = _steps(course, window, pressure, along, len(motion.phases), motion.half_cycles)
     if not pasts:
-        _check_memory(placed.comm, _cells(window, steps, way * np.abs(along) / np.linalg.norm(along)))
+        _check_memory(placed.bodies.comm, _cells(window, steps, way * np.abs(along) / np.linalg.norm(along)))
     edges = course.period * np.arange(steps + 1) / steps
     times = (edges[1:] + edges[:-1]) / 2
     phases = course.phase(times)
@@ -337,7 +337,7 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
     places = np.append(records.displacement[-1], records.displacement)
     offsets = np.interp(times, edges, places)
     way = float(np.ptp(places)) * np.abs(along)
-    _check_memory(system.comm, _cells(window, steps, way))
+    _check_memory(system.bodies.comm, _cells(window, steps, way))
     return Heating(
         system,
         until,

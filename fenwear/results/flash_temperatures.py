@@ -402,7 +402,7 @@ def numbers(temperatures: FlashTemperatures) -> dict[str, Any]:
         "contact_mm": heating.extent.tolist(),
         "nodes_across": list(temperatures.across),
         "thermal_feedback": temperatures.feedback,
-        "warnings": [heating.placed.names.with_names(warning) for warning in temperatures.warnings],
+        "warnings": [heating.placed.case.names.with_names(warning) for warning in temperatures.warnings],
     }
 
 

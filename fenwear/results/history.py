@@ -54,7 +54,7 @@ def variables_of(system: Tribosystem) -> dict[str, Quantity]:
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
-    with_names, columns = system.names.meant, {**_columns(system), **_of_program(system.case)}
+    with_names, columns = system.case.names.meant, {**_columns(system), **_of_program(system.case)}
     return {name: column._replace(attributes=with_names(column.attributes)) for name, column in columns.items()}
 
 
@@ -85,14 +85,14 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
         "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
     }
-    if system.strip_changes:
+    if system.phases.strip_changes:
         along = "position along the strip, on its material, as x in the middle position"
         columns["x_strip"] = Column(("x_strip",), pair.strip.abscissa, {"units": "mm", "long_name": along})
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
     if arc:
         columns |= _outline(pair.punch, "")
-    if system.strip_changes and pair.strip.arc is not None:
+    if system.phases.strip_changes and pair.strip.arc is not None:
         columns |= _outline(pair.strip, "_strip")
     return {**columns, **part_columns(system, plane=True), **time_steps.columns(system), **roughness.columns(system)}
 
@@ -400,7 +400,7 @@ def _attributes(system: Tribosystem) -> dict[str, Any]:
         "title": system.case.title or "fenwear run",
         "Conventions": "CF-1.11 UGRID-1.0" if solid else "CF-1.11",
         "case": system.case.to_toml(),
-        "directions": " ".join(system.direction_words.values()),  # of d = 1 and d = -1
+        "directions": " ".join(system.sliding.words.values()),  # of d = 1 and d = -1
         "conforming": int(conforming(system.pair)),
         "versions": json.dumps(versions()),
         **({"model": system.case.model.kind} if solid else {}),

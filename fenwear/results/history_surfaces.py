@@ -115,12 +115,12 @@ def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
     pair, chart = placed.pair, sliding_chart(placed.sliding.field, placed.pair)
     columns = _columns(chart, pair.punch, "")
-    return columns | _columns(chart, pair.strip, "_strip") if placed.strip_changes else columns
+    return columns | _columns(chart, pair.strip, "_strip") if placed.phases.strip_changes else columns
 
 
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:
     """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
-    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_changes else {})
+    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.phases.strip_changes else {})
     columns = {}
     for end, surface in ends.items():
         over = (f"{'x' if plane else 'node'}{end}",)

@@ -60,7 +60,7 @@ def _debris(block: Block) -> tuple[Array, Array, Array]:
     """
     system = block.system
     if system.layers.strip_carries:
-        return block.carried[:, 0], block.carried[:, 1], system.bodies.punch.thickness * system.carried_areas
+        return block.carried[:, 0], block.carried[:, 1], system.bodies.punch.thickness * system.sliding.carried_areas
     return _row(block, DEBRIS[0]), _row(block, DEBRIS[1]), _areas(block)
 
 
@@ -163,7 +163,7 @@ def of_coated(body: str) -> list[Quantity]:
 def _coat(block: Block, body: str) -> tuple[Array, Array, Array]:
     """Return a body's coating (n,), mm, the areas of its coated nodes (n,), mm², and the worn depth (k, n), mm."""
     system, punch = block.system, body == "punch"
-    thickness = system.coatings[0 if punch else 1]
+    thickness = system.laws.coatings[0 if punch else 1]
     weights = system.pair.weights if punch else system.pair.strip.weights
     return thickness, weights * (thickness > 0), block.wear if punch else block.wear_strip
 
@@ -177,7 +177,7 @@ def worn_through(block: Block, before: RunState, known: Mapping[str, float]) -> 
         known: Its earlier numbers.
     """
     system, events = block.system, dict[str, float]()
-    for row, (body, thickness) in enumerate(zip(BODIES, system.coatings, strict=True)):
+    for row, (body, thickness) in enumerate(zip(BODIES, system.laws.coatings, strict=True)):
         if not thickness.any():
             continue
         begun, depths = ((before.worn.punch, block.wear), (before.worn.strip, block.wear_strip))[row]
@@ -203,9 +203,9 @@ def _coated(system: ContactSetup, body: str, thickness: Array) -> CoatedBody:
     above = law.of_coating
     if above is None:
         return CoatedBody(thickness, np.ones_like(thickness))
-    conditions = system.conditions(0)
+    conditions = system.phases.conditions(0)
     base, coating = (
-        coefficient(wear_law, system.friction, conditions, f"wear.{body}").mean() for wear_law in (law, above)
+        coefficient(wear_law, system.laws.friction, conditions, f"wear.{body}").mean() for wear_law in (law, above)
     )
     return CoatedBody(thickness, np.full_like(thickness, base / coating))
 
@@ -234,7 +234,7 @@ def of_creeping(name: str) -> list[Quantity]:
     volume = f"volume that the {name} has crept over the contact nodes, at the end of the half-cycle"
 
     def depth(block: Block) -> Array:
-        return np.asarray(block.system.creep.depths(block.crept.T)[name].T)
+        return np.asarray(block.system.elastic.creep.depths(block.crept.T)[name].T)
 
     return [
         Quantity(f"creep_depth{end}", ALONG, "mm", text, depth),
@@ -253,9 +253,9 @@ def quantities(system: Tribosystem) -> list[Quantity]:
         *_of_states(system),
         *(
             quantity
-            for body, thickness in zip(BODIES, system.coatings, strict=True)
+            for body, thickness in zip(BODIES, system.laws.coatings, strict=True)
             if thickness.any()
             for quantity in of_coated(body)
         ),
-        *(quantity for member in system.creep.members for quantity in of_creeping(member.name)),
+        *(quantity for member in system.elastic.creep.members for quantity in of_creeping(member.name)),
     ]

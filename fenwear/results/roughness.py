@@ -43,7 +43,7 @@ def columns(system: Tribosystem) -> dict[str, Column]:
             {"units": "mm", "long_name": f"height of the unworn {body} over its smooth shape, out of it"},
         )
         for body, surface in _rough(system).items()
-        if body == "punch" or system.strip_changes
+        if body == "punch" or system.phases.strip_changes
     }
 
 

@@ -211,7 +211,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
     """
     return {
         "title": system.case.title,
-        **({"names": system.names.by_roles} if system.names.given else {}),
+        **({"names": system.case.names.by_roles} if system.case.names.given else {}),
         "half_cycles": int(last.half_cycle[-1]),
         **run,
         **sheet_of(last),
@@ -223,7 +223,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **{name: value for name, value in extremes.items() if name != HOTTEST},
         "contact_nodes": len(system.pair.x),
         "degrees_of_freedom": system.bodies.unknowns,
-        "ranks": system.comm.size,
+        "ranks": system.bodies.comm.size,
         "versions": versions(),
     }
 
@@ -289,7 +289,7 @@ def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     for k, pressure in enumerate(map(np.asarray, last.pressure[cycle])):
         at = {"pressure_MPa": _at(system, pressure)} if plane else {}
         numbers = {key: row[k].item() for key, row in rows.items() if key != "direction"}
-        contacts[system.direction_words[int(rows["direction"][k])]] = {**numbers, **at, **net.numbers(pressure)}
+        contacts[system.sliding.words[int(rows["direction"][k])]] = {**numbers, **at, **net.numbers(pressure)}
     return contacts
 
 

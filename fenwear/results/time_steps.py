@@ -98,7 +98,7 @@ IN_TURNING = {"displacement": "rad", "tangential_force": "N mm"}  # units where 
 
 def _step_quantities(system: Tribosystem) -> list[Quantity]:
     """Return the quantities of time steps of a system whose law resolves them; none of others."""
-    if not system.sticks:
+    if not system.law.sticks:
         return []
     step_quantities, turns = [*IN_STEPS, *(OF_HEAT if system.exchange.conducts else ())], any(system.sliding.field.turn)
     if system.pair.punch.dim == 3:
@@ -144,10 +144,10 @@ def _step_columns(system: Tribosystem) -> dict[str, Column]:
 
 def attributes(system: Tribosystem) -> dict[str, Any]:
     """Return the attributes of a history of a law that resolves half-cycles; none of others."""
-    if not system.sticks:
+    if not system.law.sticks:
         return {}
     problem = system.law_state.problem
-    return {"law": system.law, "friction": float(problem.friction[0]), "period": problem.program.period}
+    return {"law": system.law.name, "friction": float(problem.friction[0]), "period": problem.program.period}
 
 
 def most(system: Tribosystem) -> int:
@@ -286,7 +286,7 @@ OF_CYCLE = tuple(
 
 def extremes(block: Block) -> dict[str, float]:
     """Return the largest values over the time steps of a block, by the names of a run's extremes."""
-    if not block.system.sticks:
+    if not block.system.law.sticks:
         return {}
     weights = block.system.law_state.problem.weights
     steps = steps_of(block)
@@ -298,7 +298,7 @@ def extremes(block: Block) -> dict[str, float]:
 
 def hottest(block: Block, heat: HeatRecord) -> Array:
     """Return the largest temperature of each half-cycle of a block (k,), K: of its time steps, or at its end."""
-    if not block.system.sticks:
+    if not block.system.law.sticks:
         return heat.largest_temperature
     return np.array([stroke.records.temperature.max() for stroke in steps_of(block)])
 
@@ -328,19 +328,19 @@ def table_cycle(last: Block) -> TableCycle | None:
     system = last.system
     if not system.motion.steps:
         return None
-    if system.sticks:
+    if system.law.sticks:
         return _of_time_steps(last, steps_of(last)[-1])
     pressure = all_phases(last.end.contacts).pressure
     if not len(pressure):
         return None
-    end, shear = last.end, system.ways.shear(pressure)
+    end, shear = last.end, system.phases.ways.shear(pressure)
     states = [
-        system.conditions(k, np.asarray(phase_pressure), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
+        system.phases.conditions(k, np.asarray(phase_pressure), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
         for k, phase_pressure in enumerate(pressure)
     ]
-    tensors = system.ways.tensor(pressure), system.ways.tensor_of_strip(pressure)
-    worn = system.wear.phases(states).begun(end.worn).worn(pressure)
-    return TableCycle(system.path.sum(axis=0), pressure, worn, tensors)
+    tensors = system.phases.ways.tensor(pressure), system.phases.ways.tensor_of_strip(pressure)
+    worn = system.phases.wear.phases(states).begun(end.worn).worn(pressure)
+    return TableCycle(system.sliding.path.sum(axis=0), pressure, worn, tensors)
 
 
 def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
@@ -379,9 +379,9 @@ OF_TABLE = (
 
 def _table_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return the sliding of each place in each step of a table, and the tracks of the strip's material."""
-    if not placed.slides_many_ways:
+    if not placed.sliding.many_ways:
         return {}
-    ways = placed.ways
+    ways = placed.phases.ways
     slid = ways.lengths[:, :, None] * ways.directions
     return {
         "slid": Column(
@@ -409,7 +409,7 @@ def _tracks(placed: ContactSetup) -> Array:
 
 def sliding_numbers(last: Block, cycle: TableCycle) -> dict[str, float]:
     """Return the ways of a last cycle for the sheet."""
-    areas = last.system.pair.weights * (cycle.pressure.max(axis=0) > 0 if last.system.sticks else 1.0)
+    areas = last.system.pair.weights * (cycle.pressure.max(axis=0) > 0 if last.system.law.sticks else 1.0)
     return {
         "mean_way_of_cycle_mm": float(areas @ cycle.ways / areas.sum()),
         "largest_way_of_cycle_mm": float(cycle.ways.max()),
@@ -437,9 +437,9 @@ def _cross_shear(tensor: SlidingTensor, areas: Array) -> Mapping[str, float]:
 
 def quantities(system: Tribosystem) -> list[Quantity]:
     """Return the quantities of time steps, and of a cycle that is a table of a solid's ways."""
-    return [*_step_quantities(system), *(OF_TABLE if system.slides_many_ways else ())]
+    return [*_step_quantities(system), *(OF_TABLE if system.sliding.many_ways else ())]
 
 
 def columns(system: Tribosystem) -> dict[str, Column]:
     """Return the columns of time steps and of tables that do not change in a run."""
-    return {**(_step_columns(system) if system.sticks else {}), **_table_columns(system)}
+    return {**(_step_columns(system) if system.law.sticks else {}), **_table_columns(system)}

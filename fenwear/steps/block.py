@@ -147,7 +147,7 @@ class Block:
     @property
     def time(self) -> Array:
         """Time at the end of each half-cycle (k,), s."""
-        return self.system.time(self.half_cycle)
+        return self.system.sliding.time(self.half_cycle)
 
     @property
     def load(self) -> Array:
@@ -162,8 +162,7 @@ class Block:
     @property
     def ambient(self) -> Array:
         """Temperature of the surroundings (k,), K; 0 without heat."""
-        heat = self.system.heat
-        return np.full(len(self), 0.0 if heat is None else heat.ambient)
+        return np.full(len(self), self.system.exchange.ambient)
 
     @property
     def largest_pressure(self) -> Array:
@@ -309,7 +308,7 @@ class Recorder:
             carried=np.array([row.worn.carried for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             friction_ratio=tuple(middle.friction_ratio for middle in middles),
-            sliding=tuple(map(system.ways.tensor, pressures)) if system.slides_many_ways else (),
+            sliding=tuple(map(system.phases.ways.tensor, pressures)) if system.sliding.many_ways else (),
         )
         self._rows, self._retries, self._remedies = [], [], Counter()
         return block
@@ -326,7 +325,7 @@ class Recorder:
         errors = np.zeros(len(self._rows))
         for members in groups.values():
             numbers, records = zip(*members, strict=True)
-            equilibrium = records[0].equilibrium or self.system.interfaces[records[0].phase].rigid
+            equilibrium = records[0].equilibrium or self.system.elastic.interfaces[records[0].phase].rigid
             pressure = np.concatenate([record.contact.pressure for record in records])
             force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
@@ -337,13 +336,13 @@ class Recorder:
             else:
                 carried = equilibrium.of(pressure, np.array(ratios))
             balance = carried + loads[:, None] * equilibrium.resultant
-            error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
+            error = np.abs(balance / (self.system.rigid.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)
         return errors
 
     def _complementarity(self) -> Array:
         """Return the largest error of Signorini's conditions in each half-cycle (k,)."""
-        length = self.system.elastic_length
+        length = self.system.law.elastic_length(self.system)
         if self._rows and self._rows[0].steps is not None:
             steps = [row.steps for row in self._rows if row.steps is not None]
             return np.array([complementarity_error(step.pressure, step.gap, length).max() for step in steps])
@@ -359,7 +358,7 @@ class Recorder:
         So where a threshold or cap leaves none, nodes stick, or directions change. Solved again only when the zone
         changes.
         """
-        if self.system.sticks or self.system.motion.steps:
+        if self.system.law.sticks or self.system.motion.steps:
             return np.full(len(pressure), np.nan)
         zone = pressure > 0
         key = (direction, zone.tobytes())

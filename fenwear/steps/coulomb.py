@@ -14,6 +14,7 @@ import numpy as np
 
 from fenwear.bodies.surface_operators import SurfaceOperator
 from fenwear.case import Case
+from fenwear.case.body_names import with_body_names
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.errors import CaseError, ConvergenceError, InputError
 from fenwear.contact import ContactState
@@ -143,20 +144,20 @@ class Coulomb:
         """Return the system of a case whose bodies are built; collective."""
         if bodies.punch.reach is not None:  # its grid begins around the first contact, pressed alone
             bodies = SLIDING.of_bodies(case, bodies, heat="none", fresh=fresh).bodies
-        return system_of(case, bodies, law=self.name, heat=heat, fresh=fresh)
+        return system_of(case, bodies, law=self, heat=heat, fresh=fresh)
 
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         same = bodies.punch is system.bodies.punch
-        condensed = (system.condensed.punch, system.condensed.strip) if same else None
+        condensed = (system.elastic.condensed.punch, system.elastic.condensed.strip) if same else None
         heat: Preparation = "as set" if system.law_state.prepared else "none"
         ends = system.law_state.ends
-        return system_of(system.case, bodies, law=self.name, heat=heat, condensed=condensed, ends=ends)
+        return system_of(system.case, bodies, law=self, heat=heat, condensed=condensed, ends=ends)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
         before = system.case
-        bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
+        bodies, condensed = system.bodies, (system.elastic.condensed.punch, system.elastic.condensed.strip)
         if before.loading != case.loading:
             bodies = bodies.under(case)
             condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
@@ -166,14 +167,15 @@ class Coulomb:
         if held != asked:
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
         moves = unheated_problem(case, bodies, condensed=condensed).interface.moves
-        same = condensed if moves == system.condensed.strip_moves else None
+        same = condensed if moves == system.elastic.condensed.strip_moves else None
         ends = system.law_state.ends if same_steps(before, case) else None
-        return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
+        return system_of(case, bodies, law=self, condensed=same, ends=ends)
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
         return float(system.law_state.problem.interface.middle.elastic_length)
 
+    @with_body_names
     def check_touching(self, system: Tribosystem) -> None:
         """Make sure that the load brings the surfaces together; collective.
 
@@ -225,7 +227,7 @@ def system_of(
     case: Case,
     bodies: Bodies,
     *,
-    law: str,
+    law: ContactLaw,
     heat: Preparation = "as set",
     fresh: bool = False,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
@@ -236,7 +238,7 @@ def system_of(
     Args:
         case: With contact.law = "coulomb", or that of another law that resolves slip.
         bodies: Of it.
-        law: By its name.
+        law: Of the contact.
         heat: Whether heat is prepared, and the time steps are halved until they are fine enough: "none" for neither.
         fresh: Condense the bodies again, even where they are kept on disk.
         condensed: Both, where they are condensed already.

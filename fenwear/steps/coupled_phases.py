@@ -67,7 +67,7 @@ def check_cycle_memory(system: Tribosystem) -> None:
     exchange = with_reduced_heat(system).exchange
     subject = "the map of each heat step in a cycle, which jumps and steady states keep,"
     advice = 'Use fewer `motion.positions` or `heat.steps`, larger elements, or `run.integration = "implicit"`.'
-    check_memory(system.comm, cycle_memory(exchange), "heat", subject, advice)
+    check_memory(system.bodies.comm, cycle_memory(exchange), "heat", subject, advice)
 
 
 @dataclass(frozen=True)
@@ -182,10 +182,10 @@ class Coupled:
         self._touching: Mask | None = None  # which nodes do in each phase, for the edges of the contact
         self._passing: LayerEvolution | None = None  # at the conditions last taken, where debris is felt by them
         self.heat = cycle_heat(system)
-        self._warm = self.heat.dim > 0 and not system.constant_coefficients
-        self._felt = system.layers.debris.present and system.asks("debris")
+        self._warm = self.heat.dim > 0 and not system.phases.constant
+        self._felt = system.layers.debris.present and system.laws.asks("debris")
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
-        if not system.friction.constant:
+        if not system.laws.friction.constant:
             self.heat = cycles_of(self.heat.exchange.with_friction(self.mu))
 
     def solve(
@@ -212,7 +212,7 @@ class Coupled:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         self.held = None
-        if self.system.edges is None:
+        if self.system.laws.edges is None:
             return self._at_edges(temperature, cycles, start, solve, passing)
         # Of the contact that was found before: nodes that open and close as edges move would never come to an end.
         for _ in range(EDGES):
@@ -251,7 +251,7 @@ class Coupled:
         conducting: Callable[[NDArray[Any]], Array],
     ) -> Solved:
         """Return the solution where nodes of these pressures conduct."""
-        heat, constant, shape, contact = self.heat, self.system.constant_coefficients, start.pressure.shape, start
+        heat, constant, shape, contact = self.heat, self.system.phases.constant, start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
         # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
         depths = [passing.before.punch, passing.before.strip] if passing.follows else []
@@ -346,9 +346,9 @@ class Coupled:
         """Take the coefficients at these pressures and, where there are any, temperatures, depths and debris."""
         system = self.system
         pressure = np.maximum(pressure, 0.0)  # a combination of some may lie below
-        shear = system.ways.shear(pressure)
+        shear = system.phases.ways.shear(pressure)
         conditions = [
-            system.conditions(
+            system.phases.conditions(
                 k,
                 p,
                 (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None,
@@ -361,18 +361,18 @@ class Coupled:
         ]
         if debris is not None:
             lies, on_strip = np.maximum(debris, 0.0), system.layers.strip_carries
-            facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.pairs]
+            facing = [pair.wear_interpolation @ lies if on_strip else lies for pair in system.sliding.pairs]
             conditions = [
                 replace(condition, debris=debris) for condition, debris in zip(conditions, facing, strict=True)
             ]
-        evolution = replace(system.evolution(conditions, worn), near=self.held)
+        evolution = replace(system.phases.evolution(conditions, worn), near=self.held)
         conditions = list(self._remembering(evolution, passing))
         evolution = replace(evolution, near=self.held)
         self._take(conditions, evolution)
         if debris is not None:
-            self._passing = system.passing(system.wear.phases(conditions), None, evolution, conditions)
-        if not system.friction.constant:
-            friction = [system.friction.values(state) for state in conditions]
+            self._passing = system.phases.passing(system.phases.wear.phases(conditions), None, evolution, conditions)
+        if not system.laws.friction.constant:
+            friction = [system.laws.friction.values(state) for state in conditions]
             self.mu = np.array([heating_friction(system, mu, phase) for phase, mu in enumerate(friction)])
 
     def _remembering(self, evolution: Evolution, passing: DepthEvolution) -> Sequence[ContactConditions]:

@@ -12,7 +12,7 @@ from fenwear.common.errors import CaseError, ConvergenceError, InterruptedRunErr
 from fenwear.common.parallel import Team
 from fenwear.steps.block import Block, HalfCycle, Recorder
 from fenwear.steps.run_state import RunState
-from fenwear.system import Tribosystem
+from fenwear.system import Tribosystem, led
 
 BLOCK = 200  # half-cycles
 
@@ -121,7 +121,7 @@ def run_steps(system: Tribosystem, step: Step, state: RunState, limits: RunLimit
     system.team.serve(system)
     stretches = _Stretches(system, step, state.half_cycle, limits)
     while state.half_cycle < limits.half_cycles:
-        done = system.led(partial(stretches.next, state))
+        done = led(system, partial(stretches.next, state))
         state = done.state
         if done.block is not None:
             yield done.block
@@ -156,7 +156,7 @@ class _Stretches:
             try:
                 after, recorded = self.step(state, until)
             except (ConvergenceError, InterruptedRunError) as error:
-                self.system.names.tell(error)
+                self.system.case.names.tell(error)
                 failure: Exception = error
                 if isinstance(error, ConvergenceError) and not isinstance(error, CaseError):
                     failure = type(error)(f"half-cycle {state.half_cycle + 1}: {error}")

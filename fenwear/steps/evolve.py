@@ -72,20 +72,22 @@ def jump_within(
         message = f"jumps start from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
     watching = Watching(system.team, limits.watch)
-    step: Jumps = system.contact_law.jumps(system, tolerance, watching, limits.loading)
+    step: Jumps = system.law.jumps(system, tolerance, watching, limits.loading)
     state = on_exchange(start or beginning(step.system), step.system.exchange)  # before rank 0 leads
     if finer and state.finer is None:
         state = replace(state, finer=state)
     stops = frozenset(-(-stop // strokes) * strokes for stop in limits.stops)
     limits = replace(limits, half_cycles=limits.half_cycles // strokes * strokes, stops=stops, watch=watching)
-    system.wear_on_meshes(state.worn)  # before rank 0 leads: the elements' heights take all ranks
+    system.bodies.wear_on_meshes(state.worn, system.case)  # before rank 0 leads: the elements' heights take all ranks
     yield from run_steps(step.system, partial(_on_meshes, system, step), state, limits)
 
 
 def _on_meshes(system: Tribosystem, step: Jumps, state: RunState, until: int) -> tuple[RunState, list[HalfCycle]]:
     """Return the state and the records of a jump, shortened where it wears far more than meshes are to follow."""
     after, recorded = step(state, until)
-    before, worn = (system.team.lead(partial(system.wear_on_meshes, moment.worn)) for moment in (state, after))
+    before, worn = (
+        system.team.lead(partial(system.bodies.wear_on_meshes, moment.worn, system.case)) for moment in (state, after)
+    )
     strokes = system.motion.half_cycles
     cycles = (after.half_cycle - state.half_cycle) // strokes
     if worn <= LATE or before > 1 or cycles == 1:  # beyond it already: nobody has them follow
@@ -127,7 +129,7 @@ def march_within(
     """Yield all half-cycles, as `march`, within limits; collective."""
     state = on_exchange(start or beginning(system), system.exchange)  # before rank 0 leads
     watching = Watching(system.team, limits.watch)
-    step = system.contact_law.half_cycles(system, watching, limits.loading, implicit=implicit)
+    step = system.law.half_cycles(system, watching, limits.loading, implicit=implicit)
     yield from run_steps(system, step, state, replace(limits, watch=watching))
 
 

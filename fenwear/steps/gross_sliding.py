@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.case import Case
+from fenwear.case.body_names import with_body_names
 from fenwear.common.errors import MARCHED, SHORTER_JUMPS, SMALLER_STEPS, CaseError, ConvergenceError, InputError
 from fenwear.contact import ContactState
 from fenwear.heat.temperature import HeatState
@@ -50,13 +51,14 @@ from fenwear.system import (
     with_reduced_heat,
 )
 from fenwear.system.contact_laws import GROSS
-from fenwear.system.tribosystem import answers_for, condense_bodies
+from fenwear.system.tribosystem import answers_for, condense_bodies, layer_conductance
 from fenwear.system.variants import same_conduction
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
 _Made = tuple[
     Attempt[Any] | None, RunState, list[HalfCycle]
 ]  # a jump, None where it was marched; its end, its last cycle
+CARRIED = 1e-6  # of the loads: what the contact carries by rounding
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 
 
@@ -143,7 +145,7 @@ class HalfCycles:
         phases = range(len(system.motion.phases))
         self.steps = [PhaseStep(system, phase, implicit=implicit) for phase in phases]
         self.smaller = SmallerSteps(system, implicit=implicit)
-        self._of_cycle = system.ways.asked  # whether a coefficient depends on what a whole cycle does
+        self._of_cycle = system.phases.ways.asked  # whether a coefficient depends on what a whole cycle does
 
     def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next half-cycle, and its record."""
@@ -168,7 +170,7 @@ class HalfCycles:
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
         known = all_phases(state.contacts).pressure if self._of_cycle else np.zeros((0, 0))
-        cycle = self.system.ways.shear(known) if len(known) else None
+        cycle = self.system.phases.ways.shear(known) if len(known) else None
         for number, phase in enumerate(phases):
             if number:
                 self.watch()
@@ -271,7 +273,7 @@ class GrossSliding:
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         placed = self._placed(system.case, bodies, _sliding_as(system, system.case))
-        condensed = system.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
+        condensed = system.elastic.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
         return _with_heat_as(system, joined(placed, condensed), keep=bodies.warmed is None)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
@@ -280,7 +282,7 @@ class GrossSliding:
         Loads, friction, wear, motion and the exchange of heat factor no stiffness again; another motion prepares the
         steps of heat again.
         """
-        before, bodies, condensed, sliding = system.case, system.bodies, system.condensed, system.sliding
+        before, bodies, condensed, sliding = system.case, system.bodies, system.elastic.condensed, system.sliding
         if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
             sliding = _sliding_as(system, case)
         if before.loading != case.loading:
@@ -298,16 +300,16 @@ class GrossSliding:
         if not conducts_alike or placed.motion != system.motion:
             return _with_heat_as(system, joined(placed, condensed))
         exchange = system.exchange.varied(case.heat, heating_frictions(placed))
-        return joined(placed, condensed, exchange.through(placed.layer_conductance()))
+        return joined(placed, condensed, exchange.through(layer_conductance(placed)))
 
     def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> ContactSetup:
-        placed = place_case_bodies(case, bodies, sliding)
-        return placed if placed.law == self.name else replace(placed, law=self.name)
+        return replace(place_case_bodies(case, bodies, sliding), law=self)
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
-        return system.interface.elastic_length
+        return system.elastic.interface.elastic_length
 
+    @with_body_names
     def check_touching(self, system: Tribosystem) -> None:
         """Make sure that the surfaces touch in some phase; collective.
 
@@ -319,7 +321,7 @@ class GrossSliding:
         for phase in range(len(system.motion.phases)):
             contact = system.phase_contact((phase,)).solve(system.gap(phase, system.unworn()))
             if contact.pressure.max() > 0:
-                system.check_carried(float(system.pairs[phase].weights @ contact.pressure[0]))
+                _check_carried(system, float(system.sliding.pairs[phase].weights @ contact.pressure[0]))
                 return
             gaps.append(float(contact.gap.min()))
         raise CaseError(
@@ -346,6 +348,27 @@ class GrossSliding:
     def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
         """Return the step of many cycles."""
         return Jumps(Stepper(system, tolerance, watch, loading), tolerance)
+
+
+def _check_carried(system: Tribosystem, force: float) -> None:
+    """Raise where supports carry all of the loads.
+
+    Args:
+        system: The bodies.
+        force: Of the contact, N/mm in the plane, N else.
+    """
+    bodies = (system.bodies.punch, system.bodies.strip)
+    given = max(float(np.abs(body.given).max(initial=0.0)) for body in bodies)
+    moved = system.rigid.mode_names or any(body.moved for body in bodies)
+    if moved or force * bodies[0].thickness > CARRIED * given:
+        return
+    raise CaseError(
+        InputError(
+            "punch.supports",
+            f"the supports carry all of the load of {given:.4g} N, and none of it reaches the contact. Free the "
+            "punch along the contact's normal, or move a support `by` an approach in place of the load",
+        )
+    )
 
 
 def _sliding_as(system: Tribosystem, case: Case) -> Sliding:

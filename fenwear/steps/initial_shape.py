@@ -101,12 +101,12 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     for factor, share in loads:
         if not (0 < factor < np.inf and 0 < share < np.inf):
             raise CaseError(InputError("--load", f"expected positive numbers FACTOR or FACTOR:SHARE, got {factor:g}"))
-    if system.sticks and len(loads) > 1:
+    if system.law.sticks and len(loads) > 1:
         message = "each load has its own stick zone, which alone carries the load in the end. Give one load"
         raise CaseError(InputError("--load", message))
     systems = [system if factor == 1.0 else with_case(system, loads_times(system.case, factor)) for factor, _ in loads]
     states: tuple[SteadyState | FinalShape, ...] = tuple(steady(loaded) for loaded in systems)
-    if system.sticks:
+    if system.law.sticks:
         systems = [state.system for state in states]  # on the grid that the scar has grown to
     shares = np.array([share for _, share in loads]) / sum(share for _, share in loads)
     depth = _depth(system, states, shares)
@@ -115,7 +115,7 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
     if system.case.heat is None:
         depth = depth if len(loads) == 1 else _evened(systems, shares, depth)
         first = [_pressures(loaded, depth) for loaded in systems]
-        uneven = 0.0 if system.sticks else _uneven(systems, shares, first)[0]
+        uneven = 0.0 if system.law.sticks else _uneven(systems, shares, first)[0]
     left = [
         float(np.abs(p - goal).max() / pressure_scale(loaded, goal))
         for loaded, p, goal in zip(systems, first, goals, strict=True)
@@ -139,8 +139,8 @@ def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
             would have to be added; the system sticks, or has heat.
         ConvergenceError: the contact on the shape did not converge.
     """
-    if system.sticks or system.case.heat is not None:
-        key = "contact.law" if system.sticks else "heat"
+    if system.law.sticks or system.case.heat is not None:
+        key = "contact.law" if system.law.sticks else "heat"
         raise CaseError(
             InputError(
                 key,
@@ -149,7 +149,7 @@ def shape_for_pressure(system: Tribosystem, pressure: Array) -> InitialShape:
         )
     if not (np.isfinite(pressure).all() and pressure.min() >= 0 and pressure.any()):
         raise CaseError(InputError("--pressure", "expected numbers of zero or more, and some above zero"))
-    interface, ratio, unworn = system.interfaces[0], system.friction_ratios()[0], system.unworn()
+    interface, ratio, unworn = system.elastic.interfaces[0], system.phases.ratios()[0], system.unworn()
     goal = _balanced(system, pressure, ratio)
     forces = (interface.pair.normal + ratio) * (goal * interface.pair.weights)[:, None]
     shape = -(interface.apply(forces)[:, 0] + interface.load_gap + system.gap(0, unworn))
@@ -167,7 +167,7 @@ def _balanced(system: Tribosystem, pressure: Array, ratio: Array) -> Array:
     Raises:
         CaseError: it does not; names each rigid mode with what the pressure carries, and what it must.
     """
-    rigid, thickness = system.interfaces[0].rigid, system.bodies.punch.thickness
+    rigid, thickness = system.elastic.interfaces[0].rigid, system.bodies.punch.thickness
     balance = rigid.equilibrium(ratio)
     carried, needed = balance @ pressure, -rigid.resultant
     allowed = UNBALANCED * np.abs(balance) @ pressure
@@ -215,7 +215,7 @@ def _depth(system: Tribosystem, states: Sequence[SteadyState | FinalShape], shar
     shapes = [state.depth if isinstance(state, FinalShape) else state.closest_shape for state in states]
     pressed = np.any([_steady_pressures(state).any(axis=0) for state in states], axis=0)
     mean = shares @ np.array(shapes)
-    return mean if system.sticks else _least(system, mean, pressed)
+    return mean if system.law.sticks else _least(system, mean, pressed)
 
 
 def _least(system: Tribosystem, shape: Array, pressed: Mask) -> Array:
@@ -231,7 +231,7 @@ def _evened(systems: Sequence[Tribosystem], shares: Array, start: Array) -> Arra
         ConvergenceError: none is found.
     """
     system = systems[0]
-    compliance = system.interface.compliance(np.mean(system.friction_ratios(), axis=0))
+    compliance = system.elastic.interface.compliance(np.mean(system.phases.ratios(), axis=0))
 
     def advance(depth: Array) -> tuple[Array, tuple[Array, Mask], bool]:
         pressures = [_pressures(loaded, depth) for loaded in systems]
@@ -250,7 +250,7 @@ def _least_motion(system: Tribosystem, shape: Array, where: Mask) -> Array:
     Raises:
         ConvergenceError: there is none.
     """
-    modes, scale = system.rigid.rigid_normal / system.mode_lengths, float(np.abs(shape[where]).max()) or 1.0
+    modes, scale = system.rigid.rigid_normal / system.rigid.mode_lengths, float(np.abs(shape[where]).max()) or 1.0
     weights = system.pair.weights / system.pair.weights.sum()
     solution = scipy.optimize.linprog(
         -(weights * where) @ modes, A_ub=modes[where], b_ub=shape[where] / scale, bounds=(None, None)
@@ -269,7 +269,7 @@ def _steady_pressures(state: SteadyState | FinalShape) -> Array:
 
 def _pressures(system: Tribosystem, depth: Array) -> Array:
     """Return the pressures of the first cycle on a shape (phases, n), MPa; collective."""
-    if system.sticks:
+    if system.law.sticks:
         problem = system.law_state.problem
         made = problem.beginning(replace(problem.unworn(), punch=depth))
         return TimeStepRecords.joined(problem.cycle(made)[1]).pressure
@@ -281,7 +281,8 @@ def _pressures(system: Tribosystem, depth: Array) -> Array:
 def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[Array]) -> tuple[float, Array, Array]:
     """Return the share of the wear in all loads that no rigid motion follows, this part (n,), and the wear (n,)."""
     worn = [
-        share * loaded.phases_wear.opening(p)[0] for loaded, share, p in zip(systems, shares, pressures, strict=True)
+        share * loaded.phases.mean_wear.opening(p)[0]
+        for loaded, share, p in zip(systems, shares, pressures, strict=True)
     ]
     total, pressed = np.sum(worn, axis=0), np.any([p.any(axis=0) for p in pressures], axis=0)
     modes, rest = systems[0].rigid.rigid_normal[pressed], np.zeros_like(total)
@@ -292,7 +293,7 @@ def _uneven(systems: Sequence[Tribosystem], shares: Array, pressures: Sequence[A
 def _tolerance(system: Tribosystem, goal: Array, depth: Array) -> float:
     """Return the amplitude of a wave over the contact that changes the pressure by a share of its scale, mm."""
     scale = pressure_scale(system, goal)
-    small = PROBE * system.contact_law.elastic_length(system) * scale
+    small = PROBE * system.law.elastic_length(system) * scale
     before, surface, amplitudes = _pressures(system, depth), system.pair.punch, []
     for s in surface.places.T:
         wave = np.cos(2 * np.pi * (s - s.min()) / np.ptp(s))

@@ -82,22 +82,22 @@ class Stepper(JumpLaw[JumpMoment]):
         check_cycle_memory(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
         self.periodic = periodic  # whether temperatures are those that repeat, at the end of a stage
-        self._sizes = Sizes(system.layers, system.pair, system.creep.depth)
+        self._sizes = Sizes(system.layers, system.pair, system.elastic.creep.depth)
         self.contact = system.phase_contact(range(len(system.motion.phases)))
-        self.ratios = system.friction_ratios()
-        self.wear = system.phases_wear
-        self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]
-        self.evolution = system.evolution(self.conditions)
-        self._mu = [system.friction.values(condition) for condition in self.conditions]
+        self.ratios = system.phases.ratios()
+        self.wear = system.phases.mean_wear
+        self.conditions: Sequence[ContactConditions] = [system.phases.conditions(k) for k in range(len(self.ratios))]
+        self.evolution = system.phases.evolution(self.conditions)
+        self._mu = [system.laws.friction.values(condition) for condition in self.conditions]
         self._meters = [PhaseMeter(system, k) for k in range(len(self.ratios))]
         self.coupled = Coupled(system, self.take)
         self._flowed: Array | float = 0.0  # beyond the hardness, in the stage solved last
         self._begin: RunState = beginning(system)  # of the jump
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._last_cycle: list[HalfCycle] = []
-        follows = bool(system.passing_laws) or system.layers.varies or system.asks("debris")
+        follows = bool(system.case.passing_laws) or system.layers.varies or system.laws.asks("debris")
         follows = follows or bool(system.layers.memory.names)
-        self._follows = follows or system.friction.of_coatings != (None, None)  # coefficients do, within a step
+        self._follows = follows or system.laws.friction.of_coatings != (None, None)  # coefficients do, within a step
         by_friction = any(law.energy for law in system.sliding.wear)
         self._wear_follows = follows or (self._follows and by_friction)
 
@@ -160,7 +160,7 @@ class Stepper(JumpLaw[JumpMoment]):
         Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
         """
         largest = 0.0
-        for body, thickness in zip(("punch", "strip"), self.system.coatings, strict=True):
+        for body, thickness in zip(("punch", "strip"), self.system.laws.coatings, strict=True):
             first, full, other = (getattr(moment.worn, body) for moment in (made.begin, made.full, made.end))
             ended = (first < thickness) & (np.maximum(full, other) >= thickness)
             apart = float(np.abs(full - other).max(where=ended, initial=0.0))
@@ -197,14 +197,15 @@ class Stepper(JumpLaw[JumpMoment]):
         """Return the wear of a cycle at the depths, temperatures and pressures of a moment."""
         system, exchange = self.system, self.coupled.heat.exchange
         pressures = state.contact.pressure
-        shear = system.ways.shear(pressures)
+        shear = system.phases.ways.shear(pressures)
         surfaces = exchange.contact_temperatures(exchange.at(state.temperature))
         conditions: Sequence[ContactConditions] = [
-            system.conditions(k, pressures[k], surfaces, state.worn, half_cycles, shear) for k in range(len(pressures))
+            system.phases.conditions(k, pressures[k], surfaces, state.worn, half_cycles, shear)
+            for k in range(len(pressures))
         ]
-        evolution = system.evolution(conditions, state.worn)
+        evolution = system.phases.evolution(conditions, state.worn)
         conditions = evolution.around(system.layers.held(state.worn))
-        return system.wear.phases(conditions).begun(state.worn).worn(pressures)
+        return system.phases.wear.phases(conditions).begun(state.worn).worn(pressures)
 
     def _solve_to(self, share: float) -> None:
         """Solve contact to a share of the tolerance, where its digits cost; fully beyond a hardness, as flow stays."""
@@ -270,7 +271,7 @@ class Stepper(JumpLaw[JumpMoment]):
         if self.periodic:
             before, heated = replace(before, temperature=begin), 0 * begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
+        passing = self.system.phases.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, self._flowed * (1 / cycles))
         worn = replace(worn, crept=self._creep(before.worn, cycles).rate(contact.pressure))
         rate = _Rate(heated, worn, adds, solved.conductances, self.wear)
@@ -297,7 +298,7 @@ class Stepper(JumpLaw[JumpMoment]):
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
         worn, cycles = begin
-        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
+        passing = self.system.phases.passing(self.wear, None, self.evolution, self.conditions)
         step, near = passing.step(worn, cycles), start
         gap, coupling = self._creep(worn, cycles).opening(gap, coupling)
 
@@ -311,16 +312,16 @@ class Stepper(JumpLaw[JumpMoment]):
 
     def _creep(self, worn: WornDepths, cycles: float) -> CreepStage:
         """Return the creep of a stage."""
-        return self.system.creep.stage(worn.crept, cycles, self.ratios, self._load)
+        return self.system.elastic.creep.stage(worn.crept, cycles, self.ratios, self._load)
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution) -> None:
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
-        self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
-        self._mu = [system.friction.values(condition) for condition in conditions]
-        if system.friction.constant:
+        self.wear, self.evolution, self.conditions = system.phases.wear.phases(conditions), evolution, conditions
+        self._mu = [system.laws.friction.values(condition) for condition in conditions]
+        if system.laws.friction.constant:
             return
-        self.ratios = system.friction_ratios(conditions)
+        self.ratios = system.phases.ratios(conditions)
         self.contact.slide(self.ratios)
 
     def _adds(self, pressure: Array) -> list[Totals]:
@@ -350,7 +351,7 @@ class Stepper(JumpLaw[JumpMoment]):
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
         conditions = [self.conditions[k] for k in phases]
-        passing = self.system.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
+        passing = self.system.phases.passing(self.wear.some(phases), phases, self.evolution.some(phases), conditions)
         return passing.worn(pressures, now)
 
     def _last_cycle_heat(self, end: JumpMoment) -> list[HeatRecord | None]:

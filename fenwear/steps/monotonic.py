@@ -14,7 +14,7 @@ from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.heat.temperature import HeatState
 from fenwear.steps.slow_changes import with_own_properties
-from fenwear.system import Tribosystem, steady_exchange
+from fenwear.system import Tribosystem, isothermal, steady_exchange
 
 DIRECTIONS = (-1, 1)
 
@@ -59,9 +59,9 @@ def monotonic(system: Tribosystem, *, properties_within: float | None = None) ->
         CaseError: the case has no heat, or a body loses heat nowhere; a property that is not positive.
         ConvergenceError: there is no optimum, or properties and temperatures do not converge.
     """
-    if system.heat is None:
+    if system.case.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    unheated = replace(system, exchange=system.isothermal)  # the heat of its motion is not asked for
+    unheated = replace(system, exchange=isothermal(system))  # the heat of its motion is not asked for
     states = [
         with_own_properties(unheated, partial(_one_way, d), lambda state: state.end, properties_within)[0]
         for d in DIRECTIONS

@@ -122,11 +122,11 @@ class ThermalContact:
             free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
             contact = self._contact.solve(free, contact, wearing, response.gap[None, :, None, :])
             change = contact.pressure[0] - pressure
-            if agreed(self.system.comm, bool(np.abs(change).max() < CLOSE * mean)):
+            if agreed(self.system.bodies.comm, bool(np.abs(change).max() < CLOSE * mean)):
                 return contact, after, self._heat(after, terms, iteration)
             others = response.conductance, exchange.conductance(contact.pressure[0])
             exact = all(np.array_equal(other, conductance, equal_nan=True) for other in others)
-            if agreed(self.system.comm, exact):
+            if agreed(self.system.bodies.comm, exact):
                 after = exchange.at(after.values + response.state @ change)
                 return contact, after, self._heat(after, terms + response.terms @ change, iteration)
             if iteration > ALTERNATES:
@@ -141,7 +141,7 @@ class ThermalContact:
         self._asked = key
         costly = self.exchange.by_pressure or self.exchange.heat.operator == "full"
         near = known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT))
-        if known is not None and agreed(self.system.comm, near):
+        if known is not None and agreed(self.system.bodies.comm, near):
             return known
         state, terms = self.exchange.change(self.phase, conductance, pressure=np.eye(len(conductance)))
         self._response = _Response(conductance, state, terms, self.exchange.gap_change(state, self.phase))
@@ -163,9 +163,9 @@ class ThermalContact:
                 raise ConvergenceError(f"{error}; in iteration {iteration} of the split. {SPLIT_ADVICE}") from error
             before, volume = volume, gap_volume(self.system, free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
-            if agreed(self.system.comm, bool(abs(volume - before) < tolerance * volume)):
+            if agreed(self.system.bodies.comm, bool(abs(volume - before) < tolerance * volume)):
                 return contact, after, self._heat(after, terms, iteration)
-            if agreed(self.system.comm, not np.isfinite(volume)):
+            if agreed(self.system.bodies.comm, not np.isfinite(volume)):
                 break
         raise ConvergenceError(
             f"the operator split of heat and contact did not converge in {iteration} iterations. {SPLIT_ADVICE}"
@@ -300,9 +300,9 @@ class PhaseStep:
         self.system, self.phase, self.implicit = system, phase, implicit
         flows = implicit and system.layers.hardness < np.inf
         self._at_begin = PhaseStep(system, phase, implicit=False) if flows else None
-        self._constant, self._load = system.constant_coefficients, 1.0
+        self._constant, self._load = system.phases.constant, 1.0
         # Explicitly, wear and what remembers follow the pressure, and do not change it.
-        friction, asks = system.friction, system.friction.asks
+        friction, asks = system.laws.friction, system.laws.friction.asks
         apart = not self._constant and not implicit and not friction.remembers and not asks("edge")
         self._wears_after = apart and friction.constant
         self._slides_before = apart and not friction.constant and not asks("p", "pm")
@@ -310,19 +310,21 @@ class PhaseStep:
         self._contact = system.passed_contact(phase)
         self._follows = follows and isinstance(self._contact, CondensedContact) and self._contact.can_follow
         self._thermal = ThermalContact(system, phase, self._contact)
-        conditions = system.conditions(phase)
+        conditions = system.phases.conditions(phase)
         # Where nothing asks for more than the pressure and debris of the moment, all else stays as it is.
         changing = (
-            system.coated or system.exchange.conducts or any(map(system.asks, ("depth", "s", "cs", "pm", "edge")))
+            system.laws.any_coating
+            or system.exchange.conducts
+            or any(map(system.laws.asks, ("depth", "s", "cs", "pm", "edge")))
         )
         self._staying = None if changing else conditions
-        self._mu = system.friction.values(conditions)
-        self._friction_ratio = system.phase_friction(phase, self._mu)
-        wear = system.wear.phases([conditions], [phase])
-        self._passing = system.passing(wear, [phase])
+        self._mu = system.laws.friction.values(conditions)
+        self._friction_ratio = system.phases.ratio(phase, self._mu)
+        wear = system.phases.wear.phases([conditions], [phase])
+        self._passing = system.phases.passing(wear, [phase])
         self._flowed: Array | float = 0.0  # beyond the hardness, in the last solve
-        self._bare = system.phase_friction(phase, np.zeros_like(self._mu))
-        self._along = system.phase_friction(phase, np.ones_like(self._mu)) - self._bare
+        self._bare = system.phases.ratio(phase, np.zeros_like(self._mu))
+        self._along = system.phases.ratio(phase, np.ones_like(self._mu)) - self._bare
         self._onwards: Onwards | None = None  # where the iterations of contact depend on their start
         self._layers = layers = system.layers.at(phase)
         if self._follows or layers.closure is not None:
@@ -394,9 +396,9 @@ class PhaseStep:
         Raises:
             ConvergenceError: Newton's method does not find both together.
         """
-        mu = FollowingFriction(self.system.friction, self._conditions(at.near, None, at, at.near > 0))
+        mu = FollowingFriction(self.system.laws.friction, self._conditions(at.near, None, at, at.near > 0))
         contact = self._following(mu, at, gap)
-        if self.system.edges is None and not self.system.asks("depth"):
+        if self.system.laws.edges is None and not self.system.laws.asks("depth"):
             passing = self._taken(mu.at(contact.pressure[0]), at.worn, ended=True)
         else:
             passing = self._update(contact.pressure[0], at, ended=True)
@@ -448,7 +450,7 @@ class PhaseStep:
         """
         surfaces = self.system.exchange.contact_temperatures(at.temperature, self.phase - 1)
         passing = self._taken(self._conditions(pressure, surfaces, at, touching), at.worn, ended=ended)
-        if not self.system.asks("depth"):
+        if not self.system.laws.asks("depth"):
             return passing
         middle = at.worn + passing.worn(pressure[None], at.worn).times(0.5)
         halfway = replace(at, worn=replace(at.worn, punch=middle.punch, strip=middle.strip))
@@ -457,31 +459,33 @@ class PhaseStep:
     def _conditions(
         self, pressure: Array, surfaces: tuple[Array, Array] | None, at: _Begin, touching: Mask | None
     ) -> ContactConditions:
-        """Return the conditions that coefficients depend on, as `Tribosystem.conditions`."""
+        """Return the conditions that coefficients depend on, as `PhaseLaws.conditions`."""
         system, worn = self.system, at.worn
         if self._staying is None:
-            return system.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)
-        return self._staying.pressed(pressure, system.layers.facing(system.pairs[self.phase], worn))
+            return system.phases.conditions(self.phase, pressure, surfaces, worn, at.half_cycles, at.cycle, touching)
+        return self._staying.pressed(pressure, system.layers.facing(system.sliding.pairs[self.phase], worn))
 
     def _taken(self, conditions: ContactConditions, worn: WornDepths, *, ended: bool) -> LayerEvolution:
         """Take friction and wear at conditions and depths at the start of the phase, as `_update`."""
         system = self.system
-        evolution = system.evolution([conditions], worn, [self.phase])
+        evolution = system.phases.evolution([conditions], worn, [self.phase])
         # Coefficients are those of the states in the middle of the phase.
         (conditions,), end, _ = evolution.through(system.layers.held(worn))
         # Once the phase has ended its friction is known, but for one that has followed the pressure.
-        changes = not system.friction.constant and (self._follows or not ended)
+        changes = not system.laws.friction.constant and (self._follows or not ended)
         if changes:
-            mu = self._mu = system.friction.values(conditions)
+            mu = self._mu = system.laws.friction.values(conditions)
             self._friction_ratio = self._bare + mu[:, None] * self._along
             if not ended:
                 self._contact.slide([self._friction_ratio])
                 self._thermal.slide(heating_friction(system, mu, self.phase))
-        wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
+        wear = (
+            self._passing.wear if system.phases.wear.constant else system.phases.wear.phases([conditions], [self.phase])
+        )
         layers, debris = self._layers, self._passing.debris
         if layers.varies:
-            onto = layers.places([system.pairs[self.phase]])
-            debris = layers.debris.over(system.path[[self.phase]], [conditions], onto)
+            onto = layers.places([system.sliding.pairs[self.phase]])
+            debris = layers.debris.over(system.sliding.path[[self.phase]], [conditions], onto)
         return LayerEvolution(layers, wear, debris, evolution, end if ended else None)
 
     @cached_property
@@ -540,7 +544,7 @@ class PhaseStep:
         def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]
             lost = passing.worn(contact.pressure, at.worn, flowed=self._flowed)
-            creep = self.system.creep
+            creep = self.system.elastic.creep
             if creep.creeps:
                 crept = creep.change(self.phase, at.worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)

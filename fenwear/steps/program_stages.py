@@ -16,7 +16,7 @@ from fenwear.steps.block import Block
 from fenwear.steps.driver import Loading, RunLimits, as_given
 from fenwear.steps.run_state import RunState, carried_by, on_other_grid, with_phases
 from fenwear.steps.slow_changes import Integrate, follow
-from fenwear.system import Clock, ContactLaw, ContactSetup, Tribosystem, grows, regridded, with_case, with_room
+from fenwear.system import Clock, ContactSetup, Tribosystem, grows, regridded, with_case, with_room
 
 MOST_RECURRING = 16  # systems of stages that are held at once, each with its steps of heat
 
@@ -98,12 +98,15 @@ def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
         system: Of the case, on meshes as they are now.
         stage: Of its program.
     """
-    law: ContactLaw = system.contact_law
-    return _at_its_time(law.varied(system, stage.case), system, stage)
+    return _at_its_time(system.law.varied(system, stage.case), system, stage)
 
 
 def _at_its_time(staged: Tribosystem, system: Tribosystem, stage: Stage) -> Tribosystem:
-    return replace(staged, case=system.case, clock=Clock(stage.begin, stage.time, stage.slid))
+    return replace(
+        staged,
+        case=system.case,
+        sliding=replace(staged.sliding, clock=Clock(stage.begin, stage.time, stage.slid)),
+    )
 
 
 class Recurring:

@@ -87,14 +87,14 @@ class PhaseMeter:
     """
 
     def __init__(self, system: ContactSetup, phase: int) -> None:
-        pair, slid = system.pairs[phase], system.sliding_ratio[phase]
+        pair, slid = system.sliding.pairs[phase], system.sliding.ratio[phase]
         self._areas = system.bodies.punch.thickness * pair.weights
         self._path = system.motion.phases[phase].distance * slid
         positions, phases = system.motion.positions, system.motion.phases
         first = phase // positions * positions
         length = sum(phase.distance for phase in phases[first : first + positions])
         self._share = phases[phase].distance / length if length else 1 / positions  # at rest by the time
-        speed = np.linalg.norm(system.field_of(phase).velocity(pair.opposite), axis=1)
+        speed = np.linalg.norm(system.sliding.field_of(phase).velocity(pair.opposite), axis=1)
         self._weights, self._moved = pair.weights, pair.weights * system.motion.phases[phase].distance * speed
         self._mean_distance = float(self._moved.sum() / pair.weights.sum())  # where nothing presses
         self._approach = approach(system.rigids[phase])
@@ -104,8 +104,8 @@ class PhaseMeter:
             for density in opposite_densities(system, phase)
         ]
         normal, none = pair.normal, np.zeros(len(slid))
-        bare = system.friction_in_space(phase, none)
-        along = system.friction_in_space(phase, none + 1) - bare  # of a unit of mu
+        bare = system.phases.ratio_in_space(phase, none)
+        along = system.phases.ratio_in_space(phase, none + 1) - bare  # of a unit of mu
         pressing, dragging = normal + in_model(bare, normal.shape[1]), in_model(along, normal.shape[1])
         carried, dragged = (np.einsum("id,id->i", force, self._approach) for force in (pressing, dragging))
         path, areas = self._areas * self._path, self._areas
@@ -140,7 +140,7 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
         totals: Other additions.
         lost: Depths worn meanwhile.
     """
-    return with_worn(system, totals, lost, [bool(coating.any()) for coating in system.coatings])
+    return with_worn(system, totals, lost, [bool(coating.any()) for coating in system.laws.coatings])
 
 
 def with_worn(system: ContactSetup, totals: Totals, lost: WornDepths, counts: Sequence[bool] = (True, True)) -> Totals:
@@ -183,9 +183,9 @@ def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[Con
     Raises:
         CaseError: a coefficient is negative or not finite there.
     """
-    wear = system.wear.phases(conditions)
+    wear = system.phases.wear.phases(conditions)
     return [
-        PhaseMeter(system, k)(pressure[k], system.friction.values(state), wear.some([k]))
+        PhaseMeter(system, k)(pressure[k], system.laws.friction.values(state), wear.some([k]))
         for k, state in enumerate(conditions)
     ]
 
@@ -207,7 +207,7 @@ def counted_back(end: T, added: Sequence[T]) -> list[T]:
 
 def opposite_densities(system: ContactSetup, phase: int) -> tuple[Array | None, Array | None]:
     """Return the densities of punch and strip at the contact nodes in a phase, N s²/mm⁴."""
-    pair, (punch, strip) = system.pairs[phase], system.bodies.densities
+    pair, (punch, strip) = system.sliding.pairs[phase], system.bodies.densities
     if strip is None:
         return punch, None
     nodes = pair.strip.weights
@@ -285,7 +285,7 @@ def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> R
     return replace(
         state,
         worn=carried(state.worn, before, after),
-        memory=None if state.memory is None else after.contact_law.on_other_grid(state.memory, before, after),
+        memory=None if state.memory is None else after.law.on_other_grid(state.memory, before, after),
         contacts=tuple(contacts),
         totals=replace(
             totals, energy=on_nodes(totals.energy, nodes, none), pressure=on_nodes(totals.pressure, nodes, none)
@@ -329,4 +329,4 @@ def pressure_scales(system: Tribosystem, pressure: Array) -> Array:
     force = (np.abs(pressure) * weights).sum(axis=(1, 2))
     carried = (pressure**2 * weights).sum(axis=(1, 2))
     loaded = force > 0
-    return np.where(loaded, carried / np.where(loaded, force, 1.0), system.interface.pressure_scale)
+    return np.where(loaded, carried / np.where(loaded, force, 1.0), system.elastic.interface.pressure_scale)

@@ -34,6 +34,7 @@ from fenwear.algebra.assembled import interpolate
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.heat.temperature import HeatState
+from fenwear.laws.wear import WornDepths
 from fenwear.steps.block import Block
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.run_state import RunState, carried_by, on_other_grid
@@ -132,7 +133,7 @@ class _Leaving:
         self.system, self.given, self._heights_of = system, given, heights_of or system
         system.team.serve(self)
         if given is None:  # before rank 0 leads: the elements' heights take all ranks
-            self._heights_of.mesh_update_due(system.unworn())
+            self._mesh_update_due(system.unworn())
 
     def __call__(self, state: RunState) -> bool:
         """Return whether parts need an update; collective, or for rank 0 that leads."""
@@ -142,11 +143,15 @@ class _Leaving:
         """Return the parts to update; collective."""
         return self._renewal(state, self.is_warm)
 
+    def _mesh_update_due(self, worn: WornDepths) -> bool:
+        """Return whether the wear since the meshes were moved is large against the elements at the contact."""
+        return self._heights_of.bodies.wear_on_meshes(worn, self._heights_of.case) > 1
+
     def _renewal(self, state: RunState, is_warm: Callable[[RunState], bool]) -> Renewal | None:
         team = self.system.team
         if self.given is not None:
             return self.given.get(state.half_cycle)
-        if team.lead(partial(self._heights_of.mesh_update_due, state.worn)):
+        if team.lead(partial(self._mesh_update_due, state.worn)):
             return Renewal.MESHES
         if warming_key(self.system) and is_warm(state):
             return Renewal.PROPERTIES
@@ -223,9 +228,9 @@ def with_own_properties(
         ConvergenceError: the properties do not come to rest.
     """
     state, key = solve(system), warming_key(system)
-    if not key or system.heat is None:
+    if not key or system.case.heat is None:
         return state, 0
-    share = LEFT if within is None else within / system.heat.property_tolerance
+    share = LEFT if within is None else within / system.case.heat.property_tolerance
     followed, before = 1.0, np.inf
     for done in range(PASSES):
         end = temperatures(state)

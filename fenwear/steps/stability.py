@@ -118,9 +118,9 @@ def _parts(
     pressure, state_conductances = (
         (state, None) if isinstance(state, np.ndarray) else (state.phase_pressure, state.conductances)
     )
-    if system.passing_laws:
+    if system.case.passing_laws:
         raise CaseError(
-            InputError(system.passing_laws[0], "changes as long as it slides, so that no state grows or decays")
+            InputError(system.case.passing_laws[0], "changes as long as it slides, so that no state grows or decays")
         )
     shape = (len(system.motion.phases), len(system.pair.weights))
     if pressure.shape != shape:
@@ -136,7 +136,7 @@ def _factors(
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
-    dim = heat.dim + system.creep.size
+    dim = heat.dim + system.elastic.creep.size
     if system.layers.debris.present:
         dim += len(system.pair.strip.weights) if system.layers.strip_carries else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
@@ -157,7 +157,7 @@ def explicit_growth(system: Tribosystem) -> float | None:
     explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit ones let
     disturbances grow, too, and where it is unknown: without heat, or with laws that pass.
     """
-    if not system.exchange.conducts or system.passing_laws:
+    if not system.exchange.conducts or system.case.passing_laws:
         return None
     even = np.full((len(system.motion.phases), len(system.pair.weights)), system.rigid.mean_pressure)
     try:
@@ -226,16 +226,16 @@ def repeating_temperatures(
         ConvergenceError: there are none, or friction and the temperatures that it depends on do not converge.
     """
     heat = cycle_heat(system)
-    if not heat.dim or (system.constant_coefficients and not heat.exchange.by_pressure):
+    if not heat.dim or (system.phases.constant and not heat.exchange.by_pressure):
         return heat, []
     if conductances is None:
         conductances = heat.conductances(touching(pressure))
     surfaces: list[tuple[Array, Array] | None] = [None] * len(pressure)
     before = None
     for _ in range(MAX_ITERATIONS):
-        if not system.friction.constant:
-            conditions = [system.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
-            friction = [system.friction.values(c) for c in conditions]
+        if not system.laws.friction.constant:
+            conditions = [system.phases.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
+            friction = [system.laws.friction.values(c) for c in conditions]
             mu = np.array([heating_friction(system, ratio, phase) for phase, ratio in enumerate(friction)])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         exchange = heat.exchange
@@ -248,7 +248,7 @@ def repeating_temperatures(
             states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
         surfaces = [exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
         temperatures = np.array(surfaces)
-        if system.friction.constant:
+        if system.laws.friction.constant:
             return heat, states
         if before is not None and np.abs(temperatures - before).max() <= CLOSE * max(1.0, float(np.ptp(temperatures))):
             return heat, states
@@ -272,19 +272,20 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat, states: Seque
     if states:
         warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
     conditions = [
-        system.conditions(k, np.asarray(p), warmth) for k, (p, warmth) in enumerate(zip(pressure, warm, strict=True))
+        system.phases.conditions(k, np.asarray(p), warmth)
+        for k, (p, warmth) in enumerate(zip(pressure, warm, strict=True))
     ]
-    rest = system.rested(conditions)
+    rest = system.phases.rested(conditions)
     if not layers.debris.present:
         return rest
     thickness = layers.lies(rest)
     for _ in range(MAX_ITERATIONS):
         lying = layers.with_thickness(rest, thickness)
-        pairs = zip(conditions, system.pairs, strict=True)
+        pairs = zip(conditions, system.sliding.pairs, strict=True)
         now = [replace(condition, debris=layers.facing(pair, lying)) for condition, pair in pairs]
-        passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
+        passing, before = system.phases.passing(system.phases.wear.phases(now), None, None, now), thickness
         thickness = passing.resting_at_debris(pressure)
-        if not layers.varies and not system.asks("debris"):
+        if not layers.varies and not system.laws.asks("debris"):
             break
         if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):
             break
@@ -309,10 +310,13 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
     Raises:
         CaseError: the case has no heat, or a body no heat sink.
     """
-    n, rigid, friction_ratio = len(system.pair.weights), system.rigid, system.friction_ratio(direction)
-    compliance, balance = system.interface.compliance(friction_ratio).matrix(), rigid.equilibrium(friction_ratio)
+    n, rigid, friction_ratio = len(system.pair.weights), system.rigid, system.phases.middle_ratio(direction)
+    compliance, balance = (
+        system.elastic.interface.compliance(friction_ratio).matrix(),
+        rigid.equilibrium(friction_ratio),
+    )
     everywhere, none = np.ones(n, dtype=bool), np.zeros((len(balance), n))
-    pressed = answered(system.interface, compliance, balance, everywhere, np.eye(n), none)
+    pressed = answered(system.elastic.interface, compliance, balance, everywhere, np.eye(n), none)
     speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed
         exchange = steady_exchange(system, [direction * speed])
@@ -343,9 +347,9 @@ def stability_number(system: Tribosystem) -> float:
     error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
     the phase that wears most.
     """
-    ratios, largest = system.friction_ratios(), 0.0
+    ratios, largest = system.phases.ratios(), 0.0
     for phase, opened in system.team.lead(partial(_most_worn, system)):
-        interface = system.interfaces[phase]
+        interface = system.elastic.interfaces[phase]
         contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
         worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
         largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
@@ -356,11 +360,13 @@ def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
     """Return of each direction the phase that wears most, if any does, and its S b p^(b-1), on the strip's nodes."""
     n = len(system.rigid.rigid_normal)
     uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
-    wear = system.phases_wear
+    wear = system.phases.mean_wear
     slopes = sum((body.slope(uniform) for body in wear.bodies), np.zeros_like(uniform))
     directions, most = np.array(system.motion.directions), slopes.max(axis=1)
     phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
-    opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]
+    opened = [
+        system.phases.wear.phases([system.phases.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases
+    ]
     return [(k, slope) for k, slope in zip(phases, opened, strict=True) if slope.data.any()]
 
 
@@ -400,7 +406,9 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
         ConvergenceError: contact without heat did not converge.
     """
     exchange, positions = system.exchange, system.motion.positions
-    if not exchange.conducts or system.sticks:  # there every time step tells whether its answer is the only one near
+    if (
+        not exchange.conducts or system.law.sticks
+    ):  # there every time step tells whether its answer is the only one near
         return None
     gains = [0.0]
     for phase in range(positions // 2, len(system.motion.phases), positions):
@@ -413,7 +421,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
             continue
         slope = _steepest_traction(system, phase, carried, state)
         opened = opened_by_heat(system, phase, carried, slope, state)[closed]
-        sliding = SlidingContact(system.interfaces[phase], system.phase_friction(phase, slope))
+        sliding = SlidingContact(system.elastic.interfaces[phase], system.phases.ratio(phase, slope))
         contact = CondensedContact([sliding], team=system.team)
         modes = contact.size - len(closed)
         gains.append(contact.on_closed_contact(partial(_gain, opened, modes), closed))
@@ -422,9 +430,9 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None, state: HeatSta
 
 def _steepest_traction(system: Tribosystem, phase: int, pressure: Array, state: HeatState | None) -> Array:
     """Return the largest d(mu p)/dp of each node from no pressure to the largest one (n,)."""
-    exchange, friction = system.exchange, system.friction
+    exchange, friction = system.exchange, system.laws.friction
     surfaces = exchange.contact_temperatures(exchange.on_bases(state), phase - 1)
-    conditions = system.conditions(phase, pressure, surfaces)
+    conditions = system.phases.conditions(phase, pressure, surfaces)
     if not friction.asks("p", "pm"):
         return friction.values(conditions)
     levels = np.linspace(0.0, float(pressure.max()), LEVELS + 1)[:, None] * np.ones(len(pressure))
@@ -458,7 +466,7 @@ def opened_by_heat(
     if state is not None and rise.any():
         by_rise = system.exchange.by_conductance(phase, state, pressure, conductance) * rise
         changes = changes + by_rise[:, pressure > 0]
-    return np.asarray(exchange.gap_change(changes, phase) / system.interfaces[phase].elastic_length)
+    return np.asarray(exchange.gap_change(changes, phase) / system.elastic.interfaces[phase].elastic_length)
 
 
 def heat_warnings(gain: float | None, *, jumps: bool = False) -> list[str]:

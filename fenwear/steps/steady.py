@@ -150,7 +150,7 @@ class SteadyState:
     @property
     def complementarity_error(self) -> float:
         """Largest error of p >= 0, gap >= 0 and p gap = 0 in any half-cycle, over their scales."""
-        return float(complementarity_error(self.pressure, self.gap, self.system.interface.elastic_length).max())
+        return float(complementarity_error(self.pressure, self.gap, self.system.elastic.interface.elastic_length).max())
 
     def __repr__(self) -> str:
         """Say in a line what it is."""
@@ -178,7 +178,7 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
             properties of the temperatures.
     """
     system = at_step(system)
-    state: SteadyState = system.contact_law.end(system, properties_within)
+    state: SteadyState = system.law.end(system, properties_within)
     return state
 
 
@@ -225,10 +225,12 @@ def _why_none(system: Tribosystem, error: ConvergenceError) -> str:
     Raises:
         ConvergenceError: states of laws have no end.
     """
-    wear, shape = system.phases_wear, (len(system.motion.phases), len(system.pair.weights))
-    if float(wear.opening(np.full(shape, system.interface.pressure_scale)).max()) == 0:
+    wear, shape = system.phases.mean_wear, (len(system.motion.phases), len(system.pair.weights))
+    if float(wear.opening(np.full(shape, system.elastic.interface.pressure_scale)).max()) == 0:
         return NOTHING_WEARS
-    system.rested([system.conditions(phase) for phase in range(len(system.motion.phases))])  # or tells what goes on
+    system.phases.rested(
+        [system.phases.conditions(phase) for phase in range(len(system.motion.phases))]
+    )  # or tells what goes on
     if _loads_oppose(system):
         return NO_ONE_MOTION
     if wear.cap < np.inf:
@@ -238,7 +240,7 @@ def _why_none(system: Tribosystem, error: ConvergenceError) -> str:
             f"{error}; where much debris lies between, there may be several states, or none that is stable. Follow "
             "it by `run`, or give the debris a shorter life"
         )
-    if system.strip_wears or _uniform_wear_exists(system):
+    if system.sliding.strip_wears or _uniform_wear_exists(system):
         return str(error)
     return (
         f"{error}; no cyclic steady state exists: friction tips the punch so far that no pressures wear the whole "
@@ -248,9 +250,9 @@ def _why_none(system: Tribosystem, error: ConvergenceError) -> str:
 
 def _check_sinks(system: Tribosystem) -> None:
     """Raise where a body loses heat nowhere; collective."""
-    if not system.exchange.conducts or system.heat is None:
+    if not system.exchange.conducts:
         return
-    heat = system.heat
+    heat = system.exchange.heat
     shares = (heat.partition, 1 - heat.partition) if heat.conductance == 0 else (1.0, 1.0)
     for body, side, share in zip(system.bodies.heat, system.exchange.sides, shares, strict=True):
         if not side.cooled:
@@ -260,21 +262,21 @@ def _check_sinks(system: Tribosystem) -> None:
 
 def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays, or no one rigid motion can follow it."""
-    if system.track_deepens:
+    if system.sliding.track_deepens:
         raise ConvergenceError(
             "no cyclic steady state exists: the strip wears, and under a punch that moves to and fro its track deepens "
             "without end. Follow the wear by `run` with run.integration = "
             '"jump", or remove wear.strip'
         )
-    if system.passing_laws:
+    if system.case.passing_laws:
         raise ConvergenceError(
-            f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
+            f"no cyclic steady state exists: {system.case.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
-    if system.creep.endless:
+    if system.elastic.creep.endless:
         raise ConvergenceError(
-            f"no cyclic steady state exists: {system.creep.endless} grows with the logarithm of time, for ever. Follow "
-            "it by `run`, or give it terms alone"
+            f"no cyclic steady state exists: {system.elastic.creep.endless} grows with the logarithm of time, for "
+            "ever. Follow it by `run`, or give it terms alone"
         )
     if not np.abs(system.rigid.rigid_normal).max(initial=0.0):
         raise ConvergenceError(
@@ -290,10 +292,10 @@ def _loads_oppose(system: Tribosystem) -> bool:
     Worn depths of a cycle are H v, so that, without friction, sum of w p (H v) = -F v is positive for the loads F of
     each phase that wears, on the motions H of the middle position.
     """
-    pairs = zip(system.interfaces, rigid_of_phases(system), strict=True)
+    pairs = zip(system.elastic.interfaces, rigid_of_phases(system), strict=True)
     loads = np.array([-interface.rigid.resultant @ np.linalg.pinv(turned) for interface, turned in pairs])
-    loads = loads[system.path.max(axis=1) > 0]
-    loads = loads / system.mode_lengths
+    loads = loads[system.sliding.path.max(axis=1) > 0]
+    loads = loads / system.rigid.mode_lengths
     sizes = np.linalg.norm(loads, axis=1)
     loads = loads[sizes > 0] / sizes[sizes > 0, None]
     if not len(loads):
@@ -308,7 +310,7 @@ def _loads_oppose(system: Tribosystem) -> bool:
 
 def _none_under_cap(system: Tribosystem) -> str:
     """Return why there is no state where wear grows no more beyond a cap."""
-    mean, cap = system.interface.pressure_scale, system.phases_wear.cap
+    mean, cap = system.elastic.interface.pressure_scale, system.phases.mean_wear.cap
     laws = zip(("punch", "strip"), system.sliding.wear, strict=True)
     keys = [
         f"wear.{body}.{'pressure_cap' if law.per_area is None else 'touching_from'}"
@@ -337,8 +339,10 @@ class _End:
     def __init__(self, system: Tribosystem, hardness: float) -> None:
         self.system, self.hardness, self.stepper = system, hardness, Stepper(system, DIGITS, periodic=True)
         above = max(law.pressure_threshold for law in system.sliding.wear)
-        even = np.full((len(system.motion.phases), len(system.pair.weights)), system.interface.pressure_scale + above)
-        self._rate = float(system.phases_wear.opening(even).max()) / len(even)
+        even = np.full(
+            (len(system.motion.phases), len(system.pair.weights)), system.elastic.interface.pressure_scale + above
+        )
+        self._rate = float(system.phases.mean_wear.opening(even).max()) / len(even)
 
     def state(self) -> SteadyState:
         """Return the state.
@@ -348,7 +352,7 @@ class _End:
         """
         if self._rate == 0:
             raise ConvergenceError(NOTHING_WEARS)
-        wear = self.system.phases_wear
+        wear = self.system.phases.mean_wear
         loads_vary = (MIDWAY,) if self.system.motion.steps else ()
         try:
             end = self._resting(loads_vary if wear.punch.linear and wear.strip.linear else NEAR[::2])
@@ -358,7 +362,7 @@ class _End:
 
     def _resting(self, lengths: Sequence[float]) -> JumpMoment:
         """Return the end of steps of these lengths, and then of FAR, when the shape rests but for a rigid motion."""
-        system, interface, begin = self.system, self.system.interface, beginning(self.system)
+        system, interface, begin = self.system, self.system.elastic.interface, beginning(self.system)
         gap = interface.pressure_scale * interface.elastic_length
         at = self.stepper.moment(replace(begin, worn=begin.worn + self._coatings))
         near, far = [(length, NEARLY) for length in (*lengths, FAR)], [(FAR, FINE)] * MOST
@@ -370,19 +374,23 @@ class _End:
             change = np.abs(changed - _rigid_part(system, changed, touched))[touched].max()
             if digits == FINE and change <= RESTING * gap:
                 return then
-            at = then if system.coated else replace(then, worn=replace(then.worn, punch=then.worn.punch - moved))
+            at = (
+                then
+                if system.laws.any_coating
+                else replace(then, worn=replace(then.worn, punch=then.worn.punch - moved))
+            )
         raise ConvergenceError(f"the cyclic steady state did not converge in {MOST} steps")
 
     @property
     def _coatings(self) -> WornDepths:
         """Depths at which all coatings are worn through."""
-        punch, strip = self.system.coatings
+        punch, strip = self.system.laws.coatings
         return replace(self.system.unworn().times(0.0), punch=punch, strip=strip)
 
     def _shape(self, worn: WornDepths) -> Array:
         """Return the gap that depths and layers at rest open (n,), mm."""
         system = self.system
-        if system.track_changes:
+        if system.phases.track_changes:
             worn = replace(worn, carried=0 * worn.carried)
         return system.gap(0, worn) - system.pair.initial_gap
 
@@ -407,10 +415,15 @@ class _End:
         shape = self._shape(end.worn)
         closest = np.where(touched, shape, shape - contact.gap.min(axis=0))
         closest = closest - _rigid_part(system, shape, touched)
-        depths = np.linalg.lstsq(system.rigid.rigid_normal[touched] / system.mode_lengths, worn[touched], rcond=None)[0]
+        depths = np.linalg.lstsq(
+            system.rigid.rigid_normal[touched] / system.rigid.mode_lengths, worn[touched], rcond=None
+        )[0]
         depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
         middle = slice(motion.positions // 2, None, motion.positions)
-        passing, rest = system.passing(wear, conditions=stepper.conditions), system.rested(stepper.conditions)
+        passing, rest = (
+            system.phases.passing(wear, conditions=stepper.conditions),
+            system.phases.rested(stepper.conditions),
+        )
         return SteadyState(
             motion.stroke_directions,
             contact.pressure[middle],
@@ -420,7 +433,7 @@ class _End:
             closest,
             (contact.pressure[middle] > 0) @ weights,
             worn,
-            dict(zip(system.rigid.mode_names, (depths / system.mode_lengths).tolist(), strict=True)),
+            dict(zip(system.rigid.mode_names, (depths / system.rigid.mode_lengths).tolist(), strict=True)),
             contact.iterations,
             0.0,
             self._heat(end, conductances) if stepper.coupled.heat.dim else None,
@@ -428,7 +441,7 @@ class _End:
             system=system,
             conductances=conductances,
             debris=passing.resting(contact.pressure) if system.layers.debris.present else None,
-            crept=system.creep.depth(end.worn.crept),
+            crept=system.elastic.creep.depth(end.worn.crept),
             states=system.layers.memory.by_name(system.layers.held(rest)),
         )
 
@@ -468,10 +481,10 @@ def rigid_of_phases(system: Tribosystem) -> Array:
 def _uniform_wear_exists(system: Tribosystem) -> bool:
     """Return whether any pressures of the phases wear the whole contact by a rigid motion (b = 1)."""
     n, r = system.rigid.rigid_normal.shape
-    m, lengths = len(system.motion.phases), system.mode_lengths
+    m, lengths = len(system.motion.phases), system.rigid.mode_lengths
     balances: list[Array] = []
     target: list[Array] = [np.zeros(n)]
-    for interface, friction_ratio in zip(system.interfaces, system.friction_ratios(), strict=True):
+    for interface, friction_ratio in zip(system.elastic.interfaces, system.phases.ratios(), strict=True):
         balances.append(interface.rigid.equilibrium(friction_ratio) / lengths[:, None])
         target.append(-interface.rigid.resultant / lengths)
     motion = -system.rigid.rigid_normal / lengths

@@ -66,11 +66,11 @@ def cycle_of_state(state: SteadyState) -> SteadyCycle:
     system, warm, positions = state.system, state.heat, state.system.motion.positions
     latest = None if warm is None else (warm.punch[-1], warm.strip[-1])
     each: list[tuple[int, Array]] = [(k, np.asarray(p)) for k, p in enumerate(state.phase_pressure)]
-    states = [system.conditions(k, p, latest, None, None) for k, p in each]
+    states = [system.phases.conditions(k, p, latest, None, None) for k, p in each]
     if system.layers.memory.names:
-        rest = system.rested(states)
-        states = [system.conditions(k, p, latest, rest, None) for k, p in each]
-    adds, rate = phase_totals(system, state.phase_pressure, states), system.wear.phases(states)
+        rest = system.phases.rested(states)
+        states = [system.phases.conditions(k, p, latest, rest, None) for k, p in each]
+    adds, rate = phase_totals(system, state.phase_pressure, states), system.phases.wear.phases(states)
     half_cycles = stacked([reduce(Totals.__add__, adds[k : k + positions]) for k in range(0, len(adds), positions)])
     heat = None if warm is None else heat_of(warm.punch, warm.strip)
     worn = rate.worn(state.phase_pressure)

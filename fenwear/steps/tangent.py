@@ -55,10 +55,10 @@ def phase_tangent(
         implicit: Whether the wear is.
         worn: With debris, and the states that laws remember, which disturbances leave; by default those at the start.
     """
-    n, interface, creep = len(pressure), system.interfaces[phase], system.creep
+    n, interface, creep = len(pressure), system.elastic.interfaces[phase], system.elastic.creep
     laws, rigid = _laws(system, phase, pressure, heat, state, worn), interface.rigid
     dim = laws.mu_s.shape[1]
-    friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
+    friction_ratio, further = (system.phases.ratio(phase, mu) for mu in (laws.mu, laws.mu + 1))
     by_mu = Compliance(interface, (further - friction_ratio)[:, :, None], {}).matrix()  # all are linear in mu
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
@@ -122,7 +122,7 @@ def lies_after(
     if worn is None or not system.layers.debris.present:
         return worn
     conditions = _conditions(system, phase, pressure, heat, state, worn)
-    passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
+    passing = system.phases.passing(system.phases.wear.phases([conditions], [phase]), [phase], None, [conditions])
     added, _ = passing.debris_changes(pressure[None], worn, None)
     return system.layers.with_thickness(worn, system.layers.lies(worn) + added)
 
@@ -190,7 +190,7 @@ def _conditions(
 ) -> ContactConditions:
     """Return the conditions of a phase, at the temperatures and with the layers of its start."""
     surfaces = None if state is None else heat.exchange.contact_temperatures(state, phase - 1)
-    return system.conditions(phase, pressure, surfaces, worn)
+    return system.phases.conditions(phase, pressure, surfaces, worn)
 
 
 def _laws(
@@ -209,13 +209,13 @@ def _laws(
         return replace(conditions, pressure=p, temperatures=(punch, strip), debris=debris[0] if debris else 0.0)
 
     def friction(*values: Array) -> Array:
-        return system.friction.values(at(*values))
+        return system.laws.friction.values(at(*values))
 
     def depths(*values: Array) -> Array:
-        wear = system.wear.phases([at(*values)], [phase])
+        wear = system.phases.wear.phases([at(*values)], [phase])
         return np.array([body.depth(values[0][None])[0] for body in (wear.punch, wear.strip)])
 
-    wear = system.wear.phases([at(*around)], [phase])
+    wear = system.phases.wear.phases([at(*around)], [phase])
     mu_p, *mu_t = _slopes(friction, around)
     by_depths = _slopes(depths, around)
     worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
@@ -260,7 +260,7 @@ def _lying(
     Returns:
         Its remaining share (L, L), its derivatives at the end (L, n), and its part at the contact's nodes (n, L).
     """
-    layers, pair, path = system.layers, system.pairs[phase], system.path[phase]
+    layers, pair, path = system.layers, system.sliding.pairs[phase], system.sliding.path[phase]
     reads, puts = np.eye(len(path)), np.eye(len(path))
     if layers.strip_carries:
         reads, puts = pair.wear_interpolation.toarray(), pair.wear_projection.toarray()

@@ -169,8 +169,8 @@ class Model:
     ) -> tuple[float, float]:
         """Return the distance slid in a cycle, mm, mean over the contact surface, and its duration, s."""
         system = self.system(values, settings)
-        states = [system.conditions(k) for k in range(len(system.pairs))]
-        unpressed = np.zeros((len(system.pairs), len(system.pair.weights)))
+        states = [system.phases.conditions(k) for k in range(len(system.sliding.pairs))]
+        unpressed = np.zeros((len(system.sliding.pairs), len(system.pair.weights)))
         return float(cycle_totals(system, unpressed, states).of("distance")), system.motion.period
 
     def run(
@@ -257,7 +257,7 @@ class Model:
         self._check_stays()
         system = self.system(values, settings)
         self.evaluations += 1
-        if system.sticks:
+        if system.law.sticks:
             end = cycle_of_final(cast(FinalShape, steady(system)))  # under Coulomb's law
         else:
             end = cycle_of_state(steady(system, properties_within=WITHIN if self.warming else None))
@@ -299,7 +299,7 @@ class Model:
             CaseError: nodes stick or slip by themselves.
         """
         system = self.system(values, settings)
-        if system.sticks:
+        if system.law.sticks:
             message = (
                 "has no value in partial slip: wear continues until slipping nodes carry nothing. Use gross sliding"
             )
@@ -402,6 +402,8 @@ def snapshot_of(block: Block) -> Snapshot:
     else:
         pressure, heat = pressure if len(pressure) else block.pressure, block.heat
         latest = None if heat is None else (heat.temperature_punch[-1], heat.temperature_strip[-1])
-        states = [system.conditions(k, np.asarray(p), latest, end.worn, end.half_cycle) for k, p in enumerate(pressure)]
-        rate = system.wear.phases(states).worn(pressure)
+        states = [
+            system.phases.conditions(k, np.asarray(p), latest, end.worn, end.half_cycle) for k, p in enumerate(pressure)
+        ]
+        rate = system.phases.wear.phases(states).worn(pressure)
     return Snapshot(float(block.half_cycle[-1] // strokes), block, rate, pressure)

@@ -137,7 +137,7 @@ def run_with(
     for line in resolved.system.bodies.solved_by:
         log(line)
     if not resume:
-        resolved.system.check_touching()
+        resolved.system.law.check_touching(resolved.system)
     how = {"setup_seconds": time.perf_counter() - begin, **resolved.numbers}
     directory = Path(output) if output else on_root(comm, lambda: free_directory(Path("results") / name))
     try:
@@ -171,7 +171,7 @@ def _run(
             ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": time.perf_counter() - begin}
             summary = run.finish(run.last, ended)
     # Who interrupts a run is in a hurry: its figures can be drawn later.
-    hurry = isinstance(failure, InterruptedRunError) or agreed(system.comm, signals.received)
+    hurry = isinstance(failure, InterruptedRunError) or agreed(system.bodies.comm, signals.received)
     if run.last is not None and not hurry:
         summary |= run.uncertainty_and_report(run.last, summary, uncertain=failure is None)
     if failure is not None:
@@ -221,7 +221,7 @@ class _Run:
 
     def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
-        self.comm, self.case = system.comm, system.case
+        self.comm, self.case = system.bodies.comm, system.case
         self.watch = StateMonitor(system)
         start: RunState | None = None
         self.extremes: dict[str, float] = {}  # of all half-cycles so far
@@ -249,7 +249,7 @@ class _Run:
         self.warnings: list[str] = []
         self.remedies: Counter[str] = Counter()
         self.unique: list[Mask] = []  # of time steps, whether their answer was the only one near
-        if self.case.run.integration == "explicit" and not system.sticks:
+        if self.case.run.integration == "explicit" and not system.law.sticks:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = explicit_warnings(system, self.numbers["wear_step_over_explicit_limit"])
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
@@ -405,7 +405,7 @@ class _Run:
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
-        friction = block.friction_ratio[-1] if self.system.sticks else None
+        friction = block.friction_ratio[-1] if self.system.law.sticks else None
         direction, worn = int(block.direction[-1]), block.end.worn
         now = block.pressure[-1], block.rigid[-1], phase
         fields = body_fields(pressed, *now, temperatures, friction, worn)
@@ -451,7 +451,7 @@ class _Run:
 
     def finish(self, last: Block, how: dict[str, Any]) -> dict[str, Any]:
         """Write the checkpoint first, then fields and summary of a run, and return the summary; collective."""
-        said = [self.system.names.with_names(text) for text in self._warnings_at_the_end(last)]
+        said = [self.system.case.names.with_names(text) for text in self._warnings_at_the_end(last)]
         self._save()
         how |= {"warnings": said, "retries": self.remedies}
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
@@ -491,7 +491,7 @@ class _Run:
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
         pressure, motion = all_phases(self.state.contacts).pressure, self.system.motion
-        if last.heat is None or not len(pressure) or self.system.track_changes or self.system.sticks:
+        if last.heat is None or not len(pressure) or self.system.phases.track_changes or self.system.law.sticks:
             return ""
         if self.case.program is not None and self.case.program.steps[-1].ramps:
             return "the last step of the program changes speed or loads, so that no state is stationary"
@@ -515,9 +515,9 @@ def level_of(case: Case) -> RunLevel | NoLevel:
 
 def position_warnings(system: Tribosystem) -> list[str]:
     """Return the warnings of the positions of a strip that wears, or that is uneven."""
-    spacing, motion = system.position_spacing, system.motion
+    spacing, motion = system.sliding.position_spacing, system.motion
     stands = _standing_profile(system)
-    if stands or not system.track_changes or spacing <= FAR_APART:
+    if stands or not system.phases.track_changes or spacing <= FAR_APART:
         return stands
     wanted = int(np.ceil(motion.positions * spacing))
     return [
@@ -536,7 +536,7 @@ def _with_positions(number: int) -> str:
 
 def _standing_profile(system: Tribosystem) -> list[str]:
     """Return the warning of an uneven strip that slides by: in each position it stands still."""
-    slid = system.position_spacing or float(system.path.max()) / system.pair.punch.spacing()
+    slid = system.sliding.position_spacing or float(system.sliding.path.max()) / system.pair.punch.spacing()
     rough = bool(system.pair.strip.heights.any())
     if not system.case.passes or slid <= 1 or not (rough or _uneven(system)):
         return []

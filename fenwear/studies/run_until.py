@@ -59,7 +59,7 @@ class RunLevel:
     def summary(self, system: Tribosystem, state: RunState, log: Log) -> dict[str, Any]:
         """Return when the level that ends the run is reached, and log it."""
         cycles = state.half_cycle / system.motion.half_cycles
-        distance, time = float(state.totals.of("distance")), float(system.time(np.array(state.half_cycle)))
+        distance, time = float(state.totals.of("distance")), float(system.sliding.time(np.array(state.half_cycle)))
         if self.reached:
             way = f"{distance / 1e3:.5g} m, {time:.5g} s"
             log(f"{self.text} is reached after {cycles:,.6g} cycles, {way}")

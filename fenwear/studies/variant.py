@@ -101,7 +101,7 @@ def _final_shape(system: Tribosystem) -> Values:
     size = "stick_area" if system.pair.punch.dim == 3 else "stick_width"
     values |= {size: np.array(final.size), "wear": final.worn.punch, "largest_depth": final.worn.punch.max()}
     values["worn_volume"] = np.array(thickness * float(system.pair.weights @ final.worn.punch))
-    if system.strip_wears:
+    if system.sliding.strip_wears:
         values["largest_depth_strip"] = np.array(final.worn.strip.max())
         volume = thickness * float(system.pair.strip.weights @ final.worn.strip)
         values["worn_volume_strip"] = np.array(volume)
@@ -109,7 +109,7 @@ def _final_shape(system: Tribosystem) -> Values:
 
 
 def _steady(system: Tribosystem) -> Values:
-    if system.sticks:
+    if system.law.sticks:
         return _final_shape(system)
     state = steady(system)
     return {

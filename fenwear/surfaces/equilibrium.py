@@ -44,6 +44,11 @@ class RigidEquilibrium:
         """H (n, modes), the gap opened by each rigid mode."""
         return np.einsum("id,idm->im", self.pair.normal, self.motion)
 
+    @cached_property
+    def mode_lengths(self) -> Array:
+        """Largest displacement along e_n of each rigid mode for a unit velocity (modes,): 1, and mm for a rotation."""
+        return np.abs(self.rigid_normal).max(axis=0, initial=1e-300)
+
     def equilibrium(self, friction_ratio: Array | float) -> Array:
         """Return the load on each mode (modes, n) that pressure at each node balances.
 

@@ -13,7 +13,7 @@ takes again what a changed case makes necessary, and keeps the rest.
 
 from fenwear.system.both_bodies import Bodies, build_bodies, build_conduction, elastic_body
 from fenwear.system.contact_laws import ContactLaw, law_named, register_contact_law
-from fenwear.system.contact_setup import Clock, ContactSetup
+from fenwear.system.contact_setup import ContactSetup, PhaseLaws
 from fenwear.system.growing_grids import (
     answers_anywhere,
     at_rim,
@@ -32,10 +32,11 @@ from fenwear.system.growing_grids import (
 )
 from fenwear.system.memory_estimate import Resources, setup_resources
 from fenwear.system.placing import place, place_at_rest, place_case_bodies
-from fenwear.system.strokes import Sliding, make_sliding
+from fenwear.system.strokes import Clock, PlacedSliding, Sliding, make_sliding
 from fenwear.system.surface_creep import Creep, CreepStage
 from fenwear.system.tribosystem import (
     Condensed,
+    ElasticContact,
     Preparation,
     Tribosystem,
     elastic,
@@ -43,7 +44,10 @@ from fenwear.system.tribosystem import (
     friction_power,
     heating_friction,
     heating_frictions,
+    isothermal,
     joined,
+    layer_conductance,
+    led,
     preparation,
     resources_of,
     steady_exchange,
@@ -73,6 +77,9 @@ __all__ = [
     "ContactSetup",
     "Creep",
     "CreepStage",
+    "ElasticContact",
+    "PhaseLaws",
+    "PlacedSliding",
     "Preparation",
     "Resources",
     "Sliding",
@@ -91,9 +98,12 @@ __all__ = [
     "heating_friction",
     "heating_frictions",
     "in_parts",
+    "isothermal",
     "joined",
     "kept_volume",
     "law_named",
+    "layer_conductance",
+    "led",
     "make_sliding",
     "node_maps",
     "on_first_contact",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -17,7 +18,7 @@ from fenwear.bodies.elastic_material import isotropic, nodal_function
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material_regions import contact_density, contact_regions
 from fenwear.bodies.surface_operators import check_operators
-from fenwear.bodies.worn_mesh import follow_wear, movable_surface
+from fenwear.bodies.worn_mesh import element_height, follow_wear, movable_surface
 from fenwear.case import Body, Case
 from fenwear.case.body_names import ROLES, with_body_names
 from fenwear.common.arrays import Array
@@ -164,6 +165,25 @@ class Bodies:
                     "contact does not carry them. Load a group that is free to move that way"
                 )
         return texts
+
+    @cached_property
+    def element_heights(self) -> WornDepths:
+        """Height of the elements at the contact nodes of both bodies, mm; collective at first."""
+        return WornDepths(element_height(self.punch), element_height(self.strip))
+
+    def wear_on_meshes(self, worn: WornDepths, case: Case) -> float:
+        """Return the largest wear since the meshes were moved over that from which on they follow; 0 where none do.
+
+        Args:
+            worn: Depths.
+            case: The problem.
+        """
+        limit = case.geometry.follow_wear
+        if limit is None or self.punch.surface.grid is not None:  # nothing of a grid's wear is the mesh's
+            return 0.0
+        heights, rest = self.element_heights, worn if self.followed is None else worn - self.followed
+        pairs = ((rest.punch, heights.punch), (rest.strip, heights.strip))
+        return max(float((np.abs(depth) / (limit * height)).max(initial=0.0)) for depth, height in pairs)
 
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""

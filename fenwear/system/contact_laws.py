@@ -25,8 +25,8 @@ GROSS, AUTO = "gross-sliding", "auto"
 LAWS: dict[str, Any] = {GROSS: "fenwear.steps.gross_sliding", "coulomb": "fenwear.steps.coulomb"}
 
 
-def law_named(name: str) -> Any:
-    """Return a law of contact, a `ContactLaw`, by its name in cases; `auto` gives gross sliding."""
+def law_named(name: str) -> ContactLaw:
+    """Return a law of contact by its name in cases; `auto` gives gross sliding."""
     law = LAWS[GROSS if name == AUTO else name]
     return _law_of(law) if isinstance(law, str) else law
 

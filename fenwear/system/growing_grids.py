@@ -24,7 +24,6 @@ from fenwear.common.arrays import Array, Mask
 from fenwear.laws.wear import WornDepths
 from fenwear.system.both_bodies import with_surfaces
 from fenwear.system.contact_grids import on_grid
-from fenwear.system.contact_laws import ContactLaw
 from fenwear.system.contact_setup import ContactSetup
 from fenwear.system.placing import place_case_bodies
 from fenwear.system.strokes import make_sliding
@@ -73,8 +72,7 @@ def regridded(system: Tribosystem, grid: RegularGrid) -> Tribosystem:
     """Return a system on another grid of its punch; collective."""
     before = system.bodies
     punch, strip = on_grid(system.case, system.sliding, before.punch, before.strip, grid)
-    law: ContactLaw = system.contact_law
-    return law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
+    return system.law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
 
 
 def placed_on(placed: ContactSetup, grid: RegularGrid) -> ContactSetup:
@@ -96,7 +94,8 @@ def relaid(system: Tribosystem, case: Case, grid: RegularGrid | None = None) -> 
     reach = system.bodies.punch.reach
     first = (grid or system.pair.punch.grid) if reach is None else reach.grid
     assert first is not None
-    return on_first_contact(regridded(replace(system, case=case, sliding=make_sliding(case)), first))
+    sliding = make_sliding(case).over(system.pair, system.sliding.pairs)
+    return on_first_contact(regridded(replace(system, case=case, sliding=sliding), first))
 
 
 def answers_anywhere(system: Tribosystem) -> bool:
@@ -182,7 +181,7 @@ def carried(worn: WornDepths, before: Tribosystem, after: Tribosystem) -> WornDe
     (on_punch, on_strip), start = node_maps(before, after), after.unworn()
     return replace(
         start,
-        crept=after.creep.from_other(before.creep, worn.crept, on_punch),
+        crept=after.elastic.creep.from_other(before.elastic.creep, worn.crept, on_punch),
         punch=kept_volume(worn.punch, on_punch, before.pair.weights, after.pair.weights),
         strip=kept_volume(worn.strip, on_strip, before.pair.strip.weights, after.pair.strip.weights),
         between=on_nodes(worn.between, on_punch, start.between),

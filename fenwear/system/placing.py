@@ -29,6 +29,7 @@ from fenwear.surfaces.motion import DEFAULT_POSITIONS, Motion
 from fenwear.surfaces.placement import HERE
 from fenwear.surfaces.track import Border, on_closed_track
 from fenwear.system.both_bodies import Bodies
+from fenwear.system.contact_laws import ContactLaw
 from fenwear.system.contact_setup import ContactSetup
 from fenwear.system.strokes import Sliding, check_stays, make_sliding
 
@@ -82,18 +83,17 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
         if moved not in made:
             made[moved] = rigid_equilibrium(pairs[moved], bodies.punch, bodies.strip)
         rigids.append(made[moved])
+    passage = None if case.heat is None else _passage(middle, sliding, rings=rings)
     placed = ContactSetup(
         bodies=bodies,
-        sliding=sliding,
-        heat=case.heat,
+        sliding=sliding.over(middle, [pairs[at] for at in places], passage),
         case=case,
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
-        passage=None if case.heat is None else _passage(middle, sliding, rings=rings),
     )
-    for phase, equilibrium, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        when, key = f"in {placed.direction_words[phase.direction]} sliding", "punch.loads"
+    for phase, equilibrium, ratio in zip(sliding.motion.phases, rigids, placed.phases.ratios(), strict=True):
+        when, key = f"in {placed.sliding.words[phase.direction]} sliding", "punch.loads"
         if isinstance(case.motion, Cycle):
             row = int(np.searchsorted(case.motion.course.fraction, phase.fraction))
             when, key = f"from row {row} to row {row + 1}", "punch.loads" if case.motion.load is None else "motion.load"
@@ -103,7 +103,7 @@ def place(bodies: Bodies, sliding: Sliding, case: Case) -> ContactSetup:
 
 @with_body_names
 def place_at_rest(
-    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case, *, passes: bool = False
+    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: ContactLaw, case: Case, *, passes: bool = False
 ) -> ContactSetup:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 
@@ -113,7 +113,7 @@ def place_at_rest(
         bodies: Both bodies, under the mean of their loads.
         sliding: Motion, friction and wear; a phase for each half-cycle.
         middle: The surfaces there.
-        law: Of the contact, by its name.
+        law: Of the contact.
         case: The problem.
         passes: Whether the strip's material moves past the punch's.
     """
@@ -125,14 +125,12 @@ def place_at_rest(
     ]
     return ContactSetup(
         bodies=bodies,
-        sliding=sliding,
-        heat=case.heat,
+        sliding=sliding.over(middle, (middle,) * len(loaded), passes=passes),
         law=law,
         case=case,
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
-        passes=passes,
     )
 
 
@@ -185,11 +183,16 @@ def _wanted(case: Case, placed: ContactSetup) -> int:
     Of a program the longest stroke counts. None are added on contact grids, which cover what positions need, nor with
     heat, whose response is another in each.
     """
-    if not case.leaves_positions or not placed.track_varies or case.grid is not None or case.heat is not None:
+    if (
+        not case.leaves_positions
+        or not (case.strip_varies and placed.sliding.to_and_fro)
+        or case.grid is not None
+        or case.heat is not None
+    ):
         return 0
     longest = max([_step(make_sliding(stage.case).motion) for stage in stages_of(case)], default=0.0)
     step = _step(placed.motion)
-    spacing = placed.position_spacing * max(1.0, longest / step if step else 1.0)
+    spacing = placed.sliding.position_spacing * max(1.0, longest / step if step else 1.0)
     nearest = int(np.ceil(DEFAULT_POSITIONS * spacing))
     most = min(MOST, int(ENTRIES / len(placed.pair.x) ** 2))
     return min(nearest + 1 - nearest % 2, most - 1 + most % 2)  # odd: one is the middle of the stroke

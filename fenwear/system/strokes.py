@@ -3,20 +3,43 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.case import Case, Cycle, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
+from fenwear.heat.passage import Passage
 from fenwear.laws.friction import Friction
 from fenwear.surfaces import ContactPair, Placement
 from fenwear.surfaces.motion import DEFAULT_POSITIONS, Motion, Phase, make_motion
 from fenwear.surfaces.placement import in_space
-from fenwear.surfaces.sliding_field import ALONG_X, ALONG_Y, SlidingField
+from fenwear.surfaces.sliding_field import ALONG_X, ALONG_Y, SlidingField, node_rates
 
 OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 FACET = 0.1  # the same at a single node, beside facets of no regular form
+
+
+ROUNDING = 1e-12  # of the mean speed: phases whose speeds differ by less are alike
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When a motion began that is one of several.
+
+    Attributes:
+        half_cycles: Before it.
+        time: s.
+        slid: Distance of the motions before it, mm or rad.
+    """
+
+    half_cycles: int = 0
+    time: float = 0.0
+    slid: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -30,6 +53,7 @@ class Sliding:
         wear: The wear laws of punch and strip; `NoWear` where a body does not wear.
         track: Closure of the track that a wearing strip runs on: its length, mm, or 2 pi rad; None for none.
         to_and_fro: Whether the strip's worn track passes to and fro under the punch.
+        clock: When the motion began.
     """
 
     motion: Motion
@@ -38,6 +62,7 @@ class Sliding:
     wear: tuple[WearLaw, WearLaw]
     track: float | None = None
     to_and_fro: bool = False
+    clock: Clock = Clock()
 
     def measured_on(self, middle: ContactPair) -> Sliding:
         """Return the sliding with steps of a table counted by the mean distance that contact nodes slide, mm."""
@@ -52,6 +77,119 @@ class Sliding:
     def placement(self, phase: Phase) -> Placement:
         """Return the place of the strip in a phase."""
         return phase.place if self.motion.steps else self.field.placement(phase.offset)
+
+    def over(
+        self, middle: ContactPair, pairs: Sequence[ContactPair], passage: Passage | None = None, *, passes: bool = True
+    ) -> PlacedSliding:
+        """Return the sliding of surfaces opposite each other, see `PlacedSliding`."""
+        given = {one.name: getattr(self, one.name) for one in fields(Sliding)}
+        return PlacedSliding(**given, middle=middle, pairs=tuple(pairs), passage=passage, passes=passes)
+
+    def time(self, half_cycle: NDArray[np.int64]) -> Array:
+        """Return the time at the end of half-cycles, given by their numbers from 1, s."""
+        return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
+
+    def slid_after(self, half_cycles: float) -> float:
+        """Return the sliding distance after half-cycles of the run, mm or rad; of tables the number of cycles."""
+        each = 1.0 if self.motion.steps else sum(phase.distance for phase in self.motion.phases)
+        return self.clock.slid + (half_cycles - self.clock.half_cycles) / self.motion.half_cycles * each
+
+    @property
+    def strip_wears(self) -> bool:
+        """Whether the strip has a wear law."""
+        return self.wear[1].wears
+
+    @property
+    def track_deepens(self) -> bool:
+        """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
+        return self.strip_wears and self.to_and_fro
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedSliding(Sliding):
+    """The sliding of surfaces opposite each other.
+
+    Attributes:
+        middle: The surfaces in the middle position.
+        pairs: The surfaces in each phase.
+        passage: Where the punch is on a strip that conducts and passes under it to and fro; None where none does.
+        passes: Whether the strip's material moves past the punch's; not where nodes stick and it stays opposite.
+    """
+
+    middle: ContactPair
+    pairs: tuple[ContactPair, ...]
+    passage: Passage | None = None
+    passes: bool = True
+
+    def field_of(self, phase: int) -> SlidingField:
+        """Return the sliding field of a phase, in its direction of the motion or as a step of a table."""
+        return self.motion.phases[phase].field or self.field
+
+    def rates(self, power: float) -> Array:
+        """Return the sliding of nodes in each phase for a unit of the stroke's law (phases, n), see `node_rates`."""
+        return np.array([node_rates(self.field_of(phase), pair, power) for phase, pair in enumerate(self.pairs)])
+
+    @cached_property
+    def ratio(self) -> Array:
+        """Sliding of each node in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
+        return self.rates(1.0)
+
+    @cached_property
+    def path(self) -> Array:
+        """Sliding of each node in each phase (phases, n), mm."""
+        return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.ratio
+
+    @cached_property
+    def directions(self) -> Array:
+        """Unit vectors of the sliding of each phase in space (m, n, 3), d e_v, or zero."""
+        return np.array(
+            [
+                phase.direction * self.field_of(k).direction(pair.opposite, pair.normal)
+                for k, (phase, pair) in enumerate(zip(self.motion.phases, self.pairs, strict=True))
+            ]
+        )
+
+    @cached_property
+    def speeds(self) -> tuple[Array, ...]:
+        """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
+        motion = self.motion
+        speeds = [np.asarray(phase.speed * rate) for phase, rate in zip(motion.phases, self.ratio, strict=True)]
+        mean = motion.mean_speed * node_rates(self.field, self.middle)
+        return (*speeds, self.path.sum(axis=0) / motion.period if motion.steps else mean)
+
+    @property
+    def steady_speed(self) -> Array:
+        """The speeds of the phases (n,) or (phases, n), mm/s: one where all are alike."""
+        speeds = np.array([np.broadcast_to(self.speeds[k], len(self.middle.weights)) for k in range(len(self.pairs))])
+        return speeds[0] if np.abs(speeds - speeds[0]).max() <= ROUNDING * np.abs(speeds).max() else speeds
+
+    @property
+    def words(self) -> dict[int, str]:
+        """The words for the two directions d of the sliding, 1 first; a table has one, through all of its steps."""
+        return {1: "cyclically", -1: "back"} if self.motion.steps else self.field.words(self.middle.punch.dim)
+
+    @property
+    def many_ways(self) -> bool:
+        """Whether places of a solid slide in directions of their own, step by step of a table, as a whole surface."""
+        return self.motion.steps and len(self.pairs) > 1 and self.middle.punch.dim == 3
+
+    @property
+    def position_spacing(self) -> float:
+        """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
+        offsets = np.unique([phase.offset for phase in self.motion.phases])
+        moved = self.path.max() if self.motion.steps else np.diff(offsets).max(initial=0.0) * self.ratio.max()
+        return float(moved / self.middle.punch.spacing())
+
+    @cached_property
+    def carried_areas(self) -> Array:
+        """Areas that nodes of the strip stand for where it carries debris (n_strip,), mm or mm².
+
+        On a closed track, of which the mesh is a part, those by which what is put on it keeps its volume.
+        """
+        if self.track is None:
+            return self.middle.strip.weights
+        onto = self.middle.wear_projection.toarray()
+        return np.asarray(np.linalg.lstsq(onto.T, self.middle.weights, rcond=None)[0])
 
 
 def make_sliding(case: Case, *, positions: int = DEFAULT_POSITIONS) -> Sliding:

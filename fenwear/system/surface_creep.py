@@ -347,7 +347,10 @@ def creep_of(
         interfaces: Both joined in each phase.
         on_material: Returns them joined in a phase with what the strip's own material answers, wherever it is.
     """
-    bodies, given = (placed.bodies.punch, placed.bodies.strip), getattr(placed.friction.contact.layer, "creep", None)
+    bodies, given = (
+        (placed.bodies.punch, placed.bodies.strip),
+        getattr(placed.laws.friction.contact.layer, "creep", None),
+    )
     laws = [Retardation.of(body.creep) for body in bodies]
 
     def by_supports(which: int, operator: SurfaceOperator) -> Array:

@@ -16,16 +16,15 @@ from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.response import Request, identity
 from fenwear.bodies.surface_operators import Relocatable, SurfaceOperator, operators_for
-from fenwear.case.body_names import with_body_names
 from fenwear.case.program import speeds_of
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.common.parallel import all_together
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
-from fenwear.heat.heat_exchange import HeatExchange
+from fenwear.heat.heat_exchange import HeatExchange, Isothermal
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
-from fenwear.laws import Layers
+from fenwear.laws import Layers, conductance_of
 from fenwear.laws.layers import SOFT
 from fenwear.laws.wear import WornDepths
 from fenwear.surfaces import Interface, RigidEquilibrium
@@ -38,7 +37,6 @@ from fenwear.system.surface_creep import Creep, creep_of
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
-CARRIED = 1e-6  # of the loads: what the contact carries by rounding
 SAME = 1e-12  # of the largest load: what of another is rounding
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
@@ -77,16 +75,14 @@ class Condensed:
         return replace(self, punch=self.punch.under(bodies.punch), strip=self.strip.under(bodies.strip))
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Tribosystem(ContactSetup):
-    """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
+@dataclass(frozen=True)
+class ElasticContact:
+    """Both bodies condensed and joined in every phase.
 
     Attributes:
         condensed: Both bodies' answers to forces on the contact.
         interface: The condensed interface in the middle position, under the mean loads.
         interfaces: The same in each phase.
-        exchange: The bodies' temperatures over the phases; isothermal without heat, or where it was not asked for.
-        law_state: Parts that the law of contact has prepared.
         creep: Creep of bodies and layer.
     """
 
@@ -94,32 +90,31 @@ class Tribosystem(ContactSetup):
     interface: Interface
     interfaces: tuple[Interface, ...]
     creep: Creep
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tribosystem(ContactSetup):
+    """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
+
+    Attributes:
+        elastic: Both bodies' elastic answers.
+        exchange: The bodies' temperatures over the phases; isothermal without heat, or where it was not asked for.
+        law_state: Parts that the law of contact has prepared.
+    """
+
+    elastic: ElasticContact
     exchange: HeatExchange
     law_state: Any = None
-
-    @property
-    def elastic_length(self) -> float:
-        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-        return float(self.contact_law.elastic_length(self))
 
     @cached_property
     def layers(self) -> Layers:
         """Layers between the surfaces, which flow beyond a hardness as softly as the bodies are elastic."""
         layers = super().layers
-        return layers if layers.hardness == np.inf else replace(layers, softness=SOFT * self.interface.elastic_length)
-
-    @property
-    def replicated(self) -> bool:
-        """Whether every rank could continue alone: no temperatures of all nodes, no contact on all displacements."""
-        return self.exchange.reduced
-
-    def led(self, function: Callable[[], T]) -> T:
-        """Call a function of prepared bodies, on rank 0 for all where possible, else on every rank; collective.
-
-        Raises:
-            Exception: what `function` raised, on every rank.
-        """
-        return self.team.lead(function) if self.replicated else function()
+        return (
+            layers
+            if layers.hardness == np.inf
+            else replace(layers, softness=SOFT * self.elastic.interface.elastic_length)
+        )
 
     def contact(self, directions: Sequence[int]) -> ContactSolver:
         """Return the contact in the middle position under the mean loads.
@@ -127,19 +122,17 @@ class Tribosystem(ContactSetup):
         Args:
             directions: Sliding direction d of each phase that is solved for.
         """
-        phases = [SlidingContact(self.interface, self.friction_ratio(d)) for d in directions]
-        return self._contact(phases)
+        return self._contact([SlidingContact(self.elastic.interface, self.phases.middle_ratio(d)) for d in directions])
 
     def phase_contact(self, phases: Sequence[int]) -> ContactSolver:
         """Return the contact of phases of the motion, given by their numbers."""
-        ratios = self.friction_ratios()
-        sliding = [SlidingContact(self.interfaces[k], ratios[k]) for k in phases]
-        return self._contact(sliding)
+        ratios = self.phases.ratios()
+        return self._contact([SlidingContact(self.elastic.interfaces[k], ratios[k]) for k in phases])
 
     def passed_contact(self, phase: int, *, capped: bool = True) -> ContactSolver:
         """Return the contact of a phase in a march, with creep and, where possible, plastic flow."""
         return self._contact(
-            [SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])],
+            [SlidingContact(self.elastic.creep.grown[phase], self.phases.ratios()[phase])],
             self.layers.hardness if capped else np.inf,
         )
 
@@ -152,46 +145,35 @@ class Tribosystem(ContactSetup):
             passing: Whether creep continues over the phase, in a march; else it is left out.
         """
         gap = super().gap(phase, worn)
-        return gap + self.creep.offset(phase, worn.crept) if passing and self.creep.creeps else gap
+        return gap + self.elastic.creep.offset(phase, worn.crept) if passing and self.elastic.creep.creeps else gap
 
     def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, with the initial layers and without creep."""
-        return replace(super().unworn(), crept=self.creep.beginning())
+        return replace(super().unworn(), crept=self.elastic.creep.beginning())
 
-    def _contact(
-        self,
-        phases: list[SlidingContact],
-        most: float = np.inf,
-    ) -> ContactSolver:
+    def _contact(self, phases: list[SlidingContact], most: float = np.inf) -> ContactSolver:
         return CondensedContact(phases, self.remedies, self.team, most)
 
-    @with_body_names
-    def check_touching(self) -> None:
-        """Make sure that the surfaces touch in some phase; collective.
 
-        Raises:
-            CaseError: they never meet: no pressure, no wear, nothing to follow.
-            ConvergenceError: the contact of a phase did not converge.
-        """
-        self.contact_law.check_touching(self)
+def led(system: Tribosystem, function: Callable[[], T]) -> T:
+    """Call a function of a prepared system, on rank 0 for all where possible, else on every rank; collective.
 
-    def check_carried(self, force: float) -> None:
-        """Raise where supports carry all of the loads.
+    Every rank calls it where temperatures of all nodes are asked for.
 
-        Args:
-            force: Of the contact, N/mm in the plane, N else.
-        """
-        bodies = (self.bodies.punch, self.bodies.strip)
-        given = max(float(np.abs(body.given).max(initial=0.0)) for body in bodies)
-        if self.rigid.mode_names or any(body.moved for body in bodies) or force * bodies[0].thickness > CARRIED * given:
-            return
-        raise CaseError(
-            InputError(
-                "punch.supports",
-                f"the supports carry all of the load of {given:.4g} N, and none of it reaches the contact. Free the "
-                "punch along the contact's normal, or move a support `by` an approach in place of the load",
-            )
-        )
+    Raises:
+        Exception: what `function` raised, on every rank.
+    """
+    return system.team.lead(function) if system.exchange.reduced else function()
+
+
+def isothermal(placed: ContactSetup) -> Isothermal:
+    """Return the exchange of bodies that stay at their initial temperature."""
+    return Isothermal(len(placed.rigids), len(placed.pair.weights), placed.case.initial_temperature)
+
+
+def layer_conductance(placed: ContactSetup) -> Callable[[Array], Array] | None:
+    """Return h_c by the pressures (n,), where the layer gives it (`fenwear.laws.contact_conductance`)."""
+    return conductance_of(placed.layers, placed.case, placed.bodies.regions, placed.pair)
 
 
 def resources_of(placed: ContactSetup) -> Resources:
@@ -202,7 +184,7 @@ def resources_of(placed: ContactSetup) -> Resources:
     axes = 1 if fixed else dim, 1 if not moves or (fixed and flat) else dim
     asked = (nodes, nodes * axes[0]), (on_strip, on_strip * axes[1])
     interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
-    return setup_resources(placed.bodies, nodes, asked, interfaces * dim + 2 * len(placed.pairs) + 1)
+    return setup_resources(placed.bodies, nodes, asked, interfaces * dim + 2 * len(placed.sliding.pairs) + 1)
 
 
 def elastic(placed: ContactSetup, *, fresh: bool = False) -> Tribosystem:
@@ -249,13 +231,13 @@ def condense_bodies(placed: ContactSetup, *, fresh: bool = False) -> Condensed:
     else:
         opposite = csr_array(middle.transfer.T)
         onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1])
-    if placed.passage is not None:
-        onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
+    if placed.sliding.passage is not None:
+        onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.sliding.passage)
     punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     check_felt(middle, bodies.punch, bodies.strip)
     for coupling in made:
         coupling.destroy()
-    if placed.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
+    if placed.sliding.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
         return Condensed(punch, strip, moves)
     n = len(middle.weights)
     return Condensed(punch, strip.first(n), moves, strip.by_temperature[n:])
@@ -303,11 +285,8 @@ def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | 
     creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
     return Tribosystem(
         **parts,
-        condensed=condensed,
-        interface=interface,
-        interfaces=interfaces,
-        exchange=exchange or placed.isothermal,
-        creep=creep,
+        elastic=ElasticContact(condensed, interface, interfaces, creep),
+        exchange=exchange or isothermal(placed),
     )
 
 
@@ -321,7 +300,7 @@ def _under_all(condensed: Condensed, placed: ContactSetup) -> dict[int, Condense
     if not others:
         return by_id
     loads = np.array([np.concatenate([bodies.punch.load, bodies.strip.load]) for bodies in (placed.bodies, *others)])
-    chosen, shares = _spanning(placed.comm, loads)
+    chosen, shares = _spanning(placed.bodies.comm, loads)
     base = [condensed if k == 0 else condensed.under_loads(others[k - 1]) for k in chosen]
     for share, bodies in zip(shares.T[1:], others, strict=True):
         if isinstance(condensed.punch, CondensedBody) and isinstance(condensed.strip, CondensedBody):
@@ -371,15 +350,17 @@ def answers_for(before: ContactSetup, placed: ContactSetup) -> bool:
     frame = _frame(placed)
     if _frame(before) != frame:
         return False
-    first, second = (np.zeros(0) if setup.passage is None else setup.passage.nodes for setup in (before, placed))
+    first, second = (
+        np.zeros(0) if setup.sliding.passage is None else setup.sliding.passage.nodes for setup in (before, placed)
+    )
     return np.array_equal(first, second)
 
 
 def _frame(placed: ContactSetup) -> tuple[bool, bool, bool]:
     """Return whether the strip moves as a whole, whether the frame stays, and whether the strip is flat."""
     middle = placed.pair
-    moves = any(pair.transfer is not middle.transfer for pair in placed.pairs)
-    fixed = all(_close(pair.normal, middle.normal) for pair in placed.pairs)
+    moves = any(pair.transfer is not middle.transfer for pair in placed.sliding.pairs)
+    fixed = all(_close(pair.normal, middle.normal) for pair in placed.sliding.pairs)
     return moves, fixed, not moves or _close(middle.normal_on_strip, middle.normal_on_strip[:1])
 
 
@@ -399,12 +380,12 @@ def with_exchange(
         keep: Whether what is reduced is kept on disk, and taken from there where it is.
         fresh: Reduce whatever is kept.
     """
-    if system.heat is None:
+    if system.case.heat is None:
         return system
-    all_together(system.comm)
-    reduced = system.heat.operator == "reduced" if reduced is None else reduced
+    all_together(system.bodies.comm)
+    reduced = system.case.heat.operator == "reduced" if reduced is None else reduced
     exchange = prepare_exchange(
-        system.heat,
+        system.case.heat,
         system.bodies.heat,
         system.pair,
         expansions(system),
@@ -413,28 +394,28 @@ def with_exchange(
         heating_frictions(system),
         system.bodies.punch.thickness,
         reduced=reduced,
-        passage=system.passage,
+        passage=system.sliding.passage,
         others=speeds_of(system.case),
         keep=keep,
         fresh=fresh,
     )
-    return replace(system, exchange=exchange.through(system.layer_conductance()))
+    return replace(system, exchange=exchange.through(layer_conductance(system)))
 
 
 def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = False) -> Tribosystem:
     """Return the system with its heat on a small basis, whatever the settings say; see `with_exchange`; collective."""
-    if system.heat is None or (system.exchange.conducts and system.exchange.reduced):
+    if system.case.heat is None or (system.exchange.conducts and system.exchange.reduced):
         return system
     return with_exchange(system, reduced=True, keep=keep, fresh=fresh)
 
 
 def preparation(system: Tribosystem) -> Preparation:
     """Return the preparation of the heat of a system: "reduced" where its settings do not say so themselves."""
-    if system.heat is None:
+    if system.case.heat is None:
         return "as set"
     if not system.exchange.conducts:
         return "none"
-    return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
+    return "reduced" if system.exchange.reduced and system.case.heat.operator != "reduced" else "as set"
 
 
 def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:
@@ -443,10 +424,10 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     Raises:
         CaseError: there is no heat, or a body has no heat sink.
     """
-    if system.heat is None:
+    if system.case.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
     exchange = prepare_steady(
-        system.heat,
+        system.case.heat,
         system.bodies.heat,
         system.pair,
         expansions(system, in_middle=True),
@@ -455,7 +436,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         heating_friction(system, mean_friction(system)),
         system.bodies.punch.thickness,
     )
-    return exchange.through(system.layer_conductance())
+    return exchange.through(layer_conductance(system))
 
 
 def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:
@@ -468,7 +449,7 @@ def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, 
     Returns:
         At the contact nodes (n, owned) each, or of a strip that passes under the punch at its passage's (q, owned).
     """
-    condensed = system.condensed
+    condensed = system.elastic.condensed
     punch, strip = condensed.punch.by_temperature, condensed.strip.by_temperature
     if condensed.passed is not None and not in_middle:
         strip = condensed.passed
@@ -485,7 +466,7 @@ def friction_power(system: ContactSetup) -> float:
 
 def mean_friction(system: ContactSetup) -> Array:
     """Return mu at the mean pressure and speed (n,)."""
-    return system.friction.values(system.conditions(MIDDLE))
+    return system.laws.friction.values(system.phases.conditions(MIDDLE))
 
 
 def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Array:
@@ -496,7 +477,7 @@ def heating_friction(system: ContactSetup, mu: Array, phase: int = MIDDLE) -> Ar
         mu: (n,).
         phase: Number of the phase; MIDDLE for the field of the whole motion.
     """
-    return mu * (system.sliding_ratio[phase] if phase >= 0 else node_rates(system.sliding.field, system.pair))
+    return mu * (system.sliding.ratio[phase] if phase >= 0 else node_rates(system.sliding.field, system.pair))
 
 
 def heating_frictions(system: ContactSetup) -> Array:

@@ -24,7 +24,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.wear import WornDepths
 from fenwear.system.both_bodies import Bodies, build_bodies, build_conduction, elastic_body
-from fenwear.system.contact_laws import ContactLaw, law_named
+from fenwear.system.contact_laws import law_named
 from fenwear.system.contact_setup import ContactSetup
 from fenwear.system.growing_grids import answers_anywhere, on_first_contact, relaid
 from fenwear.system.placing import place, place_case_bodies
@@ -62,8 +62,9 @@ def assemble(
         CaseError: a property of the geometry is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    law: ContactLaw = law_named(case.contact.law)
-    return law.of_bodies(case, build_bodies(case, comm, followed, warmed, fresh=fresh), heat=heat, fresh=fresh)
+    return law_named(case.contact.law).of_bodies(
+        case, build_bodies(case, comm, followed, warmed, fresh=fresh), heat=heat, fresh=fresh
+    )
 
 
 def renewed(
@@ -79,8 +80,7 @@ def renewed(
     Raises:
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    law: ContactLaw = system.contact_law
-    return on_first_contact(law.renewed(system, build_bodies(system.case, system.comm, followed, warmed)))
+    return on_first_contact(system.law.renewed(system, build_bodies(system.case, system.bodies.comm, followed, warmed)))
 
 
 def place_case(
@@ -130,15 +130,15 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     Raises:
         CaseError: the punch would tip over.
     """
-    law: ContactLaw = law_named(case.contact.law)
+    law = law_named(case.contact.law)
     case = case.graded_as(system.case)  # so that studies are of one mesh
     made, wanted = set_up_by(system.case), set_up_by(case)
-    if law is system.contact_law and made != wanted and answers_anywhere(system):
+    if law is system.law and made != wanted and answers_anywhere(system):
         as_before = case.model_copy(update={"motion": system.case.motion})
         if set_up_by(as_before) == made:
             return relaid(law.varied(system, as_before), case)
-    if law is not system.contact_law or made != wanted:
-        return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
+    if law is not system.law or made != wanted:
+        return assemble(case, system.bodies.comm, system.bodies.followed, heat=preparation(system))
     return law.varied(system, case)
 
 
@@ -146,7 +146,7 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     """Return the system with each phase of the motion cut into parts of equal time; collective."""
     sliding = replace(system.sliding, motion=system.motion.in_parts(parts))
     placed = place(system.bodies, sliding, system.case)
-    cut = joined(placed, system.condensed)
+    cut = joined(placed, system.elastic.condensed)
     return with_exchange(cut, reduced=system.exchange.reduced) if system.exchange.conducts else cut
 
 
@@ -212,15 +212,15 @@ def property_change(system: Tribosystem, state: HeatState | None) -> float:
             changed = max(changed, _change(case, body, description, now, then))
         except CaseError as error:  # raised below, on all ranks
             problem = error
-    problems = [raised for raised in system.comm.allgather(problem) if raised is not None]
+    problems = [raised for raised in system.bodies.comm.allgather(problem) if raised is not None]
     if problems:
         raise problems[0]
-    return float(system.comm.allreduce(changed, op=MPI.MAX)) / case.heat.property_tolerance
+    return float(system.bodies.comm.allreduce(changed, op=MPI.MAX)) / case.heat.property_tolerance
 
 
 def taken_at(system: Tribosystem) -> tuple[Array, ...]:
     """Return the temperatures of this rank's own nodes of both bodies that the properties are taken at, K."""
-    start = tuple(np.full(body.owned, system.initial_temperature) for body in system.bodies.heat)
+    start = tuple(np.full(body.owned, system.case.initial_temperature) for body in system.bodies.heat)
     return system.bodies.warmed or start
 
 
@@ -264,8 +264,7 @@ def warmed_system(system: Tribosystem, state: HeatState) -> Tribosystem:
     """
     case = system.case
     bodies = _bodies_at(system.bodies, case, state.temperatures())
-    law: ContactLaw = system.contact_law
-    return law.renewed(system, bodies)
+    return system.law.renewed(system, bodies)
 
 
 def _bodies_at(bodies: Bodies, case: Case, temperatures: tuple[Array, Array]) -> Bodies:

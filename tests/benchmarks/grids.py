@@ -65,7 +65,7 @@ def main() -> None:
         contact = system.phase_contact([0])
         found = contact.solve(gap)
         again = seconds(partial(contact.solve, gap))
-        multiply = partial(system.interface.compliance(0.0).apply, found.pressure[0])
+        multiply = partial(system.elastic.interface.compliance(0.0).apply, found.pressure[0])
         multiply()
         product = np.median([seconds(multiply) for _ in range(9)])
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024

@@ -30,17 +30,17 @@ CASES = {
 def by_hand(system: Tribosystem, half_cycles: int) -> tuple[Array, Array]:
     """Return the pressures and depths of all half-cycles: the same algebra, and nothing but it."""
     n, phases = len(system.pair.weights), range(len(system.motion.phases))
-    rigid, ratios = system.rigid, system.friction_ratios()
+    rigid, ratios = system.rigid, system.phases.ratios()
     modes = len(rigid.resultant)
     matrices = [
         np.block(
             [[own.compliance(tau).matrix(), rigid.rigid_normal], [rigid.equilibrium(tau), np.zeros((modes, modes))]]
         )
-        for own, tau in zip(system.interfaces, ratios, strict=True)
+        for own, tau in zip(system.elastic.interfaces, ratios, strict=True)
     ]
-    rates = [system.phases_wear.depth(np.ones((len(phases), n)))[k] for k in phases]
+    rates = [system.phases.mean_wear.depth(np.ones((len(phases), n)))[k] for k in phases]
     offset, worn = np.concatenate([np.zeros(n), rigid.resultant]), np.zeros(n)
-    first = [system.interfaces[k].load_gap + system.pairs[k].initial_gap for k in phases]
+    first = [system.elastic.interfaces[k].load_gap + system.sliding.pairs[k].initial_gap for k in phases]
     closed, factors = [np.ones(n, dtype=bool) for _ in phases], [factor(m, np.ones(n, dtype=bool)) for m in matrices]
     pressures, depths, x = [], [], np.zeros(n + modes)
     for half_cycle in range(half_cycles):

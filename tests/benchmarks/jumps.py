@@ -55,7 +55,7 @@ def ends(feature: str, law: str, **how: Any) -> tuple[Array, Array, int]:
     system = assemble(load_case(base, [*settings, f"contact.law='{LAWS[law]}'", *stick]))
     strokes, before = system.motion.half_cycles, solved["steps"]
     blocks = list(evolve(system, HALF_CYCLES // strokes * strokes, **how))
-    cycles = (solved["steps"] - before) / (strokes if system.sticks else 1)
+    cycles = (solved["steps"] - before) / (strokes if system.law.sticks else 1)
     pressure = np.concatenate([block.pressure for block in blocks[-strokes:]])  # meshes that follow end a block
     return blocks[-1].end.worn.punch, pressure[-strokes:], round(cycles)
 

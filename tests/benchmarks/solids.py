@@ -91,10 +91,12 @@ def warm(system: Tribosystem, half_cycles: int = 20) -> float:
 
 def full_space(system: Tribosystem, each: float) -> None:
     """Solve one contact with all displacements as unknowns, and compare."""
-    ratio = system.friction_ratio(1)
+    ratio = system.phases.middle_ratio(1)
     gap = system.gap(0, system.unworn()) + 1e-5 * np.hypot(*system.pair.punch.x[:, :2].T) ** 2
     condensed = system.phase_contact((0,)).solve(gap).pressure[0]
-    full = FullContact([SlidingContact(system.interfaces[0], ratio)], [(system.bodies.punch, system.bodies.strip)])
+    full = FullContact(
+        [SlidingContact(system.elastic.interfaces[0], ratio)], [(system.bodies.punch, system.bodies.strip)]
+    )
     begin = time.process_time()
     pressure = full.solve(gap).pressure[0]
     spent = time.process_time() - begin

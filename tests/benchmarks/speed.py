@@ -32,7 +32,7 @@ def full_against_condensed(system: Tribosystem, half_cycles: int = 100) -> None:
         (
             system.contact((d,)),
             FullContact(
-                [SlidingContact(system.interface, system.friction_ratio(d))],
+                [SlidingContact(system.elastic.interface, system.phases.middle_ratio(d))],
                 [(system.bodies.punch, system.bodies.strip)],
             ),
         )
@@ -52,7 +52,7 @@ def full_against_condensed(system: Tribosystem, half_cycles: int = 100) -> None:
                 times[kind].append(seconds)
         condensed, full = (state.pressure[0] for state in states[phase])
         difference = max(difference, float(np.abs(condensed - full).max() / condensed.max()))
-        wear = wear + system.phases_wear.depth(np.tile(condensed, (2, 1)))[0]
+        wear = wear + system.phases.mean_wear.depth(np.tile(condensed, (2, 1)))[0]
     medians = [1e3 * statistics.median(t) for t in times]
     print(f"a contact, condensed | {medians[0]:.3f} ms (median of {len(times[0])})")
     print(f"a contact, full      | {medians[1]:.1f} ms, {medians[1] / medians[0]:.0f} times as long")

@@ -134,7 +134,7 @@ def test_a_support_at_a_point_is_the_same_as_on_its_group(assembled: Callable[..
     """`at` the pin's coordinates finds the pin's node."""
     named = assembled("example1", "geometry.degree=2")
     placed = assembled("example1", "geometry.degree=2", "punch.supports.0={at=[30, 120], fix=['x']}")
-    np.testing.assert_array_equal(placed.interface.dense(), named.interface.dense())
+    np.testing.assert_array_equal(placed.elastic.interface.dense(), named.elastic.interface.dense())
     assert tuple(placed.bodies.punch.pivot) == tuple(named.bodies.punch.pivot) == (30, 120)
 
 

@@ -387,7 +387,7 @@ def test_pressures_that_no_mesh_feels() -> None:
     ):
         assemble(load_case("rounded-punch", condensed))
     system = assemble(load_case("rounded-punch", [*condensed, "strip.operator='fine'"]))
-    stiffness = np.linalg.eigvalsh(system.interface.dense()[:, 0, :, 1])
+    stiffness = np.linalg.eigvalsh(system.elastic.interface.dense()[:, 0, :, 1])
     assert stiffness.min() > 1e-3 * stiffness.max()
 
 

@@ -38,7 +38,7 @@ def bushing(wall: float, moment: float = 0.0, *settings: str) -> Tribosystem:
 def pressed(system: Tribosystem) -> tuple[Array, float]:
     """Return the first pressures (n,) and the moment of what the contact does to the bushing about y, N mm."""
     pressure = system.contact((1,)).solve(system.pair.initial_gap).pressure[0]
-    traction = system.pair.normal + system.friction_ratio(1)
+    traction = system.pair.normal + system.phases.middle_ratio(1)
     force = system.bodies.punch.thickness * (system.pair.weights * pressure)[:, None] * traction
     x = system.pair.opposite
     return pressure, float((x[:, 1] * force[:, 0] - x[:, 0] * force[:, 1]).sum())
@@ -67,7 +67,7 @@ def test_nothing_turns_in_the_mean() -> None:
     )
     held = u - sum(a * mode for mode, a in zip(bodies.punch.rigid_modes, first.rigid[-1], strict=True))
     assert bodies.punch.guides.couples.size
-    assert abs(total(system.comm, bodies.punch.guides.couples.T @ held)[0]) * 10 < 1e-9 * gap.max()
+    assert abs(total(system.bodies.comm, bodies.punch.guides.couples.T @ held)[0]) * 10 < 1e-9 * gap.max()
     on_punch, on_strip = (
         body.trace.pick(own[:, None])[:, :, 0] for body, own in ((bodies.punch, u), (bodies.strip, beside))
     )

@@ -35,7 +35,7 @@ def condensed(
     monkeypatch.setattr(factor, "SPREAD", spread)
     settings = SMALL if name.startswith("example") else BALL if name.startswith("ball") else ()
     system = assemble(load_case(name, (*settings, *changes)), heat="none")
-    return system, [system.condensed.punch, system.condensed.strip]
+    return system, [system.elastic.condensed.punch, system.elastic.condensed.strip]
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_each_rank_has_the_same_bits(way: str, monkeypatch: pytest.MonkeyPatch) 
     system, bodies = condensed("example1", way, monkeypatch)
     for body in bodies:
         for values in (body.response, body.by_load):
-            assert len(set(system.comm.allgather(values.tobytes()))) == 1
+            assert len(set(system.bodies.comm.allgather(values.tobytes()))) == 1
 
 
 @pytest.mark.parametrize("way", ["substructures", "columns"])
@@ -106,14 +106,14 @@ def test_substructures_solve_for_any_forces(name: str, monkeypatch: pytest.Monke
     """Inside, on the boundaries between ranks and on supports: K times the solution is the forces again."""
     system, _ = condensed(name, "substructures", monkeypatch)
     for body in (system.bodies.punch, system.bodies.strip):
-        assert isinstance(body.factor, substructure.Substructures) == (system.comm.size > 1)
+        assert isinstance(body.factor, substructure.Substructures) == (system.bodies.comm.size > 1)
         first, last = body.stiffness.getOwnershipRange()
         forces = np.sin(np.outer(np.arange(first, last), (1.0, 2.0)))
         forces[body.supported] = 0.0
         both, one = body.solve(forces), body.solve(forces[:, 0])
         rest = np.abs(times(body.stiffness, both) - forces)
         found = [np.abs(both), rest, np.abs(one - both[:, 0]), np.abs(both[body.supported])]
-        largest, *errors = np.max(system.comm.allgather([array.max(initial=0.0) for array in found]), axis=0)
+        largest, *errors = np.max(system.bodies.comm.allgather([array.max(initial=0.0) for array in found]), axis=0)
         # Elimination by blocks leaves |K| |u| times rounding and the root of K's condition, 1e3 in rings (Higham).
         bounds = (1e-10 * body.stiffness.norm(PETSc.NormType.INFINITY) * largest, 1e-9 * largest, 0.0)
         assert (np.array(errors) <= bounds).all(), (errors, bounds)
@@ -132,8 +132,8 @@ def test_a_body_without_a_factor_is_told_on_every_rank(
             raise ConvergenceError("no factor")
 
     monkeypatch.setattr(factor.Factor, "compute", fails)
-    for owner in range(system.comm.size):
+    for owner in range(system.bodies.comm.size):
         matrix = system.bodies.punch.stiffness
-        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.comm, dim=2, owner=owner)
+        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.bodies.comm, dim=2, owner=owner)
         with pytest.raises(ConvergenceError, match="no factor"):
             factor.make_together([one])

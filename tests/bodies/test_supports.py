@@ -72,7 +72,7 @@ def test_attitude_angle(friction: float, tmp_path: Path) -> None:
     angle = np.arctan2(x[:, 0], x[:, 1] + 0.05)
     *_, worn = jump(system, 100_000, tolerance=0.03)
     for pressure in (next(iter(march(system, 1))).pressure[0], worn.pressure[-1]):
-        traction = (system.pair.normal + system.friction_ratio(1)) * (weights * pressure)[:, None]
+        traction = (system.pair.normal + system.phases.middle_ratio(1)) * (weights * pressure)[:, None]
         np.testing.assert_allclose(traction.sum(axis=0), [0, 50], atol=1e-8)
         middle = angle @ (weights * pressure) / (weights @ pressure)
         assert middle == pytest.approx(-np.arctan(friction), abs=np.radians(0.3))

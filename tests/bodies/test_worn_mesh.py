@@ -31,7 +31,7 @@ def test_the_bodies_lose_what_is_worn(assembled: Callable[..., Tribosystem]) -> 
     system = assembled("example1", *COARSE)
     x, strip_x = system.pair.x, system.pair.strip.x[:, 0]
     worn = WornDepths(1 + 0.5 * (x / 30) ** 2, 0.2 * (1 - (strip_x / 30) ** 2))
-    moved = assemble(system.case, system.comm, worn)
+    moved = assemble(system.case, system.bodies.comm, worn)
     assert moved.bodies.moved is not None
     vertices = slice(None, None, 2)  # straight elements: the middle nodes go with their ends
     np.testing.assert_allclose(moved.bodies.moved.punch[vertices], worn.punch[vertices], atol=1e-10)
@@ -53,10 +53,10 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
     system = assembled("example1", *COARSE)
     depth = 1e-6
     moved = assemble(
-        system.case, system.comm, WornDepths(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights)
+        system.case, system.bodies.comm, WornDepths(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights)
     )
-    scale = np.abs(system.interface.dense()).max()
-    difference = np.abs(moved.interface.dense() - system.interface.dense()).max()
+    scale = np.abs(system.elastic.interface.dense()).max()
+    difference = np.abs(moved.elastic.interface.dense() - system.elastic.interface.dense()).max()
     assert 0 < difference < 1e-5 * scale
     worn = WornDepths(np.full_like(system.pair.x, depth), system.unworn().strip)
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-13)
@@ -76,7 +76,7 @@ def test_circles_are_offset_along_their_own_normals() -> None:
         depth = 0.02 + 0.01 * np.cos(3 * angle) if surface.body == "punch" else np.full(len(angle), 0.03)
         none = system.unworn()
         worn = WornDepths(depth, none.strip) if surface.body == "punch" else WornDepths(none.punch, depth)
-        moved = assemble(case, system.comm, worn)
+        moved = assemble(case, system.bodies.comm, worn)
         x, z_moved = getattr(moved.pair, surface.body).x.T
         np.testing.assert_allclose(np.hypot(x, z_moved - z), radius + way * depth, atol=2e-5 * depth.max())
         np.testing.assert_allclose(getattr(moved.bodies.moved, surface.body), depth, rtol=1e-9)
@@ -91,7 +91,7 @@ def test_a_pin_gets_shorter(assembled: Callable[..., Tribosystem]) -> None:
     system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
     x, old = system.pair.punch.x, system.bodies.punch.body
     for depth in (np.full(len(x), 3.0), 1.0 + 0.1 * (x[:, 0] - 15.0) + 0.05 * x[:, 1] ** 2):
-        moved = assemble(system.case, system.comm, WornDepths(depth, system.unworn().strip))
+        moved = assemble(system.case, system.bodies.comm, WornDepths(depth, system.unworn().strip))
         assert moved.bodies.moved is not None
         np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
         new = moved.bodies.punch.body
@@ -114,11 +114,12 @@ def test_used_up_elements_are_refused(assembled: Callable[..., Tribosystem]) -> 
 def test_limit_of_the_offset(assembled: Callable[..., Tribosystem]) -> None:
     """The meshes follow where the depth exceeds the given share of the elements' height: 2 mm of its first row."""
     system = assembled("example1", *COARSE, "geometry.follow_wear=0.5")
-    heights = system.element_heights.punch
+    heights = system.bodies.element_heights.punch
     low, high = (WornDepths(share * heights, system.unworn().strip) for share in (0.49, 0.51))
-    assert not system.mesh_update_due(low)
-    assert system.mesh_update_due(high)
-    assert not assembled("example1", *COARSE, "geometry.follow_wear=never").mesh_update_due(high)
+    assert system.bodies.wear_on_meshes(low, system.case) <= 1
+    assert system.bodies.wear_on_meshes(high, system.case) > 1
+    still = assembled("example1", *COARSE, "geometry.follow_wear=never")
+    assert still.bodies.wear_on_meshes(high, still.case) <= 1
     z = np.unique(system.bodies.punch.body.mesh.geometry.x[:, 1].round(9))
     np.testing.assert_allclose(heights, z[1] - z[0], rtol=1e-9)
 
@@ -158,15 +159,15 @@ def test_pressure_on_some_of_the_nodes() -> None:
         punch, weights = system.bodies.punch, system.pair.punch.weights
         surface = system.pair.punch
         assert len(surface.nodes) < len(surface.trace)
-        heights = system.element_heights.punch
+        heights = system.bodies.element_heights.punch
         assert heights.shape == weights.shape
         if not solid:
             np.testing.assert_allclose(heights, 0.5, rtol=1e-9)
         low, high = (WornDepths(share * heights, system.unworn().strip) for share in (0.49, 0.51))
-        assert not system.mesh_update_due(low)
-        assert system.mesh_update_due(high)
+        assert system.bodies.wear_on_meshes(low, system.case) <= 1
+        assert system.bodies.wear_on_meshes(high, system.case) > 1
         depth = 0.02 + 0.01 * surface.x @ [1, 2, 0] if solid else np.full(len(weights), 0.02)
-        moved = assemble(system.case, system.comm, WornDepths(depth, system.unworn().strip))
+        moved = assemble(system.case, system.bodies.comm, WornDepths(depth, system.unworn().strip))
         assert moved.bodies.moved is not None
         np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
         lost = area(punch.body) - area(moved.bodies.punch.body)
@@ -181,7 +182,7 @@ def test_round_surfaces_stay_round_as_they_follow() -> None:
     system = assemble(make_case(data))
     none = system.unworn()
     worn = WornDepths(np.full_like(none.punch, 1e-7), none.strip)
-    moved = assemble(system.case, system.comm, worn)
+    moved = assemble(system.case, system.bodies.comm, worn)
     assert len(system.pair.strip.rounds[0]) == len(moved.pair.strip.rounds[0]) == 1
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-9)
     np.testing.assert_allclose(moved.pair.normal, system.pair.normal, atol=1e-7)

@@ -47,7 +47,7 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     case = load_case("fretting-partial-slip", [*SMALL, *settings])
     found = resolve_law(case, told.append)
     assert found.system.case.contact.law == found.numbers["contact_law"] == law
-    assert found.system.sticks == (law == "coulomb")
+    assert found.system.law.sticks == (law == "coulomb")
     assert found.system.case.folder == case.folder
     assert found.system.case.materials == case.materials
     assert len(told) == 1

@@ -64,7 +64,7 @@ def test_a_distributed_system_is_the_same_system(assembled: Callable[..., Tribos
 def test_all_ranks_hold_the_same_bits(assembled: Callable[..., Tribosystem]) -> None:
     """The replicated interface is equal to the last bit, so that no rank takes another Newton step."""
     system = assembled("example1")
-    mine = (system.interface.dense(), steady(system).pressure)
+    mine = (system.elastic.interface.dense(), steady(system).pressure)
     for array in mine:
         for other in COMM.allgather(array):
             np.testing.assert_array_equal(array, other)
@@ -147,7 +147,7 @@ def test_ranks_whose_arithmetic_differs(
     state = steady(system)
     check_same(state.phase_pressure, state.shape, state.iterations, stability_number(system))
     check_same(growth_rate(system, state.phase_pressure), cycles_to_reach(system, state, 0.1))
-    if system.heat is not None:
+    if system.case.heat is not None:
         check_same(critical_speed(system, 1))
 
 

@@ -86,8 +86,8 @@ def test_balance_and_complementarity(system: Tribosystem, direction: int) -> Non
 def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> None:
     """gap = g0 + w + (S_n + d mu S_t) p + H a + g_load, from the state alone."""
     state = system.contact((-1,)).solve(gap := worn(system))
-    interface = system.interface
-    expected = interface.compliance(system.friction_ratio(-1)).apply(state.pressure[0])
+    interface = system.elastic.interface
+    expected = interface.compliance(system.phases.middle_ratio(-1)).apply(state.pressure[0])
     expected += system.rigid.rigid_normal @ state.rigid[0] + interface.load_gap + gap
     np.testing.assert_allclose(state.gap[0], expected, atol=1e-12)
 
@@ -97,7 +97,7 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
 def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
     system = assembled(name, *OPENING, "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
-    full = [full_contact(system, system.interface, system.friction_ratio(d)) for d in (1, -1)]
+    full = [full_contact(system, system.elastic.interface, system.phases.middle_ratio(d)) for d in (1, -1)]
     condensed = [system.contact((d,)) for d in (1, -1)]
     wear, opened = np.zeros_like(system.pair.x), False
     for half_cycle in range(4):
@@ -106,15 +106,19 @@ def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str)
         one, other = condensed[phase].solve(gap), full[phase].solve(gap)
         scale = one.pressure.max()
         np.testing.assert_allclose(other.pressure, one.pressure, rtol=0, atol=1e-8 * scale)
-        np.testing.assert_allclose(other.gap, one.gap, rtol=0, atol=1e-8 * scale * system.interface.elastic_length)
+        np.testing.assert_allclose(
+            other.gap, one.gap, rtol=0, atol=1e-8 * scale * system.elastic.interface.elastic_length
+        )
         opened |= bool((one.pressure == 0).any() and (one.gap > 1e-5).any())
-        wear = wear + 500 * system.phases_wear.depth(np.tile(one.pressure, (2, 1)))[0]
+        wear = wear + 500 * system.phases.mean_wear.depth(np.tile(one.pressure, (2, 1)))[0]
     assert opened or name == "example2"
 
 
 def test_condensed_equals_full_on_unmatched_nodes(unmatched: Tribosystem) -> None:
     """The same where the nodes of the two surfaces do not coincide."""
-    full = full_contact(unmatched, unmatched.interface, unmatched.friction_ratio(-1)).solve(worn(unmatched))
+    full = full_contact(unmatched, unmatched.elastic.interface, unmatched.phases.middle_ratio(-1)).solve(
+        worn(unmatched)
+    )
     condensed = unmatched.contact((-1,)).solve(worn(unmatched))
     np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * condensed.pressure.max())
 
@@ -155,14 +159,14 @@ def test_a_steel_ball_on_a_few_nodes_of_a_steel_cup(assembled: Callable[..., Tri
     coarse = ("geometry.parameters.across=2", "geometry.parameters.around=2")
     system = assembled("ball-in-cup", *coarse, *(f"materials.{one}.young=210 GPa" for one in BOTH))
     state, ways = None, Counter[str]()
-    for phase, own in enumerate(system.interfaces):
+    for phase, own in enumerate(system.elastic.interfaces):
         state = system.phase_contact([phase]).solve(system.gap(phase, system.unworn()), state)
         ways += system.remedies.take()
         pressure, gap = state.pressure[0], state.gap[0]
         assert (pressure >= 0).all()
         assert gap.min() > -1e-9 * own.pair.initial_gap.max()
         assert np.abs(np.minimum(pressure / pressure.max(), gap / own.pair.initial_gap.max())).max() < 1e-9
-        rigid, ratio = own.rigid, system.friction_ratios()[phase]
+        rigid, ratio = own.rigid, system.phases.ratios()[phase]
         np.testing.assert_allclose(rigid.equilibrium(ratio) @ pressure, -rigid.resultant, rtol=0, atol=1e-6)
         assert 3 <= (pressure > 0).sum() < 8
     assert ways[INTERIOR] > 0
@@ -203,7 +207,7 @@ def test_no_convergence_is_said(assembled: Callable[..., Tribosystem], one_itera
     contact = (
         system.contact((1,))
         if solver == "condensed"
-        else full_contact(system, system.interface, system.friction_ratio(1))
+        else full_contact(system, system.elastic.interface, system.phases.middle_ratio(1))
     )
     with pytest.raises(ConvergenceError, match=r"DIVERGED_MAX_IT after 1 .*-fenwear_.*contact_snes"):
         contact.solve(worn(system))
@@ -286,8 +290,8 @@ def test_action_is_reaction_on_a_scarred_surface(assembled: Callable[..., Tribos
     system = assemble(flat.case, followed=scar)
     assert np.ptp(system.pair.normal[:, 0]) > 0.02  # radians that the frame turns by
     thickness = flat.case.model.thickness
-    for phase, ratio in enumerate(system.friction_ratios()):
-        interface = system.interfaces[phase]
+    for phase, ratio in enumerate(system.phases.ratios()):
+        interface = system.elastic.interfaces[phase]
         gap = system.gap(phase, scar)
         condensed = CondensedContact([SlidingContact(interface, ratio)]).solve(gap)
         full = full_contact(system, interface, ratio).solve(gap)

@@ -27,7 +27,7 @@ def solved(system: Tribosystem, *, cycles: float = 30.0) -> ContactState:
     assert isinstance(contact, CondensedContact)
     unworn = system.unworn()
     gap = np.array([system.gap(k, unworn) for k in range(len(system.motion.phases))])
-    return contact.solve(gap, None, system.passing(system.phases_wear).step(unworn.between, cycles))
+    return contact.solve(gap, None, system.phases.passing(system.phases.mean_wear).step(unworn.between, cycles))
 
 
 @pytest.mark.parametrize(

@@ -255,7 +255,7 @@ def finite() -> Case:
 
 def crept(block: Block) -> Array:
     """Return how far punch and strip have crept at the end of a block (2, n), mm."""
-    return np.array(list(block.system.creep.depths(block.end.worn.crept).values()))
+    return np.array(list(block.system.elastic.creep.depths(block.end.worn.crept).values()))
 
 
 @pytest.mark.parametrize(

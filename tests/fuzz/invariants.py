@@ -160,7 +160,7 @@ class Bench:
             if made == _key(case, system):
                 return with_case(system, case)
         system = assemble(case, heat=preparation_of(case))
-        system.check_touching()
+        system.law.check_touching(system)
         self._systems = [*self._systems[-SYSTEMS + 1 :], (_key(case, system), system)]
         return system
 

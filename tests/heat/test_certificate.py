@@ -63,8 +63,8 @@ def test_against_the_whole_mesh(way: str, seed: int) -> None:
     whole = _over(with_exchange(system, reduced=False).exchange, pressures, rigid)
     reduced = with_reduced_heat(system)
     small = _over(reduced.exchange, pressures, rigid)
-    assert system.heat is not None
-    allowed = system.heat.reduction_difference
+    assert system.case.heat is not None
+    allowed = system.case.heat.reduction_difference
     fineness = reduced.exchange.fineness
     assert fineness is not None
     assert fineness.difference is not None

@@ -171,8 +171,8 @@ def check_balance(block: Block) -> None:
     # The friction heat is mu F0 times the sliding distance, whatever the pressure; mJ.
     system = block.system
     np.testing.assert_allclose(friction, 0.25 * 1e4 * system.motion.sliding()[0], rtol=1e-9)
-    np.testing.assert_allclose(rest[0], system.heat.debris * friction, rtol=1e-12)
-    if system.heat.coupling == "implicit":  # split, nodes that have just opened rub at the relaxed pressure
+    np.testing.assert_allclose(rest[0], system.case.heat.debris * friction, rtol=1e-12)
+    if system.case.heat.coupling == "implicit":  # split, nodes that have just opened rub at the relaxed pressure
         np.testing.assert_allclose(crossing.sum(axis=0), friction - rest[0], rtol=1e-9)
 
 

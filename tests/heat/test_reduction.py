@@ -53,7 +53,7 @@ def test_reduced_equals_full(assembled: Callable[..., Tribosystem], settings: tu
     """Contact temperatures within 0.05 K over the pressures of 100 half-cycles, with a fraction of the unknowns."""
     full = assembled("example1-heat", *COARSE, *settings, "heat.operator=full")
     reduced = assembled("example1-heat", *COARSE, *settings)
-    sizes = [sum(system.comm.allreduce(body.owned) for body in system.bodies.heat) for system in (full, reduced)]
+    sizes = [sum(system.bodies.comm.allreduce(body.owned) for body in system.bodies.heat) for system in (full, reduced)]
     assert len(reduced.exchange.initial().values) < sizes[0] / 5
     block = run(full)  # a pressure that opens nodes, and closes them again
     expected = heated(full, block.pressure)

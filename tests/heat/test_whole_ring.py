@@ -34,7 +34,7 @@ def around_the_pad(height: float, speed: float) -> tuple[Floats, Floats, float]:
     ]  # fmt: skip
     case = load_case("example1-heat", settings)
     placed = place_case(case)
-    heat, bodies, pair, field = placed.heat, placed.bodies.heat, placed.pair, placed.sliding.field
+    heat, bodies, pair, field = placed.case.heat, placed.bodies.heat, placed.pair, placed.sliding.field
     assert heat is not None
     assert bodies is not None
     punch, strip = (np.zeros((len(pair.weights), body.owned)) for body in bodies)

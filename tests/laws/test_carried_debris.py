@@ -84,7 +84,7 @@ def test_jumps_come_to_the_steady_state_under_what_goes_to_and_fro(law: str) -> 
     pressure = np.concatenate([one.pressure for one in last.contacts])
     top = pressure.max()
     assert found.phase_pressure == pytest.approx(pressure, abs=1e-6 * top)
-    lies = system.pairs[0].wear_interpolation @ last.worn.carried[0]
+    lies = system.sliding.pairs[0].wear_interpolation @ last.worn.carried[0]
     assert found.debris == pytest.approx(lies, abs=1e-6 * lies.max())
     assert np.abs(steady(bare).pressure - found.pressure).max() > 1e-2 * top
 

@@ -100,7 +100,7 @@ def test_jumps_go_through_the_end_as_marches_do(law: str, bodies: str) -> None:
     }[bodies]
     system, cycles = coated(law, thickness, "", *more), 200
     *_, marched = march(system, 2 * cycles)
-    for depth, thick in zip((marched.wear[-1], marched.wear_strip[-1]), system.coatings, strict=True):
+    for depth, thick in zip((marched.wear[-1], marched.wear_strip[-1]), system.laws.coatings, strict=True):
         if thick.any():
             assert 0.05 < (depth >= thick).mean() < 0.95
     errors = []
@@ -125,7 +125,7 @@ def test_jumps_see_where_friction_ends() -> None:
     settings = [*SMALLEST, *STICK, "contact.law='coulomb'", "contact.friction=0.9", wear % (UNEVEN % 1e-6)]
     system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 240
     *_, marched = march(system, half_cycles)
-    thickness, exact = system.coatings[0], marched.wear[-1]
+    thickness, exact = system.laws.coatings[0], marched.wear[-1]
     assert 0.1 < (exact >= thickness).mean() < 0.9
     errors = []
     for tolerance in (0.1, 0.001):
@@ -142,7 +142,7 @@ def test_per_area(law: str) -> None:
     stick, size = (STICK, 4e-7) if law == "coulomb" else (("stick={}",), 5.5e-7)
     settings = [*SMALLEST, f"contact.law='{law}'", *stick, "contact.friction=0.3", wear % (UNEVEN % size)]
     system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 100
-    thickness = system.coatings[0]
+    thickness = system.laws.coatings[0]
     *_, marched = march(system, half_cycles)
     touched = marched.wear[-1] > 0
     assert 0.1 < (marched.wear[-1][touched] >= thickness[touched]).mean() < 0.9
@@ -174,7 +174,7 @@ def test_a_coating_whose_law_is_another_one(law: str, name: str) -> None:
     cycles, stick = 100, STICK if law == "coulomb" else ("stick={}",)
     wear = UNLIKE[name] % (UNEVEN % thickness)
     system = assemble(load_case("fretting-partial-slip", [*SMALLEST, f"contact.law='{law}'", *stick, wear]))
-    thick = system.coatings[0]
+    thick = system.laws.coatings[0]
     rates = {
         "base by its pressure": (lambda p: 1e-7 * p, lambda p: 2e-7 * (1 + p / 200) * p),
         "per area, then by pressure": (lambda p: 4e-5 * np.minimum(p / 5, 1), lambda p: 4e-7 * p),
@@ -256,7 +256,7 @@ def test_the_end_of_partial_slip_is_shared_through_coatings() -> None:
     }
     settings = [*SMALLEST, *STICK, "contact.law='coulomb'", both]
     systems = {name: assemble(load_case("fretting-partial-slip", [*settings, law])) for name, law in laws.items()}
-    ends = {name: system.contact_law.end(system) for name, system in systems.items()}
+    ends = {name: system.law.end(system) for name, system in systems.items()}
     coated, depth = ends["coated"].worn.punch, ends["bare"].depth
     np.testing.assert_allclose(ends["coated"].depth, depth, rtol=1e-9, atol=1e-12)
     # The strip loses what the coating would: t + 3 (A - t) + A = depth.
@@ -314,7 +314,7 @@ def test_soft_coatings_of_both_bodies() -> None:
     for tolerance in (0.3, 0.03):
         *_, last = jump(soft, 100, tolerance=tolerance)
         errors.append(0.0)
-        for name, thickness in zip(("wear", "wear_strip"), soft.coatings, strict=True):
+        for name, thickness in zip(("wear", "wear_strip"), soft.laws.coatings, strict=True):
             one, other = (getattr(block, name)[-1] for block in marched)
             assert 0.1 < (one >= thickness).mean() < 0.9
             apart = np.abs(getattr(last, name)[-1] - (one + other) / 2).max() / one.max()
@@ -327,7 +327,7 @@ def test_jumps_through_soft_coatings_as_marches(assembled: Assemble) -> None:
     """Stiffness ends where the coating does: what is left gives way, thinner and thinner."""
     system, half_cycles = assembled("example2", *SMALL, SOFT % "punch"), 240
     marched = [list(march(system, half_cycles, implicit=way))[-1].wear[-1] for way in (True, False)]
-    exact, thickness = sum(marched) / 2, system.coatings[0]  # of which the errors of first order go
+    exact, thickness = sum(marched) / 2, system.laws.coatings[0]  # of which the errors of first order go
     assert 0.05 < (exact >= thickness).mean() < 0.5
     hard = assembled("example2", *SMALL, (SOFT % "punch").replace(", modulus='20 MPa'", ""))
     assert np.abs(list(march(hard, half_cycles))[-1].wear[-1] - exact).max() > 0.1 * exact.max()

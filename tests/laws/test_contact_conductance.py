@@ -9,6 +9,7 @@ from scipy.integrate import quad
 
 from fenwear import Case, CaseError, assemble, load_case, steady
 from fenwear.steps import Block, evolve
+from fenwear.system import layer_conductance
 
 CONDUCTIVITY, MODULUS, STIFFNESS = 45.0, 2e5 / (2 * (1 - 0.3**2)), 1e6  # N/(s K); MPa; MPa/mm
 LAYER = f"contact.layer={{kind='linear', stiffness='{STIFFNESS:g} MPa/mm'}}"
@@ -31,7 +32,7 @@ def test_asperities_conduct_by_their_radii() -> None:
     sigma, radius, density = 0.2e-3 * np.sqrt(np.pi / 2), 50e-3, 1000.0
     layer = "{kind='rough', roughness='0.2 um', asperity_radius='50 um', asperity_density='1000 1/mm^2'}"
     system = assemble(case_of("gross-sliding", "'layer'", f"contact.layer={layer}"))
-    conductance = system.layer_conductance()
+    conductance = layer_conductance(system)
     assert conductance is not None
 
     def over(h: float, power: float) -> float:

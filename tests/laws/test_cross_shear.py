@@ -44,12 +44,14 @@ LINE = "motion={kind='cycle', columns=['time (s)', 'shift_x (mm)', 'shift_y (mm)
 def test_circles_and_lines(assembled: Callable[..., Tribosystem]) -> None:
     """Exactly 1/2 and 0, on both materials; the way is the polygon's."""
     round_, straight = (assembled("example1", *PATHS, motion) for motion in (circle(12), LINE))
-    np.testing.assert_allclose(round_.path.sum(axis=0), 12 * 4 * np.sin(np.pi / 12), rtol=1e-12)
+    np.testing.assert_allclose(round_.sliding.path.sum(axis=0), 12 * 4 * np.sin(np.pi / 12), rtol=1e-12)
     for of in (SlidingWays.tensor, SlidingWays.tensor_of_strip):
-        covered = of(round_.ways).work > 1e-9
-        np.testing.assert_allclose(of(round_.ways).ratio[covered], 0.5, atol=1e-7)
-        np.testing.assert_allclose(of(straight.ways).ratio, 0, atol=1e-7)
-    np.testing.assert_allclose(straight.ways.tensor().direction, np.tile([2, 1, 0] / np.sqrt(5), (17, 1)), atol=1e-12)
+        covered = of(round_.phases.ways).work > 1e-9
+        np.testing.assert_allclose(of(round_.phases.ways).ratio[covered], 0.5, atol=1e-7)
+        np.testing.assert_allclose(of(straight.phases.ways).ratio, 0, atol=1e-7)
+    np.testing.assert_allclose(
+        straight.phases.ways.tensor().direction, np.tile([2, 1, 0] / np.sqrt(5), (17, 1)), atol=1e-12
+    )
 
 
 def test_laws_of_cross_shear_and_mean_pressure(assembled: Callable[..., Tribosystem]) -> None:

@@ -19,6 +19,7 @@ from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.stability import growth_rate
 from fenwear.studies.model import Model
+from fenwear.system import layer_conductance
 
 Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
@@ -29,7 +30,7 @@ MEAN = 1e4 / 600
 
 
 def law_of(system: Tribosystem, **given: Any) -> np.ndarray:
-    return system.wear.phases([system.conditions(0, **given)], [0]).punch.rate[0]
+    return system.phases.wear.phases([system.phases.conditions(0, **given)], [0]).punch.rate[0]
 
 
 def test_position(assembled: Assemble) -> None:
@@ -39,7 +40,7 @@ def test_position(assembled: Assemble) -> None:
     inverse = 1 / (1 + (x / 30) ** 2)
     np.testing.assert_allclose(state.pressure[0], MEAN * inverse * weights.sum() / (weights @ inverse), rtol=1e-8)
     np.testing.assert_allclose(system.optimum(1).pressure, state.pressure[0], rtol=1e-8)
-    assert system.constant_coefficients
+    assert system.phases.constant
 
 
 def two_linings(tmp_path: Any, *settings: str) -> Case:
@@ -114,7 +115,7 @@ def test_a_node_between_linings_shares_friction_and_powers_of_the_pressure(tmp_p
     between, left = (abs(system.pair.x) < 1e-9), system.pair.x < -1e-9
     state = steady(system)
     np.testing.assert_allclose(state.pressure[0], np.where(between, 50.0, np.where(left, 75.0, 25.0)), rtol=1e-6)
-    mu = system.friction.values(system.conditions(0, state.pressure[0]))
+    mu = system.laws.friction.values(system.phases.conditions(0, state.pressure[0]))
     assert mu[between] == pytest.approx((0.02 * 75 + 0.04 * 25) / 100, rel=1e-6)
 
 
@@ -128,7 +129,7 @@ def test_regions_take_expressions_and_tables(tmp_path: Any) -> None:
     exact = np.where(x < 0, 1e-5 * (1 + x**2), 2e-5)
     exact[abs(x) < 1e-9] = 1.5e-5
     np.testing.assert_allclose(law_of(system, worn=worn), exact, rtol=1e-12)
-    assert not system.constant_coefficients
+    assert not system.phases.constant
     for wrong in ("{expression='1e-8*q'}", "{table=[[0, 1]]}", "{law='mine'}"):
         with pytest.raises(CaseError, match=r"wear\.punch\.coefficient.*regions\.punch_right"):
             two_linings(tmp_path, f"wear.punch.coefficient={{regions={{punch_left=1e-8, punch_right={wrong}}}}}")
@@ -145,7 +146,7 @@ def test_rough_linings_of_two_materials_close_and_conduct_as_each_does(tmp_path:
         "heat={convection='20 W/(m^2 K)', conductance='layer'}",
     )
     system = assemble(two_linings(tmp_path, *settings))
-    x, closure, conductance = system.pair.x, system.layers.closure, system.layer_conductance()
+    x, closure, conductance = system.pair.x, system.layers.closure, layer_conductance(system)
     assert isinstance(closure, RoughClosure)
     assert conductance is not None
     pressure = np.full(len(x), 50.0)
@@ -210,11 +211,11 @@ def test_threshold_and_cap(assembled: Assemble) -> None:
     """Below the threshold nothing wears, above it what is more; beyond the cap no more; slopes by differences."""
     law = "wear.punch={coefficient=1e-8, pressure_threshold=5, pressure_cap=20, pressure_exponent=2}"
     system = assembled("example2", *PLAIN, law)
-    wear = system.phases_wear
+    wear = system.phases.mean_wear
     p = np.resize(np.array([0.0, 4.0, 6.0, 15.0, 25.0]), (1, len(system.pair.x)))
     depths = 1e-8 * 100 * np.resize(np.array([0.0, 0.0, 1.0, 100.0, 225.0]), p.shape)
     np.testing.assert_allclose(wear.depth(p), depths, rtol=1e-12)
-    layer, change = LayerStep(system.passing(wear), system.unworn(), 3.0), np.full_like(p, 1e-6)
+    layer, change = LayerStep(system.phases.passing(wear), system.unworn(), 3.0), np.full_like(p, 1e-6)
     left, right = layer.border(p)
     derivative = np.einsum("knq,jqi,ji->kn", left, right, change)
     differences = (layer.opening(p + change) - layer.opening(p - change)) / 2
@@ -276,7 +277,7 @@ def test_a_law_is_registered_by_a_decorator() -> None:
 def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:
     """A law of depth or distance is refused, by its key, where a state that repeats is asked for."""
     system = assembled("example2", *SMALL, "contact.friction={expression='0.2 + 0.1*exp(-s)'}")
-    assert system.passing_laws == ["contact.friction"]
+    assert system.case.passing_laws == ["contact.friction"]
     with pytest.raises(ConvergenceError, match=r"contact\.friction changes with the worn depth or the distance"):
         steady(system)
     with pytest.raises(CaseError, match=r"contact\.friction"):

@@ -14,6 +14,7 @@ from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, st
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import march_within
 from fenwear.steps.run_state import beginning
+from fenwear.system import layer_conductance
 
 Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
@@ -50,8 +51,10 @@ def test_friction_that_follows_the_pressure_is_that_of_the_pressure(between: str
     *_, three = march(system, 3, start=two.end)
     before, found = two.end.worn, three.end.contacts[phase].pressure[0]
     apart = system.passed_contact(phase)
-    apart.slide([system.phase_friction(phase, system.friction.values(system.conditions(phase, found)))])
-    step = system.passing(system.phases_wear.some([phase]), [phase]).step(before, implicit=False, capped=True)
+    apart.slide([system.phases.ratio(phase, system.laws.friction.values(system.phases.conditions(phase, found)))])
+    step = system.phases.passing(system.phases.mean_wear.some([phase]), [phase]).step(
+        before, implicit=False, capped=True
+    )
     alone = apart.solve(system.gap(phase, before, passing=True), None, step).pressure[0]
     np.testing.assert_allclose(found, alone, rtol=0, atol=1e-9 * alone.max())
 
@@ -109,7 +112,7 @@ def test_a_layer_of_asperities_feels_their_pressure(kind: str, assembled: Assemb
     pressure, step = np.linspace(1, 60, len(dry.pair.weights)), 1e-3
     carried = pressure * (0.2 + pressure / 100)
     np.testing.assert_allclose(wet.layers.given(pressure), dry.layers.given(carried), rtol=1e-12)
-    of_dry, of_wet = dry.layer_conductance(), wet.layer_conductance()
+    of_dry, of_wet = layer_conductance(dry), layer_conductance(wet)
     assert of_dry is not None
     assert of_wet is not None
     np.testing.assert_allclose(of_wet(pressure), of_dry(carried), rtol=1e-9)
@@ -138,7 +141,7 @@ def test_a_layer_under_a_film_that_changes_within_the_cycle(assembled: Assemble)
     system = assembled("example2", *given, *rigid)
     (block,) = march_within(system, RunLimits(1, block=1))
     phases = system.motion.phases[:3]
-    slid = np.array([system.conditions(k).speed[0] * phase.duration for k, phase in enumerate(phases)])
+    slid = np.array([system.phases.conditions(k).speed[0] * phase.duration for k, phase in enumerate(phases)])
     film = 0.1 * (slid / [phase.duration for phase in phases]) ** 0.5
     share = np.interp(film, [0, 1, 3], [1, 0.4, 0])
     worn = np.cumsum([0.0, *(4e-7 * share * MEAN * slid)[:2]])
@@ -160,7 +163,7 @@ def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> No
     for law, rate in laws.items():
         settings = ("contact.lubrication.asperity_share=0.5", "contact.friction=0.2", f"wear.punch={law}")
         system = assembled("example2", *SMALL, MOTION % 100, *settings)
-        np.testing.assert_allclose(system.phases_wear.punch.rate, 100 * rate, rtol=1e-12)
+        np.testing.assert_allclose(system.phases.mean_wear.punch.rate, 100 * rate, rtol=1e-12)
 
 
 def test_pressures_of_the_end(assembled: Assemble) -> None:
@@ -194,4 +197,4 @@ def test_a_share_above_one_is_told(assembled: Assemble) -> None:
     """With the state that it was met at."""
     case = load_case("example2", [*SMALL, "contact.lubrication.asperity_share={expression='p'}"])
     with pytest.raises(CaseError, match=r"contact.lubrication.asperity_share:"):
-        assemble(case).friction.values(assemble(case).conditions(0))
+        assemble(case).laws.friction.values(assemble(case).phases.conditions(0))

@@ -33,14 +33,14 @@ def test_depth(assembled: Callable[..., Tribosystem], b: float) -> None:
     system = assembled("example1", f"wear.punch={{coefficient=2e-8, pressure_exponent={b}}}")
     n = len(system.pair.x)
     p = np.stack([np.linspace(0, 9, n), np.linspace(5, 0, n)])
-    np.testing.assert_allclose(system.phases_wear.depth(p), 6e-8 * p**b, rtol=1e-13)
-    assert system.phases_wear.worn(p).strip.max() == 0
+    np.testing.assert_allclose(system.phases.mean_wear.depth(p), 6e-8 * p**b, rtol=1e-13)
+    assert system.phases.mean_wear.worn(p).strip.max() == 0
 
 
 def test_layer_and_its_border(assembled: Callable[..., Tribosystem]) -> None:
     """The layer opens the gap by N cycles' wear of both bodies; L_k R_j is its derivative (central differences)."""
     system = assembled("example1", *BOTH)
-    layer = LayerStep(system.passing(system.phases_wear), system.unworn(), 50)
+    layer = LayerStep(system.phases.passing(system.phases.mean_wear), system.unworn(), 50)
     shape = (len(system.motion.phases), len(system.pair.x))
     random = np.random.default_rng(1)
     p, change = random.uniform(1, 20, shape), random.uniform(-1, 1, shape)
@@ -55,7 +55,7 @@ def test_strip_loses_what_its_pressure_wears(assembled: Callable[..., Tribosyste
     """The cross-section worn off the strip is the integral of beta~ p^b S, at every offset."""
     system = assembled("example1", *BOTH)
     p = np.random.default_rng(2).uniform(1, 20, (len(system.motion.phases), len(system.pair.x)))
-    worn = system.phases_wear.worn(p)
+    worn = system.phases.mean_wear.worn(p)
     sliding = np.array([phase.distance for phase in system.motion.phases])
     exact = 2e-8 * (sliding[:, None] * p**2) @ system.pair.weights
     assert system.pair.strip.weights @ worn.strip == pytest.approx(exact.sum(), rel=1e-13)
@@ -65,7 +65,7 @@ def test_uniform_pressure_wears_the_strip_evenly(assembled: Callable[..., Tribos
     """Where the punch stands in every position the track is flat, though no node meets another: a patch test."""
     system = assembled("example1", *BOTH)
     p = np.full((len(system.motion.phases), len(system.pair.x)), 10.0)
-    worn, x = system.phases_wear.worn(p), system.pair.strip.x[:, 0]
+    worn, x = system.phases.mean_wear.worn(p), system.pair.strip.x[:, 0]
     always = np.abs(x) < 25
     np.testing.assert_allclose(worn.strip[always], 2e-8 * 100 * 6, rtol=1e-12)
     assert worn.strip[np.abs(x) > 33].max() == 0

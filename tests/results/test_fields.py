@@ -65,10 +65,10 @@ def test_fields_close_the_gap_with_heat(assembled: Callable[..., Tribosystem], t
 
     punch, strip = system.bodies.punch, system.bodies.strip
     pressed, expansion = on_trace(cold[1], strip), on_trace(warm[1], strip) - on_trace(cold[1], strip)
-    assert system.passage is not None
-    here, moved = system.pair.transfer, system.passage.ends[state[2]]
-    assert abs(here[:, system.passage.nodes] - moved).max() > 0.1  # it does matter where
-    below = here @ pressed + moved @ expansion[system.passage.nodes]
+    assert system.sliding.passage is not None
+    here, moved = system.pair.transfer, system.sliding.passage.ends[state[2]]
+    assert abs(here[:, system.sliding.passage.nodes] - moved).max() > 0.1  # it does matter where
+    below = here @ pressed + moved @ expansion[system.sliding.passage.nodes]
     found = system.pair.punch.spread.T @ on_trace(warm[0], punch) - below + system.pair.initial_gap + block.wear[-2]
     np.testing.assert_allclose(found, block.gap[-1], rtol=0, atol=1e-12)
     assert block.heat is not None

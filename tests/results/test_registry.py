@@ -116,7 +116,7 @@ def test_a_coating_is_worn_through_in_a_share_of_its_scar() -> None:
     )
     weights = np.ones(depth.shape[1])
     pair = SimpleNamespace(weights=weights, strip=SimpleNamespace(weights=weights))
-    system = SimpleNamespace(pair=pair, coatings=(np.ones(len(weights)), np.zeros(len(weights))))
+    system = SimpleNamespace(pair=pair, laws=SimpleNamespace(coatings=(np.ones(len(weights)), np.zeros(len(weights)))))
     block: Any = SimpleNamespace(system=system, wear=depth, wear_strip=0 * depth)
     found = computed(block, layer_results.of_coated("punch"))
     assert found["worn_through_of_scar"] == pytest.approx([0.5])

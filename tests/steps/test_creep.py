@@ -44,7 +44,7 @@ def end(system: Tribosystem, how: str, count: int | None = None, tolerance: floa
 
 
 def crept(block: Block) -> np.ndarray:
-    return block.system.creep.depth(block.end.worn.crept)
+    return block.system.elastic.creep.depth(block.end.worn.crept)
 
 
 @pytest.mark.parametrize("who", WHO)
@@ -87,7 +87,7 @@ def test_a_bar_gets_shorter() -> None:
     block = next(march(system, 20))
     time = np.arange(1, 21)
     shorter = [2 / 1000 * 0.5 * -np.expm1(-time / 2), 3 / 500 * 3.0 * -np.expm1(-time / 7)]
-    found = system.creep.depths(block.crept.T)
+    found = system.elastic.creep.depths(block.crept.T)
     for name, exact in zip(("punch", "strip"), shorter, strict=True):
         assert np.abs(found[name] - exact).max() < 1e-9 * exact.max()
     assert block.rigid[:, 0] - first == pytest.approx(-sum(shorter), rel=1e-9)
@@ -137,7 +137,7 @@ def test_creep_faster_than_a_half_cycle(how: str, tau: float) -> None:
 def test_growth_rates_see_creep(load: str) -> None:
     """Small changes of depths and of what has crept become in a cycle what the cycle's tangent makes of them."""
     system = assemble(case_of(*WHO["all"][:-1], "wear.punch.coefficient='1e-4 1/MPa'", *([load] if load else [])))
-    creep = system.creep
+    creep = system.elastic.creep
     assert creep is not None
     begin = end(system, "jump", 4000, 1e-2).end
     rng = np.random.default_rng(1)

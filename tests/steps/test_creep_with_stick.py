@@ -34,7 +34,7 @@ def case_of(*more: str) -> Case:
 
 
 def crept(block: Block) -> np.ndarray:
-    return block.system.creep.depth(block.end.worn.crept)
+    return block.system.elastic.creep.depth(block.end.worn.crept)
 
 
 def end(system: Tribosystem, how: str, count: int | None = None, tolerance: float = 3e-2) -> Block:

@@ -43,7 +43,9 @@ def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> 
     np.testing.assert_allclose(volumes, [end.totals.of("volume_punch"), end.totals.of("volume_strip")], rtol=1e-12)
     assert volumes[1] == pytest.approx(0.3 * volumes[0], rel=1e-12)
     pressed = sum(
-        float(c.pressure[0] @ (pair.weights * s)) for c, s in zip(end.contacts, system.path, strict=True) if c.solved
+        float(c.pressure[0] @ (pair.weights * s))
+        for c, s in zip(end.contacts, system.sliding.path, strict=True)
+        if c.solved
     )
     assert volumes[0] == pytest.approx(3 * RATE * pressed, rel=1e-6)
     assert end.worn.strip.min() >= 0
@@ -80,7 +82,9 @@ def test_both_bodies_wear_point_by_point(assembled: Callable[..., Tribosystem]) 
         system = assembled("ball-in-cup", *COARSE, finer, "wear.strip.coefficient=3e-10", motion)
         *_, last = march(system, 1)
         end, cup, ball = last.end, system.pair, system.pair.strip
-        doses = [RATE * way * c.pressure[0] for c, way in zip(end.contacts, system.path, strict=True) if c.solved]
+        doses = [
+            RATE * way * c.pressure[0] for c, way in zip(end.contacts, system.sliding.path, strict=True) if c.solved
+        ]
         np.testing.assert_allclose(end.worn.punch, sum(doses), rtol=0, atol=1e-12 * end.worn.punch.max())
         volume = 0.3 * cup.weights @ sum(doses)
         assert ball.weights @ end.worn.strip == pytest.approx(volume, rel=1e-12)

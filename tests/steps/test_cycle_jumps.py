@@ -45,7 +45,7 @@ def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> N
     contact = system.contact((1, -1))
     wear, state = np.zeros_like(system.pair.x), None
     for _ in range(2 * cycles):  # steps of half a cycle, as accurate as the shortest jump
-        wearing = system.passing(system.phases_wear).step(system.unworn(), 0.5)
+        wearing = system.phases.passing(system.phases.mean_wear).step(system.unworn(), 0.5)
         assert wearing is not None
         state = contact.solve(system.pair.initial_gap + wear, state, wearing)
         wear = wear + wearing.opening(state.pressure)[0]

@@ -154,7 +154,7 @@ def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch
         return solve(self, gap, start, wearing, coupling)
 
     monkeypatch.setattr(CondensedContact, "solve", noted)
-    fresh = replace(system, exchange=system.exchange.varied(system.heat, system.exchange.friction))
+    fresh = replace(system, exchange=system.exchange.varied(system.case.heat, system.exchange.friction))
     lagged = list(jump_within(fresh, RunLimits(400, block=2), tolerance=0.01))
     assert len(solved) > 100
     assert sum(solved) < 0.05 * len(solved)

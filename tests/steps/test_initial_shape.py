@@ -72,7 +72,7 @@ def test_the_least_is_taken_off(assembled: Callable[..., Tribosystem]) -> None:
     """No rigid motion of a bushing or of a hinged shoe takes less off without having material added somewhere."""
     for name, settings in (("bushing", BUSHING), ("drum-brake", DRUM)):
         system = assembled(name, *settings)
-        shape, modes = initial_shape(system), system.rigid.rigid_normal / system.mode_lengths
+        shape, modes = initial_shape(system), system.rigid.rigid_normal / system.rigid.mode_lengths
         (state,) = shape.states
         pressed = state.phase_pressure.max(axis=0) > 0
         touching = pressed & (shape.depth < 1e-9 * shape.depth.max())
@@ -204,7 +204,7 @@ def test_bad_loads(assembled: Callable[..., Tribosystem], loads: Any) -> None:
 
 def wanted(system: Tribosystem, name: str) -> Any:
     """Return a pressure that no flat surface has, and that balances the loads: lowest in the middle, and zero there."""
-    rigid, ratio = system.interfaces[0].rigid, system.friction_ratios()[0]
+    rigid, ratio = system.elastic.interfaces[0].rigid, system.phases.ratios()[0]
     s = system.pair.punch.places
     s = (2 * s - s.min(axis=0) - s.max(axis=0)) / np.ptp(s, axis=0)
     form = 1 + (s**2).sum(axis=1)
@@ -238,7 +238,7 @@ def test_a_wanted_pressure(assembled: Callable[..., Tribosystem], name: str, set
 def test_pressures_that_balance_forbids(assembled: Callable[..., Tribosystem]) -> None:
     """Named are the rigid modes, with what the pressure carries and what it must; a small rest is corrected."""
     system = assembled("example1", *SMALL)
-    ratio, rigid, x = system.friction_ratios()[0], system.interfaces[0].rigid, system.pair.x
+    ratio, rigid, x = system.phases.ratios()[0], system.elastic.interfaces[0].rigid, system.pair.x
     with pytest.raises(CaseError, match=r"lambda_F; loads and friction need 10000 N") as failure:
         shape_for_pressure(system, pressure_at(system.pair.punch, "20 + 0.2*x"))
     assert f"carries {20 * 600:g} N along lambda_F" in str(failure.value)

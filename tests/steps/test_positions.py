@@ -123,7 +123,9 @@ def test_sliding_out_of_the_plane(assembled: Callable[..., Tribosystem]) -> None
     plain = assembled("example1", *COARSE, "contact.friction=0")
     across = assembled("example1", *COARSE, "motion.axis=y")
     np.testing.assert_allclose(steady(across).pressure, steady(plain).pressure, atol=1e-9 * MEAN)
-    np.testing.assert_allclose(across.friction.ratio(-1, np.full_like(across.pair.x, 0.25), across.pair)[:, 1], -0.25)
+    np.testing.assert_allclose(
+        across.laws.friction.ratio(-1, np.full_like(across.pair.x, 0.25), across.pair)[:, 1], -0.25
+    )
     pulled = assembled("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
     rightward = assembled("example1", *COARSE, "contact.friction=0.1")  # -mu_d e_n x e_y = mu_d e_x
     for direction in (1, -1):
@@ -231,10 +233,10 @@ def test_surfaces_that_never_meet(assembled: Callable[..., Tribosystem]) -> None
     for force in (-1000, 1000):
         system = assembled("example1", *COARSE, held, f"punch.loads=[{{on='punch_free', force=[0, {force}]}}]")
         if force < 0:
-            system.check_touching()
+            system.law.check_touching(system)
             continue
         with pytest.raises(CaseError, match=r"geometry: the surfaces never meet within the stroke: .* mm apart"):
-            system.check_touching()
+            system.law.check_touching(system)
 
 
 @pytest.mark.parametrize(

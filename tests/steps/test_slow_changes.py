@@ -45,7 +45,7 @@ def test_jumps_end_where_meshes_follow(assembled: Callable[..., Tribosystem]) ->
     system = assembled("monotonic-lz40", *settings)
     ends = [list(evolve(system, 300, integration=how)) for how in ("jump", "implicit")]
     for block in ends[0]:
-        assert block.system.wear_on_meshes(block.end.worn) <= LATE
+        assert block.system.bodies.wear_on_meshes(block.end.worn, block.system.case) <= LATE
     jumped, marched = ends[0][-1], ends[1][-1]
     np.testing.assert_allclose(jumped.pressure[-1], marched.pressure[-1], atol=1e-3 * marched.pressure[-1].max())
     assert len(ends[0]) > 10
@@ -100,7 +100,7 @@ def test_temperature_keeps_its_place(assembled: Callable[..., Tribosystem]) -> N
     settings = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
     system = assembled("example1-heat", *settings)
     worn = WornDepths(0.3 + 0.1 * (system.pair.x / 30) ** 2, 0.1 + 0 * system.pair.strip.weights)
-    moved = assemble(system.case, system.comm, worn)
+    moved = assemble(system.case, system.bodies.comm, worn)
     for old, new in zip(system.bodies.heat, moved.bodies.heat, strict=True):
         x, there = (body.space.tabulate_dof_coordinates()[: body.owned] for body in (old, new))
         linear = partial(np.dot, b=np.array([0.3, 2.0, 0.0]))

@@ -140,7 +140,7 @@ def touching_where_it_stays(state: SteadyState) -> float:
     assert (motion[~touched] < 1e-9 * largest).all()  # there nothing wears, and the motion does not press
     worn = np.where(np.isnan(state.shape), 1.0, state.shape)
     phases = range(len(pressure))
-    gaps = np.array([own.pair.initial_gap + worn for own in system.interfaces])
+    gaps = np.array([own.pair.initial_gap + worn for own in system.elastic.interfaces])
     found = system.phase_contact(phases).solve(gaps).pressure  # by the contact of given shapes
     np.testing.assert_allclose(found, pressure, rtol=0, atol=1e-8 * pressure.max())
     return float(touched.mean())

@@ -62,7 +62,7 @@ def test_steady_state_of_changing_loads_and_ways(assembled: Callable[..., Tribos
     *_, last = jump(system, 400_000, tolerance=1e-3)
     ended = np.concatenate([contact.pressure for contact in last.end.contacts])
     np.testing.assert_allclose(ended, state.phase_pressure, atol=0.01 * state.phase_pressure.max())
-    worn = (1e-8 * system.path * state.phase_pressure).sum(axis=0)
+    worn = (1e-8 * system.sliding.path * state.phase_pressure).sum(axis=0)
     np.testing.assert_allclose(worn, state.wear_per_cycle, rtol=1e-9)
     touching = state.phase_pressure.max(axis=0) > 0
     x = system.pair.x[touching]

@@ -31,10 +31,10 @@ HALF_CYCLES = 200
 
 def dense(system: Tribosystem) -> tuple[Array, Array, Array, Array]:
     """Return S + Theta, S, H and E of full contact, made column by column from the compliance and the heat."""
-    n, interface, exchange = len(system.pair.weights), system.interface, system.exchange
+    n, interface, exchange = len(system.pair.weights), system.elastic.interface, system.exchange
     uniform = np.full(n, system.rigid.mean_pressure)
     states, _ = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
-    ratio = system.friction_ratio(1)
+    ratio = system.phases.middle_ratio(1)
     compliance = interface.compliance(ratio).matrix()
     rigid = interface.rigid
     return compliance + exchange.gap_change(states), compliance, rigid.rigid_normal, rigid.equilibrium(ratio)
@@ -80,18 +80,18 @@ def test_the_gain_is_of_the_tangent_where_friction_depends_on_pressure(
 
     def determinant(own: Tribosystem, *, heated: bool) -> float:
         phase, exchange = own.motion.positions // 2, own.exchange
-        rigid = own.interfaces[phase].rigid
+        rigid = own.elastic.interfaces[phase].rigid
 
         def force(pressure: Array) -> Array:
-            mu = own.friction.values(own.conditions(phase, pressure))
-            ratio = own.phase_friction(phase, mu)
-            gap = own.interfaces[phase].compliance(ratio).matrix() @ pressure
+            mu = own.laws.friction.values(own.phases.conditions(phase, pressure))
+            ratio = own.phases.ratio(phase, mu)
+            gap = own.elastic.interfaces[phase].compliance(ratio).matrix() @ pressure
             if heated:
                 heating = heating_friction(own, mu, phase)
                 made = exchange.with_friction(np.array([heating] * len(own.motion.phases)))
                 states, _ = made.change(phase, exchange.conductance(even), pressure=pressure[:, None])
                 gap = gap + made.gap_change(states, phase)[:, 0]
-            return np.concatenate([gap / own.interface.elastic_length, rigid.equilibrium(ratio) @ pressure])
+            return np.concatenate([gap / own.elastic.interface.elastic_length, rigid.equilibrium(ratio) @ pressure])
 
         step = 1e-4 * mean
         columns = [(force(even + step * e) - force(even - step * e)) / (2 * step) for e in np.eye(n)]

@@ -45,7 +45,7 @@ CASES = {
 def ways(system: Tribosystem, turns: list[list[float]]) -> Array:
     """Return the way past each contact node by turns of the strip about the origin (m, 3), rad: (m, n), mm."""
     found = []
-    for turn, pair in zip(turns, system.pairs, strict=True):
+    for turn, pair in zip(turns, system.sliding.pairs, strict=True):
         moved, normal = np.cross(turn, in_space(pair.opposite)), in_space(pair.normal)
         along = moved - np.einsum("ic,ic->i", moved, normal)[:, None] * normal
         found.append(np.linalg.norm(along, axis=1))
@@ -63,7 +63,7 @@ def test_what_is_worn_is_k_p_s_everywhere(assembled: Callable[..., Tribosystem],
     system = assembled(name, *settings, *wears, "geometry.follow_wear=never")
     pair, thick, slid = system.pair, system.bodies.punch.thickness, ways(system, turns)
     if name == "ball-in-cup":  # its axes pass through the contact: nodes slide what their areas do, not their places
-        by_area = system.wear.sliding[0]
+        by_area = system.phases.wear.sliding[0]
         np.testing.assert_allclose(by_area, slid, rtol=0, atol=0.05 * slid.max())
         slid = by_area
     end, dose, volume = None, np.zeros(len(pair.weights)), 0.0
@@ -73,7 +73,7 @@ def test_what_is_worn_is_k_p_s_everywhere(assembled: Callable[..., Tribosystem],
         for k, (contact, way) in enumerate(zip(end.contacts, slid, strict=True)):
             assert contact is not None
             dose += contact.pressure[0] * way
-            volume += thick * float(system.pairs[k].weights @ (contact.pressure[0] * way))
+            volume += thick * float(system.sliding.pairs[k].weights @ (contact.pressure[0] * way))
     np.testing.assert_allclose(end.worn.punch, PUNCH * dose, rtol=0, atol=1e-9 * end.worn.punch.max())
     assert float(end.totals.of("volume_punch")) == pytest.approx(PUNCH * volume, rel=1e-9)
     *_, jumped = jump(system, 1000, tolerance=0.03, start=end)

@@ -152,7 +152,7 @@ def test_steady_heat_by_kirchhoff() -> None:
             share = kirchhoff(k0, far) + (kirchhoff(k0, top) - kirchhoff(k0, far)) * (1 - depth / h)
             exact = (np.sqrt(1 + 2 * SLOPE * share / k0) - 1) / SLOPE
             worst = max(worst, float(np.abs(found - exact).max(initial=0.0)))
-        errors.append(system.comm.allreduce(worst, op=MPI.MAX))
+        errors.append(system.bodies.comm.allreduce(worst, op=MPI.MAX))
     assert top > FAR[0] + 30
     assert errors[0] > 1e-4 * top
     assert errors[1] < 2e-5 * top
@@ -220,9 +220,9 @@ def test_uniform_warmth_is_other_constants(edited: Edited) -> None:
     assert not properties_outdated(hot, at)
     assert hot.bodies.punch is not cold.bodies.punch
     assert np.array_equal(taken_at(hot)[0], np.full(cold.bodies.heat[0].owned, 60.0))
-    answers = list(other.condensed.punch.arrays().values())
+    answers = list(other.elastic.condensed.punch.arrays().values())
     unit = 1e-3 * max(np.abs(its).max(initial=0) for its in answers)  # loads of free bodies leave rounding alone
-    for own, its in zip(hot.condensed.punch.arrays().values(), answers, strict=True):
+    for own, its in zip(hot.elastic.condensed.punch.arrays().values(), answers, strict=True):
         np.testing.assert_allclose(own, its, atol=1e-9 * max(np.abs(its).max(initial=0), unit))
     np.testing.assert_allclose(hot.exchange.gap(at), other.exchange.gap(at), rtol=1e-8)
     assert np.abs(hot.exchange.gap(at) / cold.exchange.gap(at) - 1).max() > 0.05

@@ -64,7 +64,7 @@ def test_nothing_ends_at_planes_of_symmetry() -> None:
         third = "contact={friction=0, third_body={share=0.5, life='3 mm', edge_life='0.1 mm', edge_length='0.1 mm'}}"
         system = assemble(load_case("ball-on-flat", [*settings, third]))
         *_, last = march(system, 20)
-        x, edges = system.pair.punch.x, system.edges
+        x, edges = system.pair.punch.x, system.laws.edges
         assert edges is not None
         own = (x[:, :2] >= -1e-9).all(axis=1)
         order = np.lexsort(x[own, :2].round(6).T)

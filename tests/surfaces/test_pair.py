@@ -66,7 +66,7 @@ def test_equilibrium_of_example_1(assembled: Callable[..., Tribosystem]) -> None
 @pytest.mark.mpi
 def test_compliance_of_mirrored_directions(assembled: Callable[..., Tribosystem]) -> None:
     """Example 2 is its own mirror image: without the rigid part the gap by e_z is even and by e_x odd under x -> -x."""
-    interface = assembled("example2").interface
+    interface = assembled("example2").elastic.interface
     weights = interface.pair.weights
     balanced = np.eye(len(weights)) - 1 / len(weights)  # forces without resultant, gaps without mean
     for axis, sign in ((1, 1), (0, -1)):

@@ -250,7 +250,7 @@ def test_worn_in_cup(tmp_path: Path) -> None:
         x, weights = system.pair.punch.x, system.pair.weights
         best, largest = system.optimum(1), 4 * load / (np.pi**2 * 100)
         exact = largest * np.maximum(np.cos(np.arctan2(x[:, 0], x[:, 2])), 0)
-        rate = weights @ (coefficient * best.pressure * system.sliding_ratio[0])
+        rate = weights @ (coefficient * best.pressure * system.sliding.ratio[0])
         errors.append(
             (
                 np.abs(best.pressure - exact).max() / largest,

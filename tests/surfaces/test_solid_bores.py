@@ -85,7 +85,7 @@ def test_a_load_off_the_middle_tilts() -> None:
     system = assemble(load_case("bushing-misaligned", coarse))
     assert set(system.rigid.mode_names) == {"lambda_F", "lambda_Fx", "lambda_Mx", "lambda_Mz"}
     (first,) = march(system, 1)
-    traction = system.pair.normal + system.friction_ratio(1)
+    traction = system.pair.normal + system.phases.middle_ratio(1)
     forces = (system.pair.weights * first.pressure[-1])[:, None] * traction
     np.testing.assert_allclose(forces.sum(axis=0)[[0, 2]], [0, 2000], atol=1e-6)
     x = system.pair.opposite

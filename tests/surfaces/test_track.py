@@ -125,9 +125,9 @@ def test_sides_of_a_track_to_and_fro(along: int, cells: dict[str, float]) -> Non
     direction = [float(k == along) for k in range(3)]
     motion = {"kind": "reciprocating", "amplitude": 0.3, "angular_frequency": 1.0, "along": direction, "positions": 12}
     placed = blocks(motion, **cells)
-    worn = placed.phases_wear.worn(np.ones((len(placed.pairs), len(placed.pair.weights))))
+    worn = placed.phases.mean_wear.worn(np.ones((len(placed.sliding.pairs), len(placed.pair.weights))))
     beside, x, xs = 1 - along, placed.pair.punch.x, placed.pair.strip.x
-    for pair in placed.pairs:
+    for pair in placed.sliding.pairs:
         felt = pair.opening(0 * pair.weights, worn.strip)
         for k in np.unique(x[:, along].round(6)):
             row = felt[np.abs(x[:, along] - k) < 1e-6]  # triangles divide the areas of their nodes unevenly

@@ -293,7 +293,10 @@ def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def contact(self: Tribosystem, directions: tuple[int, ...]) -> CondensedContact:
         return CondensedContact(
-            [SlidingContact(self.interface, self.friction_ratio(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
+            [
+                SlidingContact(self.elastic.interface, self.phases.middle_ratio(d) * (1 + 1e-6 * self.bodies.comm.size))
+                for d in directions
+            ]
         )
 
     monkeypatch.setattr(Tribosystem, "contact", contact)

@@ -114,7 +114,7 @@ def relief_rates(system: Tribosystem, modulus: float, speed: Array | float = 1.0
     rigid = system.rigid
     n, r = rigid.rigid_normal.shape
     matrix = np.zeros((n + r, n + r))
-    matrix[:n, :n] = system.interface.compliance(0.0, modulus).matrix()
+    matrix[:n, :n] = system.elastic.interface.compliance(0.0, modulus).matrix()
     matrix[:n, n:] = rigid.rigid_normal
     matrix[n:, :n] = rigid.equilibrium(0.0)
     return np.asarray(np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n] * speed).real)

@@ -131,7 +131,7 @@ def wear_of(half_angle: float) -> float:
 
 def worn(system: Tribosystem, slid: float, tolerance: float = 0.003) -> Block:
     """Return the bore after sliding by so many mm, by jumps."""
-    *_, last = jump(system, round(slid / float(system.sliding_ratio[0].mean())), tolerance=tolerance)
+    *_, last = jump(system, round(slid / float(system.sliding.ratio[0].mean())), tolerance=tolerance)
     return last
 
 

@@ -53,7 +53,7 @@ def drum_brake() -> Result:
         rows.append(profile(f"{elements} elements: optimum (MPa)", pressure, system.optimum(1).pressure, 1e-9))
         x, surface = system.pair.punch.x, system.pair.punch
         area = WIDTH * (system.pair.weights * pressure)[:, None]
-        pressed, rubbed = area * system.pair.normal, area * system.friction_ratio(1)
+        pressed, rubbed = area * system.pair.normal, area * system.phases.middle_ratio(1)
         theta, worst = np.abs(np.arctan2(x[:, 0], -x[:, 1])) - BELOW, 0.0
         for shoe, side, largest in (("right", 1, 1.0), ("left", -1, trailing)):
             own, name = surface.nodes_of(shoe), "leading" if side > 0 else "trailing"
@@ -118,7 +118,7 @@ def two_pads() -> Result:
         alone, best = system.optimum(1), worn_in.optimum(1)
         radius = np.hypot(*surface.x[:, :2].T)
         track = np.hypot(*worn_in.pair.strip.x[:, :2].T)
-        disc = worn_in.phases_wear.worn(best.pressure[None]).strip / (2 * np.pi / SPEED)  # in a turn
+        disc = worn_in.phases.mean_wear.worn(best.pressure[None]).strip / (2 * np.pi / SPEED)  # in a turn
         inside = np.abs(track - (INNER + OUTER) / 2) < 0.3 * (OUTER - INNER)
         of_disc.append(float(np.abs(disc[inside] / rates["disc"] - 1).max()))
         what = f"disc, {across} elements across: recedes (mm/s)"
@@ -141,7 +141,7 @@ def two_pads() -> Result:
             *_, last = jump(worn_in, 1_000_000, tolerance=3e-3)
             what = "pads and disc worn in, by jumps from flat on: pressure (MPa)"
             rows.append(profile(what, best.pressure, last.pressure[-1], 1e-4, scale=best.pressure.max()))
-            by_force = system.interface.compliance(0.0).matrix() / weights
+            by_force = system.elastic.interface.compliance(0.0).matrix() / weights
             front, back = (surface.nodes_of(name) for name in PADS)
             through = by_force[np.ix_(front, back)]
             scale = float(np.abs(through).max())

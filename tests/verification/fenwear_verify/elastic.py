@@ -116,7 +116,9 @@ def patch() -> Result:
                 z = body.space.tabulate_dof_coordinates()[:owned, 1]
                 ours.append(field["displacement"].x.array[: 2 * owned].reshape(-1, 2))
                 exact.append(np.stack([0 * z, strains[1] * heights[1] + strain * z], axis=1))
-            expected, found = (np.concatenate(system.comm.allgather(np.concatenate(part))) for part in (exact, ours))
+            expected, found = (
+                np.concatenate(system.bodies.comm.allgather(np.concatenate(part))) for part in (exact, ours)
+            )
             scale = np.abs(expected).max()
             rows.append(profile(f"{case}: displacement (mm)", expected, found, 1e-9, scale=scale))
     return Result(rows)

@@ -92,12 +92,12 @@ def free_expansion() -> Result:
         )
         turn = expansion * tz * half  # the rotation that the second pin prevents
         exact += turn * np.stack([-z, s], axis=1)
-        exact, ours = (np.concatenate(system.comm.allgather(part)) for part in (exact, ours))
+        exact, ours = (np.concatenate(system.bodies.comm.allgather(part)) for part in (exact, ours))
         scale = np.abs(exact).max()
         rows.append(profile(f"plane {plane}: displacement (mm)", exact, ours, 1e-9, scale=scale))
         if plane == "stress":
             held = 2e5 * alpha * t0  # what a bar held at its ends would bear
-            largest = system.comm.allreduce(float(np.abs(fields["von_mises"].x.array).max()), max)
+            largest = system.bodies.comm.allreduce(float(np.abs(fields["von_mises"].x.array).max()), max)
             rows.append(number(f"plane {plane}: largest stress / E alpha t0", 0, largest / held, 1e-8, scale=1))
     return Result(rows)
 

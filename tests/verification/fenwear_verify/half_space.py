@@ -189,7 +189,10 @@ def love() -> Result:
             system = assemble(make(elements, materials=(RIGID, STEEL)))
             x = system.pair.punch.x
             answers = {
-                "displacement (p L / E*)": (1.0, system.interface.compliance(0.0).apply(np.ones(len(x))) * MODULUS),
+                "displacement (p L / E*)": (
+                    1.0,
+                    system.elastic.interface.compliance(0.0).apply(np.ones(len(x))) * MODULUS,
+                ),
                 "temperature (q L / K)": (0.5, _warmed(make(elements, **hot)) * CONDUCTING["conductivity"]),
             }
             for what, (factor, values) in answers.items():

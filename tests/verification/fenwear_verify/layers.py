@@ -92,4 +92,4 @@ def _approach(system: Tribosystem) -> float:
 
 
 def _giving(system: Tribosystem) -> LayerStep | None:
-    return system.passing(system.phases_wear).step(system.unworn(), implicit=False)
+    return system.phases.passing(system.phases.mean_wear).step(system.unworn(), implicit=False)

@@ -100,7 +100,7 @@ def steady_rise(placed: ContactSetup) -> tuple[Array, Array]:
 
 def rise_after(placed: ContactSetup, *, reduced: bool = False) -> tuple[Array, Array]:
     """Return k theta / q at the end of the first half-cycle by the steps of a run, found and exact (n,); collective."""
-    bodies, pair, motion, heat = placed.bodies.heat, placed.pair, placed.motion, placed.heat
+    bodies, pair, motion, heat = placed.bodies.heat, placed.pair, placed.motion, placed.case.heat
     assert bodies is not None
     assert heat is not None
     phase = motion.phases[0]

@@ -76,7 +76,7 @@ def unrolled(x: Array) -> Array:
 def answer(system: Tribosystem, x: Array) -> Array:
     """Return the disc's displacement along z half a turn from x (n, 3) by unit pressures and their friction (n, m)."""
     pair, strip = system.pair, system.bodies.strip
-    force = (pair.normal + system.friction_ratio(1)) * pair.weights[:, None]
+    force = (pair.normal + system.phases.middle_ratio(1)) * pair.weights[:, None]
     right = strip.trace.place(-(pair.transfer.T.toarray()[:, None, :] * force.T[None]))
     right[strip.supported] = 0.0
     lifted = strip.trace.pick(strip.solve(right))[:, 2]
@@ -105,7 +105,7 @@ class Worn:
 
     def wear(self) -> None:
         """Wear for a turn."""
-        self.worn = self.worn + self.system.phases_wear.worn(self.pressure[None])
+        self.worn = self.worn + self.system.phases.mean_wear.worn(self.pressure[None])
 
 
 def changed(across: int) -> tuple[dict[str, list[Array]], dict[str, list[Array]], Tribosystem]:
@@ -167,7 +167,7 @@ def _in_full_space(both: Tribosystem) -> Row:
     """Compare the condensed contact of both pads with that of all displacements."""
     gap = both.pair.initial_gap + 2e-3 * np.cos(both.pair.punch.x[:, 0] / 7) ** 2
     whole = [(both.bodies.punch, both.bodies.strip)]
-    full = FullContact([SlidingContact(both.interface, both.friction_ratio(1))], whole).solve(gap)
+    full = FullContact([SlidingContact(both.elastic.interface, both.phases.middle_ratio(1))], whole).solve(gap)
     ours = both.contact((1,)).solve(gap).pressure.reshape(-1)
     known = full.pressure.reshape(-1)
     return profile("both pads in full space: pressure (MPa)", known, ours, 1e-8, scale=float(known.max()))
@@ -181,7 +181,7 @@ def _worn_in() -> list[Row]:
     together, rows = vary(whole(4), wears).optimum(1), []
     for name in PADS:
         other, track = apart[OTHER[name]], best[OTHER[name]].pressure
-        receding = other.phases_wear.worn(track[None]).strip / (2 * np.pi / SPEED)
+        receding = other.phases.mean_wear.worn(track[None]).strip / (2 * np.pi / SPEED)
         radius = np.hypot(*other.pair.strip.x[:, :2].T)
         imposed = float(receding[np.abs(radius - MIDDLE) < 0.3 * (OUTER - INNER)].mean())
         (own,) = best[name].velocity.values()

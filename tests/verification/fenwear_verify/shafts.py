@@ -47,7 +47,7 @@ def under(system: Tribosystem, place: float) -> tuple[Array, Array, Array]:
 def carried(system: ContactSetup, pressure: Array) -> tuple[Array, Array]:
     """Return what the nodes of each bushing carry (2, 3), N, and its moment about the origin (2, 3), N mm."""
     pair = system.pair
-    forces = (pair.weights * pressure)[:, None] * (pair.normal + system.friction_ratio(1))
+    forces = (pair.weights * pressure)[:, None] * (pair.normal + system.phases.middle_ratio(1))
     turning = np.cross(pair.opposite, forces)
     owns = [pair.punch.nodes_of(side) for side in SIDES]
     return np.array([forces[own].sum(axis=0) for own in owns]), np.array([turning[own].sum(axis=0) for own in owns])

@@ -220,7 +220,7 @@ def one_way_sliding() -> Result:
             system = builtin("example1", "geometry.degree=2", one_way(direction), coefficient, exponent)
             block = next(march_within(system, RunLimits(1500, block=1500), implicit=True))
             rates = WearRates((np.full(len(system.pair.x), 3 * 1e-4 * MEAN ** (1 - b)),), (PressureLaw(b),))
-            optimum = minimal_dissipation(system.rigid, system.friction_ratio(system.motion.directions[0]), rates)
+            optimum = minimal_dissipation(system.rigid, system.phases.middle_ratio(system.motion.directions[0]), rates)
             x, case = system.pair.x, f"b = {b}, {direction}"
             rows.append(profile(f"{case}: pressure (MPa)", optimum.pressure, block.pressure[-1], 1e-6, scale=MEAN))
             rigid = optimum.velocity["lambda_F"] - optimum.velocity["lambda_M"] * (x - HALF_WIDTH)

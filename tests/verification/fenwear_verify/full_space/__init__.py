@@ -24,19 +24,19 @@ def nothing_condensed() -> Iterator[None]:
         return FullContact(phases, [(own.punch, own.strip) for own in bodies])
 
     def middle(system: Tribosystem, directions: Sequence[int]) -> FullContact:
-        phases = [SlidingContact(system.interface, system.friction_ratio(d)) for d in directions]
+        phases = [SlidingContact(system.elastic.interface, system.phases.middle_ratio(d)) for d in directions]
         return whole(phases, [system.bodies] * len(phases))
 
     def phases_of(system: Tribosystem, phases: Sequence[int]) -> FullContact:
-        ratios = system.friction_ratios()
-        sliding = [SlidingContact(system.interfaces[k], ratios[k]) for k in phases]
+        ratios = system.phases.ratios()
+        sliding = [SlidingContact(system.elastic.interfaces[k], ratios[k]) for k in phases]
         return whole(sliding, [system.loaded[k] for k in phases])
 
     def passed(system: Tribosystem, phase: int, **_how: Any) -> FullContact:
-        interface, factors = system.creep.grown[phase], system.creep.factors(phase)
+        interface, factors = system.elastic.creep.grown[phase], system.elastic.creep.factors(phase)
         softer = [(factors[0], factors[1])]
         both = [(system.loaded[phase].punch, system.loaded[phase].strip)]
-        return FullContact([SlidingContact(interface, system.friction_ratios()[phase])], both, softer)
+        return FullContact([SlidingContact(interface, system.phases.ratios()[phase])], both, softer)
 
     with ExitStack() as patches:
         for owner, name, new in (

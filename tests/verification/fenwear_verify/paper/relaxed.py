@@ -53,11 +53,11 @@ def run_relaxed(system: Tribosystem, half_cycles: int, relaxation: float) -> Cou
     Raises:
         ConvergenceError: a contact did not converge, or the volume of the gap did not rest.
     """
-    exchange, heat, phases = system.exchange, system.heat, range(len(system.motion.phases))
+    exchange, heat, phases = system.exchange, system.case.heat, range(len(system.motion.phases))
     if heat is None:
         raise ValueError("expected a case with heat")
     contacts = [system.phase_contact((phase,)) for phase in phases]
-    laws = [system.wear.phases([system.conditions(phase)], [phase]) for phase in phases]
+    laws = [system.phases.wear.phases([system.phases.conditions(phase)], [phase]) for phase in phases]
     worn, temperature = system.unworn(), exchange.initial()
     states = [contacts[p].solve(system.gap(p, worn) + exchange.gap(temperature, p - 1), None, None) for p in phases]
     pressure = states[0].pressure[0]

@@ -131,8 +131,8 @@ class HeatExchange:
         other.friction = friction
         return other
 
-    def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:
-        """Return the exchange whose conductance a layer gives by the pressures (n,); None where none does."""
+    def through(self, of_layer: Callable[[Array, int], Array] | None) -> HeatExchange:
+        """Return the exchange whose conductance a layer gives by pressures (n,) and phase; None where none does."""
         if of_layer is None:
             return self
         other = copy.copy(self)
@@ -195,18 +195,18 @@ class HeatExchange:
         split = len(self.bases[0])
         return values[:split], values[split:]
 
-    def conductance(self, pressure: Array) -> Array:
+    def conductance(self, pressure: Array, phase: int = 0) -> Array:
         """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
-        value = self._conductance(pressure)
+        value = self._conductance(pressure, phase)
         if self.heat.conducting == "closed":
             value[pressure <= 0] = np.nan
         return value
 
-    def conductance_slope(self, pressure: Array) -> Array:
+    def conductance_slope(self, pressure: Array, phase: int) -> Array:
         """Return dh_c/dp of each node (n,), N/(mm s K MPa): zero where h_c is constant or none conducts."""
         if not self.by_pressure:
             return np.zeros_like(pressure)
-        ends = [self.conductance((1 + sign * SLOPE) * pressure) for sign in (1, -1)]
+        ends = [self.conductance((1 + sign * SLOPE) * pressure, phase) for sign in (1, -1)]
         return np.divide(ends[0] - ends[1], 2 * SLOPE * pressure, out=np.zeros_like(pressure), where=pressure > 0)
 
     def half_cycle(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
@@ -557,13 +557,13 @@ class HeatExchange:
         return Exchanged((first, second), conductance, heat.convection, heat.partition, heat.debris)
 
 
-def _given_conductance(heat: Heat) -> tuple[Callable[[Array], Array], bool]:
+def _given_conductance(heat: Heat) -> tuple[Callable[[Array, int], Array], bool]:
     """Return h_c by the pressure (n,), N/(mm s K), as a table of heat gives it, and whether it depends on that."""
     if heat.conductance_per_pressure is None:
         constant = np.inf if isinstance(heat.conductance, str) else float(heat.conductance)  # a layer's comes later
-        return lambda pressure: np.full(len(pressure), constant), False
+        return lambda pressure, _phase: np.full(len(pressure), constant), False
     h1, h2 = heat.conductance_per_pressure
-    return lambda pressure: np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2)), True
+    return lambda pressure, _phase: np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2)), True
 
 
 def _bases(sides: Sequence[Side]) -> tuple[Basis, ...]:
@@ -594,7 +594,7 @@ class Isothermal(HeatExchange):
         """Whether every rank could continue alone: it has no temperatures of all nodes."""
         return True
 
-    def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:  # noqa: ARG002
+    def through(self, of_layer: Callable[[Array, int], Array] | None) -> HeatExchange:  # noqa: ARG002
         """Return the exchange itself, as nothing conducts."""
         return self
 
@@ -619,7 +619,7 @@ class Isothermal(HeatExchange):
         none = self.gap_change(changes, phase)
         return none, none
 
-    def conductance(self, pressure: Array) -> Array:
+    def conductance(self, pressure: Array, phase: int = 0) -> Array:  # noqa: ARG002
         """Return h_c of each node (n,), N/(mm s K): none."""
         return np.zeros(len(pressure))
 

@@ -15,7 +15,7 @@ sigma apart, beyond which less than 1e-9 of the asperities touch.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Protocol
@@ -113,21 +113,23 @@ class SharedClosure:
 
     Attributes:
         law: Of the asperities.
-        share: X by the pressure (..., n) and the speed.
-        speed: Of sliding, mm/s: of all phases (m, n), of one or of all alike (n,); zero where X does not depend on it.
+        share: X by the pressure (..., n) and the variables.
+        variables: Place, speed and temperature by their names, as laws have them: of all phases (m, n), of one or of
+            all alike (n,).
     """
 
     law: Law
-    share: Callable[[Array, Array], Array]
-    speed: Array
+    share: Callable[[Array, Mapping[str, Array]], Array]
+    variables: Mapping[str, Array]
 
     def at(self, phases: int | Sequence[int]) -> SharedClosure:
         """Return the closure in phases of the motion."""
-        return replace(self, speed=self.speed[phases]) if self.speed.ndim > 1 else self
+        own = {name: value[phases] if value.ndim > 1 else value for name, value in self.variables.items()}
+        return replace(self, variables=own)
 
     def carried(self, pressure: Array) -> Array:
         """Return the pressure of the asperities (...), MPa."""
-        return np.asarray(self.share(pressure, self.speed) * pressure)
+        return np.asarray(self.share(pressure, self.variables) * pressure)
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -148,7 +150,7 @@ class SharedClosure:
         carried = self.law.pressure_of(nearness)
         pressure = carried
         for _ in range(ROUNDS):
-            pressure = carried / np.maximum(self.share(pressure, self.speed), LEAST)
+            pressure = carried / np.maximum(self.share(pressure, self.variables), LEAST)
         return pressure
 
 

@@ -24,11 +24,11 @@ from fenwear.laws.compliant_layer import SharedClosure
 from fenwear.laws.layers import Layers, Regions, common_modulus, over_materials
 from fenwear.surfaces import ContactPair
 
-Conductance = Callable[[Array], Array]
+Conductance = Callable[[Array, int], Array]
 
 
 def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPair) -> Conductance | None:
-    """Return h_c of the nodes (n,), N/(mm s K), by their pressures (n,), MPa; None where the case gives it otherwise.
+    """Return h_c (n,), N/(mm s K), by the pressures (n,), MPa, and the phase; None where the case gives it otherwise.
 
     Args:
         layers: The layers.
@@ -37,14 +37,14 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
         pair: The surfaces opposite each other.
 
     Raises:
-        CaseError: the share that asperities carry follows a speed that changes during the cycle.
+        CaseError: the share that asperities carry depends on the temperature.
     """
     if case.heat is None or case.heat.conductance != "layer":
         return None
-    if isinstance(layers.closure, SharedClosure) and layers.closure.speed.ndim > 1:
+    if isinstance(layers.closure, SharedClosure) and "T" in layers.closure.variables:
         message = (
-            "expected a number: contact.lubrication depends on v, which changes during the cycle. "
-            "'layer' takes one share for all of it"
+            "expected a number: contact.lubrication depends on T. Spots that conduct by their own temperature make "
+            "conduction non-linear, which its steps are not"
         )
         raise CaseError(InputError("heat.conductance", message))
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None
@@ -52,8 +52,8 @@ def conductance_of(layers: Layers, case: Case, regions: Regions, pair: ContactPa
     resistance = over_materials(case, regions, pair, lambda material: 0.5 / float(material.conductivity or np.nan))
     share = 1 / (resistance * modulus)  # 2 k_1 k_2 / (k_1 + k_2) over E*
 
-    def conductance(pressure: Array) -> Array:
-        closure, carried = layers.gives, np.maximum(pressure, 0.0)
+    def conductance(pressure: Array, phase: int) -> Array:
+        closure, carried = layers.at(phase).gives, np.maximum(pressure, 0.0)
         if isinstance(closure, SharedClosure):  # the spots conduct that asperities make
             carried = closure.carried(carried)
             closure = closure.law

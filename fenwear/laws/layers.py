@@ -39,7 +39,7 @@ from fenwear.laws.compliant_layer import (
     SharedClosure,
 )
 from fenwear.laws.debris import LIFE, NO_DEBRIS, Debris
-from fenwear.laws.friction import asperity_share
+from fenwear.laws.friction import ContactConditions, asperity_share
 from fenwear.laws.law_states import FORGETFUL, Held, Memory
 from fenwear.laws.wear import NOTHING, WornDepths
 from fenwear.surfaces import ContactPair
@@ -116,6 +116,14 @@ class Layers:
     def at(self, phases: int | Sequence[int]) -> Layers:
         """Return the layers in phases of the motion: asperities under a film that follows the speed close by phase."""
         return replace(self, closure=self.closure.at(phases)) if isinstance(self.closure, SharedClosure) else self
+
+    def under(self, conditions: Sequence[ContactConditions]) -> Layers:
+        """Return the layers of phases at their temperatures, which a share of asperities may depend on."""
+        closure = self.closure
+        if not conditions or not isinstance(closure, SharedClosure) or "T" not in closure.variables:
+            return self
+        warmth = np.array([one.of("friction")["T"] for one in conditions])
+        return replace(self, closure=replace(closure, variables={**closure.variables, "T": warmth}))
 
     @property
     def varies(self) -> bool:
@@ -351,8 +359,8 @@ def layers_of(
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
         strip_carries: Whether debris lies on the strip's material.
-        alike: Variables of laws that are the same in all cycles: the speed v in each phase (m, n), or in all of them
-            (n,), and the temperature T (n,).
+        alike: Variables of laws: the speed v in each phase (m, n), or in all of them (n,), and the initial temperature
+            T (n,), which `Layers.under` changes.
 
     Raises:
         CaseError: a value is not positive somewhere.
@@ -373,9 +381,7 @@ def layers_of(
         case RoughLayer() as law:
             closure = _rough(law, modulus, _at_nodes(law, place, n))
     if closure is not None and contact.lubrication is not None:
-        known = {**place, **(alike or {})}
-        share = _share_by_pressure(contact.lubrication, known)
-        closure = SharedClosure(closure, share, known.get("v", np.zeros(n)))
+        closure = _of_asperities(closure, contact.lubrication, place, alike or {})
     third = contact.third_body
     if third is not None:
         varies = isinstance(third.life, Dependence) and third.life.varies
@@ -417,23 +423,28 @@ def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[st
     return [place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units.items()]
 
 
-def _share_by_pressure(lubrication: Lubrication, known: Mapping[str, Array]) -> Callable[[Array, Array], Array]:
-    """Return the share of the pressure that asperities carry (..., n) by the pressure (..., n) and the speed.
+def _of_asperities(
+    law: Law, lubrication: Lubrication, place: Mapping[str, Array], known: Mapping[str, Array]
+) -> SharedClosure:
+    """Return the closure of asperities that carry a share of the pressure (..., n) by it, the speed and the warmth.
 
     Raises:
-        CaseError: it depends on a speed or temperature that changes, which a layer does not follow.
+        CaseError: it depends on a speed or temperature that changes, which a layer does not follow with stick.
     """
-    asked = [variable for variable in ("v", "T") if depends_on(lubrication.coefficient, variable)]
-    changing = [variable for variable in asked if variable not in known]
+    asked = [name for name in ("v", "T") if depends_on(lubrication.coefficient, name)]
+    changing = [name for name in asked if name not in known]
     if changing:
         message = (
-            f"contact.lubrication.{lubrication.key} depends on {changing[0]}, which changes during the cycle. A layer "
-            "of asperities does not follow it. Remove the layer, or let the share depend on p and the place alone"
+            f"contact.lubrication.{lubrication.key} depends on {changing[0]}, which changes from step to step. "
+            "With stick, a layer of asperities does not follow it: nodes that stop keep a film for a while, which no "
+            "share describes. Remove the layer, or let the share depend on p and the place alone"
         )
         raise CaseError(InputError("contact.layer", message))
-    return lambda pressure, speed: asperity_share(
-        lubrication, {**known, "p": pressure, "v": speed}, pressure.shape, checked=False
-    )
+
+    def share(pressure: Array, variables: Mapping[str, Array]) -> Array:
+        return asperity_share(lubrication, {**variables, "p": pressure}, pressure.shape, checked=False)
+
+    return SharedClosure(law, share, {**place, **{name: known[name] for name in asked}})
 
 
 def _rough(law: RoughLayer, modulus: float | Array, values: list[Array]) -> Law:

@@ -116,7 +116,7 @@ class ThermalContact:
         relaxed = 1.0
         pressure = start.pressure[0]
         for iteration in range(1, MAX_ITERATIONS + 1):
-            conductance = exchange.conductance(pressure)
+            conductance = exchange.conductance(pressure, self.phase)
             after, terms = exchange.half_cycle(temperature, self.phase, pressure, conductance)
             response = self._respond(conductance)
             free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
@@ -124,7 +124,7 @@ class ThermalContact:
             change = contact.pressure[0] - pressure
             if agreed(self.system.bodies.comm, bool(np.abs(change).max() < CLOSE * mean)):
                 return contact, after, self._heat(after, terms, iteration)
-            others = response.conductance, exchange.conductance(contact.pressure[0])
+            others = response.conductance, exchange.conductance(contact.pressure[0], self.phase)
             exact = all(np.array_equal(other, conductance, equal_nan=True) for other in others)
             if agreed(self.system.bodies.comm, exact):
                 after = exchange.at(after.values + response.state @ change)
@@ -155,7 +155,9 @@ class ThermalContact:
         contact, pressure, volume = start, start.pressure[0], np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
             closed = np.where(contact.pressure[0] > 0, pressure, 0.0)  # relaxed pressures never get to zero
-            after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(closed))
+            after, terms = exchange.half_cycle(
+                temperature, self.phase, pressure, exchange.conductance(closed, self.phase)
+            )
             free = gap + exchange.gap(after, self.phase)
             try:
                 contact = self._contact.solve(free, contact, wearing)
@@ -482,7 +484,7 @@ class PhaseStep:
         wear = (
             self._passing.wear if system.phases.wear.constant else system.phases.wear.phases([conditions], [self.phase])
         )
-        layers, debris = self._layers, self._passing.debris
+        layers, debris = self._layers.under([conditions]), self._passing.debris
         if layers.varies:
             onto = layers.places([system.sliding.pairs[self.phase]])
             debris = layers.debris.over(system.sliding.path[[self.phase]], [conditions], onto)

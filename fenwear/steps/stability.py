@@ -461,7 +461,7 @@ def opened_by_heat(
         heating = [heating_friction(system, slope, k) for k in range(len(system.motion.phases))]
         exchange = exchange.with_friction(np.array(heating))
     unit = np.eye(len(pressure))[:, pressure > 0]
-    conductance, rise = exchange.conductance(pressure), exchange.conductance_slope(pressure)
+    conductance, rise = exchange.conductance(pressure, phase), exchange.conductance_slope(pressure, phase)
     changes, _ = exchange.change(phase, conductance, pressure=unit)
     if state is not None and rise.any():
         by_rise = system.exchange.by_conductance(phase, state, pressure, conductance) * rise

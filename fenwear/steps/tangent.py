@@ -71,12 +71,10 @@ def phase_tangent(
     state_s = np.block([[state_s, np.zeros((dim, len(crept.stay)))], [by_mu_crept @ traction_s, np.diag(crept.stay)]])
     state_p, dim = np.vstack([state_p, crept.by_pressure + by_mu_crept * traction_p]), len(state_s)
     laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
-    traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
+    traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s + laws.closed_s, none])
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_by_p
     by_state = by_mu @ traction_s + gap_by_s + before_s
-    slope = system.layers.at(phase).slope(pressure[None])
-    if slope is not None:
-        opened = opened + np.diag(slope[0])
+    opened = opened + np.diag(laws.closed_p)
     if implicit:
         opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
     balance = rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p
@@ -148,7 +146,7 @@ def _goes_on(
     gap_rows, before_s, state_s, state_p = (np.zeros(shape) for shape in ((n, dim), (n, dim), (dim, dim), (dim, n)))
     gap_rows[:, :of_heat] = heat.gap_rows[phase]
     if conductance is None:
-        conductance = heat.exchange.conductance(pressure)
+        conductance = heat.exchange.conductance(pressure, phase)
     state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
     if laws.lies is not None:
         state_p[of_heat:], state_s[of_heat:], reads = laws.lies
@@ -167,6 +165,7 @@ class _Laws:
         mu_s: To the state of the heat, and to the thickness of debris at its start where there is any, of L nodes where
             it lies (n, dim).
         worn_p, worn_s: Of the gap that the wear of the phase opens (n, n) and (n, dim).
+        closed_p, closed_s: Of the closure of layers (n,) and (n, dim).
         lies: Of the thickness of debris at its end (L, n) and (L, dim), and what of it lies at the contact's nodes
             (n, L); None without.
     """
@@ -177,6 +176,8 @@ class _Laws:
     mu_s: Array
     worn_p: Array
     worn_s: Array
+    closed_p: Array
+    closed_s: Array
     lies: tuple[Array, Array, Array] | None = None
 
 
@@ -215,7 +216,12 @@ def _laws(
         wear = system.phases.wear.phases([at(*values)], [phase])
         return np.array([body.depth(values[0][None])[0] for body in (wear.punch, wear.strip)])
 
+    def closed(*values: Array) -> Array:
+        return system.layers.at([phase]).under([at(*values)]).closing(values[0][None])[0]
+
     wear = system.phases.wear.phases([at(*around)], [phase])
+    closed_p = system.layers.at([phase]).under([conditions]).slope(pressure[None])[0]
+    _, *closed_t = _slopes(closed, around)
     mu_p, *mu_t = _slopes(friction, around)
     by_depths = _slopes(depths, around)
     worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
@@ -224,7 +230,8 @@ def _laws(
     rate = heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
-    laws = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+    closed_s: Array = (np.array(closed_t[:2])[:, :, None] * picked).sum(axis=0)
+    laws = _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, closed_p, closed_s)
     if not lies:
         return laws
     debris, taken = system.layers.debris, depths(*around).sum(axis=0)
@@ -234,7 +241,8 @@ def _laws(
     )
     lies_s: Array = np.hstack([(np.array(lies_t) @ picked).sum(axis=0), left + lies_here @ reads])
     mu_s, worn_s = np.hstack([mu_s, mu_t[2][:, None] * reads]), np.hstack([worn_s, worn_t[2] @ reads])
-    return replace(laws, mu_s=mu_s, worn_s=worn_s, lies=(lies_p, lies_s, reads))
+    closed_s = np.hstack([closed_s, np.zeros_like(reads)])
+    return replace(laws, mu_s=mu_s, worn_s=worn_s, closed_s=closed_s, lies=(lies_p, lies_s, reads))
 
 
 def _lying(
@@ -282,7 +290,7 @@ def _heated(
     by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
     by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.dim))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
-    rise = exchange.conductance_slope(pressure)
+    rise = exchange.conductance_slope(pressure, phase)
     if state is not None and rise.any():
         by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
     changes: Array = by_power @ (pressure[:, None] * laws.mu_s)

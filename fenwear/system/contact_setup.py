@@ -186,7 +186,8 @@ class PhaseLaws:
         chosen = list(range(len(self.sliding.motion.phases)) if phases is None else phases)
         if not conditions and self.layers.varies:
             conditions = [self.conditions(k) for k in chosen]
-        return LayerEvolution.over(self.layers.at(chosen), wear, self.sliding.path[chosen], evolution, conditions)
+        layers = self.layers.at(chosen).under(conditions)
+        return LayerEvolution.over(layers, wear, self.sliding.path[chosen], evolution, conditions)
 
     def evolution(
         self,
@@ -304,11 +305,9 @@ class ContactSetup:
 
     @property
     def _alike(self) -> dict[str, Array]:
-        """Variables of laws that are the same in all cycles: the speed of the phases, without heat the temperature."""
-        temperature = (
-            {} if self.case.heat is not None else {"T": np.full(len(self.pair.weights), self.case.initial_temperature)}
-        )
-        return {**temperature, "v": self.sliding.steady_speed}
+        """Variables of laws: the speed of the phases, and the initial temperature."""
+        initial = np.full(len(self.pair.weights), self.case.initial_temperature)
+        return {"T": initial, "v": self.sliding.steady_speed}
 
     @cached_property
     def phases(self) -> PhaseLaws:

@@ -171,8 +171,8 @@ def isothermal(placed: ContactSetup) -> Isothermal:
     return Isothermal(len(placed.rigids), len(placed.pair.weights), placed.case.initial_temperature)
 
 
-def layer_conductance(placed: ContactSetup) -> Callable[[Array], Array] | None:
-    """Return h_c by the pressures (n,), where the layer gives it (`fenwear.laws.contact_conductance`)."""
+def layer_conductance(placed: ContactSetup) -> Callable[[Array, int], Array] | None:
+    """Return h_c by pressures (n,) and phase, where the layer gives it (`fenwear.laws.contact_conductance`)."""
     return conductance_of(placed.layers, placed.case, placed.bodies.regions, placed.pair)
 
 

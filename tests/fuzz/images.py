@@ -118,8 +118,9 @@ def _floors(history: xarray.Dataset, sizes: Sizes) -> dict[str, float]:
         if values.dtype.kind == "f" and not COUNTED.search(str(name)):
             unit = values.attrs.get("units", "1")
             largest[unit] = max(largest.get(unit, 0.0), float(np.nanmax(np.abs(values.values), initial=0.0)))
-    # A bulk, or a place where a body is held, that no heat has come to yet: what the mesh makes of it, and a basis.
-    passed = {unit: 0.01 * largest.get(unit, 0.0) for unit in ("K", "mJ")}
+    # A bulk, or a place where a body is held, that no heat has come to yet: what the mesh makes of it, and a basis,
+    # whose tolerance of 1e-7 of all heat is 5e-6 of this.
+    passed = {unit: 0.02 * largest.get(unit, 0.0) for unit in ("K", "mJ")}
     return {unit: SMALL * value for unit, value in largest.items()} | {"1": 1e-3, "rad": 1e-3} | passed
 
 

@@ -150,7 +150,7 @@ def test_rough_linings_of_two_materials_close_and_conduct_as_each_does(tmp_path:
     assert isinstance(closure, RoughClosure)
     assert conductance is not None
     pressure = np.full(len(x), 50.0)
-    found, slope = conductance(pressure), closure.slope(pressure)
+    found, slope = conductance(pressure, 0), closure.slope(pressure)
     for side, young, poisson, k in ((x < -0.1, 2e5, 0.3, 45.0), (x > 0.1, 2e4, 0.2, 5.0)):
         modulus = 1 / ((1 - 0.3**2) / 2e5 + (1 - poisson**2) / young)
         np.testing.assert_allclose(closure.stiffness[side], 4 / 3 * modulus * 1e3 * 0.05**0.5 * HEIGHT**1.5)

@@ -11,9 +11,13 @@ from combinations import SMALL as SMALLEST
 from combinations import STICK
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.common.arrays import Array
+from fenwear.steps import Block
+from fenwear.steps.coupled_phases import cycle_heat
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import march_within
-from fenwear.steps.run_state import beginning
+from fenwear.steps.run_state import beginning, on_exchange
+from fenwear.steps.tangent import phase_tangent
 from fenwear.system import layer_conductance
 
 Assemble = Callable[..., Tribosystem]
@@ -115,20 +119,29 @@ def test_a_layer_of_asperities_feels_their_pressure(kind: str, assembled: Assemb
     of_dry, of_wet = layer_conductance(dry), layer_conductance(wet)
     assert of_dry is not None
     assert of_wet is not None
-    np.testing.assert_allclose(of_wet(pressure), of_dry(carried), rtol=1e-9)
+    np.testing.assert_allclose(of_wet(pressure, 0), of_dry(carried, 0), rtol=1e-9)
     change = wet.layers.given(pressure + step) - wet.layers.given(pressure - step)
     np.testing.assert_allclose(wet.layers.slope(pressure), change / (2 * step), rtol=1e-4)
 
 
 def test_a_layer_of_asperities_under_a_film(assembled: Assemble) -> None:
-    """The share follows the speed of each phase; heat of the layer asks for one that stays, and stick for no speed."""
+    """The share follows the speed of each phase, for the heat of the layer, too; with stick it may follow none."""
     layer = "contact.layer={kind='power', reference='1 um', pressure='5 MPa'}"
     dry, wet = (assembled("example2", *SMALL, MOTION % 100, layer, *more) for more in ((), (FILM,)))
     pressure = np.full(len(dry.pair.weights), MEAN)
     np.testing.assert_allclose(wet.layers.given(pressure), dry.layers.given(0.4 * pressure), rtol=1e-12)
-    heat = (*SMALL, "geometry.parameters.overlap=2", "motion.positions=3", layer, FILM, "heat.conductance='layer'")
-    with pytest.raises(CaseError, match=r"heat\.conductance: .* depends on v"):
-        assembled("example2-heat", *heat, "heat.partition=0.9")
+    few = ("geometry.degree=1", "geometry.parameters.elements_along_contact=6", "geometry.parameters.overlap=2")
+    heat = (*few, "motion.positions=3", layer, "heat.conductance='layer'", "heat.partition=0.9")
+    dry, wet = (assembled("example2-heat", *heat, *more) for more in ((), (FILM,)))
+    pressure, speeds = pressure[: len(dry.pair.weights)], [wet.phases.conditions(phase).speed[0] for phase in range(3)]
+    assert max(speeds) > 1.5 * min(speeds)
+    for phase, share in enumerate(np.interp(0.1 * np.sqrt(speeds), [0, 1, 3], [1, 0.4, 0])):
+        expected = dry.exchange.conductance(share * pressure)
+        np.testing.assert_allclose(wet.exchange.conductance(pressure, phase), expected, rtol=1e-9)
+    (*_, marched), (*_, jumped) = march(wet, 8, implicit=True), jump(wet, 8, tolerance=1e-3)
+    np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=0, atol=1e-2 * marched.wear[-1].max())
+    with pytest.raises(CaseError, match=r"heat\.conductance: .* depends on T"):
+        assembled("example2-heat", *heat, "contact.lubrication.asperity_share={expression='min(1, 0.01 * T)'}")
     with pytest.raises(CaseError, match=r"contact\.layer: .* depends on v"):
         assembled("fretting-partial-slip", *SMALLEST, "contact.law='coulomb'", *STICK, layer, FILM)
 
@@ -155,6 +168,44 @@ def test_a_layer_under_a_film_that_changes_within_the_cycle(assembled: Assemble)
     start = replace(beginning(elastic), worn=replace(elastic.unworn(), punch=state.shape))
     (first,) = march_within(elastic, RunLimits(1, block=1), start=start)
     np.testing.assert_allclose(first.end.contacts[0].pressure[0], state.phase_pressure[0], rtol=1e-9, atol=1e-9)
+
+
+def test_a_layer_under_a_film_that_thins_with_the_warmth(assembled: Assemble) -> None:
+    """X(T) p of the moment closes the layer; march, jump and end agree, and the tangent is that of the march."""
+    layer = "contact.layer={kind='power', reference='1 um', pressure='5 MPa', exponent=0.5}"
+    share = "contact.lubrication.asperity_share={expression='min(1, 0.3 + 0.01 * T)'}"
+    wet = assembled("ring-on-ring-heat", "geometry.degree=1", "geometry.parameters.across=4", layer, share)
+    pressure, warm = np.full((1, len(wet.pair.weights)), MEAN), np.full(len(wet.pair.weights), 30.0)
+    layers = wet.phases.passing(
+        wet.phases.mean_wear, None, None, [wet.phases.conditions(0, pressure[0], (warm, warm))]
+    ).layers
+    np.testing.assert_allclose(layers.closing(pressure), 1e-3 * np.sqrt(0.6 * pressure / 5), rtol=1e-12)
+    (*_, marched), (*_, jumped) = march(wet, 40, implicit=True), jump(wet, 40, tolerance=1e-3)
+    np.testing.assert_allclose(jumped.wear[-1], marched.wear[-1], rtol=0, atol=1e-3 * marched.wear[-1].max())
+    state = steady(wet)
+    assert state.heat is not None
+    start = replace(beginning(wet, state.heat.end), worn=replace(wet.unworn(), punch=state.shape))
+    *_, block = march(wet, 1, implicit=True, start=start)
+    np.testing.assert_allclose(block.end.contacts[0].pressure[0], state.phase_pressure[0], rtol=1e-6)
+    heat, n = cycle_heat(wet), len(wet.pair.weights)
+    begin = on_exchange(replace(marched.end, half_cycle=0), heat.exchange)
+    assert begin.temperature is not None
+    values = begin.temperature.values
+
+    def ended(change: Array) -> tuple[Array, Block]:
+        worn = replace(begin.worn, punch=begin.worn.punch + change[len(values) :])
+        warmed = heat.exchange.at(values + change[: len(values)])
+        *_, last = march(wet, 1, implicit=True, start=replace(begin, worn=worn, temperature=warmed))
+        end = on_exchange(last.end, heat.exchange).temperature
+        assert end is not None
+        return np.append(end.values, last.wear[-1] + last.wear_strip[-1]), last
+
+    change = np.concatenate([1e-4 * values, 1e-9 * np.sin(np.arange(n) ** 2)])
+    (_, last), (up, _), (down, _) = (ended(sign * change) for sign in (0, 1, -1))
+    found = (up - down) / 2 - change
+    expected = phase_tangent(wet, 0, last.pressure[0], heat, begin.temperature) @ change - change
+    for part in (slice(0, len(values)), slice(len(values), None)):
+        np.testing.assert_allclose(expected[part], found[part], rtol=0, atol=1e-3 * np.abs(found[part]).max())
 
 
 def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> None:

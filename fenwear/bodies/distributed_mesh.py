@@ -143,7 +143,8 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
         path = None
     if path is None:
         names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
-        raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
+        known = f"; ready ones are {names}" if geometry.file.endswith(".geo") else f" in {places[0].parent.resolve()}"
+        raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}{known}"))
     ends, suffix = (".geo", ".msh", *CAD, *MESHES), path.suffix.lower()
     shape, of_gmsh = suffix in CAD, suffix in (".geo", ".msh")
     of_cad = f"belongs to a shape from CAD ({', '.join(CAD)}); a {path.suffix} file has its own sizes"

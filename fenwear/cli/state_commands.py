@@ -37,6 +37,7 @@ AccuracyOption = Annotated[
     typer.Option("--accuracy", help="Estimate the numerical uncertainty of the largest pressures and temperature."),
 ]
 
+DIGITS_OF_ANGLE = 9  # in degrees: the rest is rounding
 SIZES = ("largest_pressure", "mean_pressure", "contact_width", "contact_area")
 CARRIED = ("normal_force", "friction_force", "friction_torque")
 FOLLOWED = 16  # phases a cycle, up to which the way to the steady state is sought: with many it takes minutes
@@ -285,7 +286,7 @@ def _steady_text(case: str, state: SteadyState, results: dict[str, Any]) -> str:
         for body, warm in (("punch", state.heat.punch), ("strip", state.heat.strip)):
             in_all[f"largest temperature of the {body}'s contact ({degrees.shown})"] = float(degrees.of(warm).max())
     rows += [(label, [value]) for label, value in in_all.items() if value is not None]
-    title = f"cyclic steady state of {case} ({state.iterations} Newton iterations)"
+    title = f"cyclic steady state of {case}, Newton iterations: {state.iterations}"
     of_step = [f"of {results['of']}"] if "of" in results else []
     if state.passes:
         of_step.append(f"material properties updated {state.passes} times to these temperatures")
@@ -371,7 +372,8 @@ def _optimum_text(system: ContactSetup, optima: dict[str, Optimum], of_step: str
         names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
         at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
         rows.append((f"pressure at {at} mm (MPa)", [float(optimum.pressure[end]) for optimum in states]))
-        rows.append((f"angle chi at {at} mm (degrees)", [math.degrees(optimum.tilt[end]) for optimum in states]))
+        angles = [round(math.degrees(optimum.tilt[end]), DIGITS_OF_ANGLE) for optimum in states]
+        rows.append((f"angle chi at {at} mm (degrees)", angles))
     return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(optima), rows)])
 
 

@@ -30,6 +30,7 @@ from fenwear.common.errors import did_you_mean
 
 MISSING = ("", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a", "inf", "-inf")
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
+SUGGESTED, LIKE = 8, 0.5  # names of columns in a message, and how alike they are to an unknown one
 MOST_HEAD = 200  # lines that an instrument may write before the heading
 _HEADING = re.compile(
     r"\s*(?P<name>[^\W\d][\w \-]*?)\s*(?:[(\[]\s*(?P<unit>.*?)\s*[)\]]|\s/\s*(?P<slash>\S.*?)|/(?P<tight>[^\s()]+))?\s*"
@@ -37,6 +38,7 @@ _HEADING = re.compile(
 _DIRECTIVE = re.compile(r"(?P<set>set\b\s*)?(?P<name>[^\s=:]+)\s*(?P<sign>[=:])\s*(?P<value>.+)", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")
+_POINTS = re.compile(r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+")
 _BOTH = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+,\d*")
 _VALUE = re.compile(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
 
@@ -185,7 +187,7 @@ def read_table(
     rows = _rows(rest, separator, len(heads))
     heads, rows = _with_unit_row(heads, rows, unit_free or keys)
     _check_heads(heads, known, header_line)
-    rows, decimal = _decimals(rows)
+    rows, decimal = _decimals(rows, separator)
     missing = next((value for _, name, value in given if name == "missing"), "error").strip().casefold()
     if missing not in ("error", "skip"):
         raise TableError("# missing", f"expected skip or error, got {missing!r}")
@@ -363,8 +365,9 @@ def check_names(heads: Sequence[Head], known: Collection[str], where: str) -> No
         TableError: names the column.
     """
     for name in (head.name for head in heads if known and head.name not in known):
+        near = difflib.get_close_matches(name, known, SUGGESTED, LIKE) or list(known)[:SUGGESTED]
         hint = did_you_mean(name, known) or "."
-        message = f"not known{where}{hint} Expected some of {', '.join(known)}, each with its unit"
+        message = f"not known{where}{hint} Expected a name with its unit, such as {', '.join(near)}"
         raise TableError(f"column {name!r}", message)
 
 
@@ -373,15 +376,20 @@ def _is_number(cell: str) -> bool:
     return match is not None and bool(re.search(r"\d", match[1]))
 
 
-def _decimals(rows: list[tuple[int, list[str]]]) -> tuple[list[tuple[int, list[str]]], str]:
+def _decimals(rows: list[tuple[int, list[str]]], separator: str) -> tuple[list[tuple[int, list[str]]], str]:
     """Return rows whose numbers have decimal points, and how they were written.
 
     Raises:
-        TableError: a comma may stand for a decimal point or for thousands.
+        TableError: a comma may stand for a decimal point or for thousands, or a point for thousands.
     """
     parts = [(line, [_VALUE.fullmatch(cell) for cell in cells]) for line, cells in rows]
     numbers = [(line, match[1]) for line, matches in parts for match in matches if match is not None]
     commas = [(line, text) for line, text in numbers if "," in text]
+    points = [(line, text) for line, text in numbers if "." in text]
+    if not commas and separator == ";" and points and all(_POINTS.fullmatch(text) for _, text in points):
+        line, text = points[0]
+        message = f"{text!r} may be {text.replace('.', '')} or {text}0. Write one of these."
+        raise TableError(f"row {line}", message)
     if not commas:
         return rows, "decimal points"
     decimal = any(_BOTH.fullmatch(t) or (_COMMA.fullmatch(t) and not _THOUSANDS.fullmatch(t)) for _, t in commas)

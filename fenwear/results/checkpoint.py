@@ -235,7 +235,7 @@ def _checked(directory: Path, case: Case) -> Arrays:
     present = _flat(by_roles(tomllib.loads(case.to_toml())))
     keys = sorted({*saved, *present})
     problems = [
-        InputError(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
+        InputError(key, f"the checkpoint has {_shown(saved, key)}, the case {_shown(present, key)}")
         for key in keys
         if saved.get(key) != present.get(key) and not key.startswith(FREE_KEYS)
     ]
@@ -255,6 +255,12 @@ def _check_sizes(directory: Path, kept: Checkpoint, system: Tribosystem) -> None
             raise damaged(directory)
     if not all(np.isfinite(depth).all() for depths in (worn, followed) for depth in (depths.punch, depths.strip)):
         raise damaged(directory)
+
+
+def _shown(keys: Mapping[str, Any], key: str) -> str:
+    """Return the value of a key for a message, a number without the digits that are rounding."""
+    value = keys.get(key, "nothing")
+    return f"{value:.12g}" if isinstance(value, float) else repr(value)
 
 
 def _flat(tables: Any, path: str = "") -> dict[str, Any]:

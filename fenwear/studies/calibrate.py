@@ -398,6 +398,12 @@ def _traces(problem: LeastSquares, predicted: Array, lines: Array) -> list[Trace
 LEAST_TESTS = 3
 
 
+def check_count(tests: Sequence[object]) -> None:
+    """Raise where tests are too few for a scatter between them."""
+    if len(tests) < LEAST_TESTS:
+        raise CaseError(InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(tests)}"))
+
+
 def between(calibrations: Sequence[Calibration]) -> Scatter:
     """Return the distribution of the unknowns from test to test: what tests of the same kind differ by.
 
@@ -412,10 +418,7 @@ def between(calibrations: Sequence[Calibration]) -> Scatter:
 
 def _between(calibrations: Sequence[Calibration]) -> tuple[Array, Array, list[bool]]:
     """Return middle values, covariance between tests, and which unknowns are taken by their logarithms."""
-    if len(calibrations) < LEAST_TESTS:
-        raise CaseError(
-            InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(calibrations)}")
-        )
+    check_count(calibrations)
     if len({tuple(calibration.values) for calibration in calibrations}) > 1:
         raise CaseError(InputError("--each", "expected the same unknowns in every calibration"))
     logarithmic = [fitted.logarithmic for fitted in calibrations[0].fitted]

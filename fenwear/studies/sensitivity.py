@@ -85,6 +85,7 @@ def _slope(t: Array, y: Array) -> tuple[float, float]:
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small
 GOOD = 1e-6  # relative error of a derivative at which the step stays
 SURELY = 0.1  # relative change of a key that a quantity without any derivative is held against
+ROUNDING = 1e-9  # elasticity below which a derivative is rounding
 NONE = 1e-3  # elasticity below which a derivative may have the error of this one
 NUMBERS = ("derivative", "error", "elasticity", "low", "high")
 Method = Literal["differences", "window"]
@@ -114,6 +115,11 @@ class Derivative:
     low: float
     high: float
     method: str
+
+    @property
+    def shown(self) -> float:
+        """The derivative, zero where it is rounding."""
+        return 0.0 if abs(self.elasticity) < ROUNDING else self.derivative
 
     @property
     def error_of(self) -> str:
@@ -154,7 +160,7 @@ class Sensitivity:
         )
         for row in self.ranked():
             lines.append(
-                f"  {row.key:36} {row.elasticity:9.4f} {row.derivative:13.5e} {row.error:9.1e}  "
+                f"  {row.key:36} {row.elasticity:9.4f} {row.shown:13.5e} {row.error:9.1e}  "
                 f"{row.low:11.5g} {row.high:11.5g}  {row.method}"
             )
         if any(row.method != "window" for row in self.derivatives):

@@ -20,7 +20,7 @@ from fenwear.report.style import BLUE, GREY, RED, panels, reference_line
 from fenwear.results.disk import replacing, write_text
 from fenwear.results.export import csv_text
 from fenwear.results.history import make_directory, write_case
-from fenwear.studies.calibrate import Calibration, between, between_as_json, calibrate, calibrate_each
+from fenwear.studies.calibrate import Calibration, between, between_as_json, calibrate, calibrate_each, check_count
 from fenwear.studies.lifetime import Lifetime, Lives, lifetime
 from fenwear.studies.measured_data import read_data
 from fenwear.studies.model import Model
@@ -189,6 +189,8 @@ def run_calibrate(
     Raises:
         CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
     """
+    if each:
+        check_count(files)
     asked = [parse_unknown(case, text) for text in unknowns]
     how, folder, comm = in_results(how, f"calibrate-{name}")
     data = on_root(comm, lambda: [read_data(path, case) for path in files])

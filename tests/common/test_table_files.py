@@ -51,6 +51,7 @@ WRONG = {
     BASE.replace("volume", "volum"): r"'volum'.*did you mean 'volume'",
     BASE.replace("volume (mm^3)", "volume"): r"'volume': has no unit",
     BASE.replace("100", '"1,000"').replace("0.", "0"): r"row 3: '1,000' may be 1000 or 1.000",
+    EURO.replace("0,25", "1.000").replace("0,49", "2").replace("0,74", "3"): r"row 3: '1.000' may be 1000 or 1.0000",
     BASE.replace("cycles)", "revolutions)"): r"does not turn",
     BASE.replace("cycles)", "rad)"): r"column 'after'",
     BASE.replace("cycles)", "ppm)"): r"column 'after'",

@@ -57,7 +57,7 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
     ("text", "expected"),
     [
         ("", "holds nothing"),
-        ("after (m), waer (mm)\n" + ROWS, r"column 'waer': not known.*some of x, after, depth"),
+        ("after (m), waer (mm)\n" + ROWS, r"column 'waer': not known.*such as"),
         ("after (m), volume\n" + ROWS, "column 'volume': has no unit"),
         ("after (m), volume (kg)\n" + ROWS, "column 'volume': unit: .*another kind"),
         ("after (m), volume (mmm)\n" + ROWS, "column 'volume': unit: .*, got 'mmm', whose unit is not known"),

@@ -137,8 +137,11 @@ class Deep:
     body: str
 
 
-def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float = 0.0) -> Deep | None:
-    """Return the element that is the deepest for its place below a contact; None where nothing touches; collective.
+NONE_DEEP = Deep(0.0, 0.0, 1.0, 0.0, "")  # no element
+
+
+def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float = 0.0) -> Deep:
+    """Return the element that is the deepest for its place below a contact; `NONE_DEEP` where none is; collective.
 
     Args:
         system: The problem.
@@ -148,18 +151,17 @@ def deepest(system: Tribosystem, net: ContactNet, pressure: Array, width: float 
     """
     zone = net.zone(pressure)
     if zone is None:
-        return None
+        return NONE_DEEP
     ends = np.where(zone.free == 1, 1.0, 2.0)  # beyond an end that is not free the contact is as made, or symmetric
     degree = system.bodies.punch.space.ufl_element().degree
     # What is coarse along the contact, too, needs more elements there, which are then less deep: see `few`.
     half = max(float(((zone.nodes - 1) * zone.spacing / ends).min()), width / 2, ALIKE * degree * zone.spacing.min())
     places = net.surface.x[net.piece(pressure)]
     bodies = [body for body in (system.bodies.punch, system.bodies.strip) if body.reading is None]
-    by_body: list[Deep] = [deep for body in bodies for deep in (_deepest(body, places, half),) if deep is not None]
-    return max(by_body, key=attrgetter("excess"), default=None)
+    return max((_deepest(body, places, half) for body in bodies), key=attrgetter("excess"), default=NONE_DEEP)
 
 
-def _deepest(body: ElasticBody, places: Array, half: float) -> Deep | None:
+def _deepest(body: ElasticBody, places: Array, half: float) -> Deep:
     mesh = body.body.mesh
     corners = cell_num_vertices(mesh.topology.cell_type)  # which stand first
     cells = geometry_dofmap(mesh)[: mesh.topology.index_map(body.dim).size_local, :corners]
@@ -230,15 +232,15 @@ class HeatedLayer:
     remedy: str
 
 
-def heated_layer(system: ContactSetup) -> HeatedLayer | None:
+def heated_layer(system: ContactSetup) -> HeatedLayer:
     """Return where the strip's elements are the coarsest for the layer that heats up at the fastest; collective.
 
-    None without heat, to and fro, and where nothing passes.
+    Its thickness is infinite without heat, to and fro, and where nothing passes.
     """
     case, motion, pair = system.case, system.motion, system.pair
     speed = max([phase.speed for phase in motion.phases] + [abs(v) for v in speeds_of(case)])
     if case.heat is None or not case.passes or len(set(motion.directions)) > 1 or speed == 0:
-        return None
+        return HeatedLayer(np.inf, 0.0, "")
     surface = pair.strip
     below = surface.spread.T @ (pair.transfer.T @ pair.weights) > 0
     mesh = system.bodies.strip.body.mesh

@@ -25,12 +25,12 @@ KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is sa
 def fineness_text(system: Tribosystem) -> str:
     """Return how fine the steps and bases of the heat are, "" without heat."""
     fineness = system.exchange.fineness
-    if fineness is None:
+    if not fineness.steps:
         return ""
     parts = [f"heat: {fineness.steps} steps in a half-cycle"]
-    if fineness.change is not None:
+    if np.isfinite(fineness.change):
         parts.append(f"halving them changes contact temperatures by {100 * fineness.change:.2g} %")
-    if fineness.difference is not None:
+    if np.isfinite(fineness.difference):
         parts.append(f"the basis changes contact temperatures and thermal gap by {100 * fineness.difference:.2g} %")
     return "; ".join(parts)
 
@@ -89,10 +89,9 @@ class HeatMonitor:
             ConvergenceError: contact without heat did not converge.
         """
         gain, fineness = heat_gain(system, pressure, state), system.exchange.fineness
-        values = {GAIN: gain}
-        if fineness is not None:
+        values = {GAIN: gain, CHANGE: fineness.change, DIFFERENCE: fineness.difference}
+        if fineness.steps:
             self.numbers[STEPS] = min(self.numbers.get(STEPS, fineness.steps), fineness.steps)
-            values |= {CHANGE: fineness.change, DIFFERENCE: fineness.difference}
         texts = remarks(Seen.of_system(system), "heat")
         jumps = system.case.run.integration == "jump"
         for text in heat_warnings(gain, jumps=jumps):
@@ -101,7 +100,7 @@ class HeatMonitor:
         worst = {KINDS[name] for name, value in values.items() if value and value >= self.numbers.get(name, value)}
         self._texts |= {kind: text for kind, text in texts.items() if kind in worst or kind not in self._texts}
         for name, value in values.items():
-            if value is not None:
+            if value is not None and np.isfinite(value):
                 self.numbers[name] = max(self.numbers.get(name, value), value)
         return new
 

@@ -251,7 +251,7 @@ def deep_elements(seen: Seen) -> Fields:
     """Return the elements that are too deep for the contact; collective."""
     pressure, net = seen.pressure[0], net_of(seen.system)
     elements = mesh_fineness.deepest(seen.system, net, pressure, _hertzian(seen, pressure))
-    if elements is None or elements.excess <= 1:
+    if elements.excess <= 1:
         return {}
     where = "at the contact" if elements.distance == 0 else f"{elements.distance:.2g} mm below the contact"
     return {
@@ -355,7 +355,7 @@ def other_unit(seen: Seen) -> Fields:
 def high_elements(seen: Seen) -> Fields:
     """Return elements higher than the layer that heats up below a fast contact; collective."""
     layer = mesh_fineness.heated_layer(seen.system)
-    return {} if layer is None or not layer.remedy else vars(layer)
+    return vars(layer) if layer.remedy else {}
 
 
 def stroke_taken_up(seen: Seen) -> Fields:
@@ -385,7 +385,7 @@ def beside_radius(seen: Seen) -> Fields:
 def coarse_heat_steps(seen: Seen) -> Fields:
     """Return by how much halving the steps of the heat changes temperatures, beyond the tolerance."""
     heat, fineness = seen.system.case.heat, seen.system.exchange.fineness
-    if heat is None or fineness is None or fineness.change is None or fineness.change <= heat.step_tolerance:
+    if heat is None or not fineness.change > heat.step_tolerance:
         return {}
     return {"steps": fineness.steps, "percent": 100 * fineness.change, "limit": heat.step_tolerance}
 
@@ -393,12 +393,7 @@ def coarse_heat_steps(seen: Seen) -> Fields:
 def coarse_heat_basis(seen: Seen) -> Fields:
     """Return by how much the reduced temperatures differ from those of the whole mesh, beyond the tolerance."""
     heat, fineness = seen.system.case.heat, seen.system.exchange.fineness
-    if (
-        heat is None
-        or fineness is None
-        or fineness.difference is None
-        or fineness.difference <= heat.reduction_difference
-    ):
+    if heat is None or not fineness.difference > heat.reduction_difference:
         return {}
     return {"percent": 100 * fineness.difference, "limit": heat.reduction_difference}
 

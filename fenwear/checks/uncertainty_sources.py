@@ -46,22 +46,20 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
         values: Their numbers.
     """
     fineness = last.system.exchange.fineness
-    if fineness is None or last.heat is None:
+    if last.heat is None:
         return {}
     known = {"heat_steps": fineness.change, "heat_basis": fineness.difference}
-    return {source: _of(last, values, share) for source, share in known.items() if share is not None}
+    return {source: _of(last, values, share) for source, share in known.items() if np.isfinite(share)}
 
 
 def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contribution]:
     """Return the contributions to a steady state, relative; pressures have at most those of the thermal gap."""
     exchange = with_reduced_heat(system).exchange
-    if exchange.fineness is None:
-        return {}
     start = {"largest_temperature": system.case.initial_temperature}
     return {
         source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
         for source, share in (("heat_steps", exchange.fineness.change), ("heat_basis", exchange.fineness.difference))
-        if share is not None
+        if np.isfinite(share)
     }
 
 
@@ -421,9 +419,8 @@ def remedies(system: Tribosystem, estimate: Uncertainty) -> dict[str, str]:
 def _remedy(system: Tribosystem, source: str) -> str:
     case, positions = system.case, system.motion.positions
     follow = case.geometry.follow_wear or 0.0
-    fineness = system.exchange.fineness
     jumps = case.run.integration == "jump"
-    steps = 0 if fineness is None else 2 * fineness.steps
+    steps = 2 * system.exchange.fineness.steps
     tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"
     return {
         "mesh": _finer(case),

@@ -86,7 +86,7 @@ class HeatExchange:
             or [contact.of_changes(r) for contact, r in zip(side.contacts, side.field.responses, strict=True)]
             for side in sides
         ]
-        self.fineness: Fineness | None = None  # of the steps, where it is known
+        self.fineness = Fineness()  # of the steps
         self._conductance, self.by_pressure = _given_conductance(heat)
         self._forget()
         for basis in self.bases:
@@ -586,7 +586,7 @@ class Isothermal(HeatExchange):
     def __init__(self, phases: int, nodes: int, temperature: float) -> None:
         self.plans: list[list[StepPlan]] = [[] for _ in range(phases)]
         self.bases, self.friction = (), np.zeros((phases, nodes))
-        self.fineness = None
+        self.fineness = Fineness()
         self._initial, self._surface = HeatState((), np.zeros(0)), np.full(nodes, temperature)
 
     @property

@@ -121,7 +121,7 @@ def prepare_exchange(
         sides.append(side)
         differences += [] if difference is None else [difference]
     exchange = HeatExchange(heat, (sides[0], sides[1]), plans, friction.copy(), pair.weights, thickness)
-    exchange.fineness = replace(fineness, steps=count * motion.positions, difference=max(differences, default=None))
+    exchange.fineness = replace(fineness, steps=count * motion.positions, difference=max(differences, default=np.nan))
     return exchange
 
 

@@ -114,14 +114,14 @@ class Fineness:
     """Fineness of steps and basis.
 
     Attributes:
-        steps: In each half-cycle.
-        change: Of contact temperatures by halving the steps, relative; None where it is not known.
-        difference: Of contact temperature and thermal gap from those of the whole mesh, relative; None on that itself.
+        steps: In each half-cycle; 0 without heat, and where they are not known.
+        change: Of contact temperatures by halving the steps, relative; NaN where it is not known.
+        difference: Of contact temperature and thermal gap from those of the whole mesh, relative; NaN on that itself.
     """
 
-    steps: int
-    change: float | None = None
-    difference: float | None = None
+    steps: int = 0
+    change: float = np.nan
+    difference: float = np.nan
 
 
 @dataclass(frozen=True, order=True)

@@ -92,7 +92,7 @@ def _size(field: Field, values: Array) -> str:
 
 
 def map_panels(
-    surface: Surface, titles: Sequence[str], look: Style, *, columns: int = 0, within: Mask | None = None
+    surface: Surface, titles: Sequence[str], look: Style, *, columns: int = 0, within: Mask | slice = slice(None)
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of equal maps with the surface's border on each.
 
@@ -103,9 +103,9 @@ def map_panels(
         columns: Maps beside each other; 0 for as many as fit.
         within: Nodes around which maps end (n,); by default all.
     """
-    seen = surface.map if within is None else surface.map[within]
+    seen = surface.map[within]
     low, high = seen.min(axis=0), seen.max(axis=0)
-    room = (0.03 if within is None or within.all() else MARGIN) * float((high - low).max()) + 1e-9
+    room = (0.03 if len(seen) == len(surface.map) else MARGIN) * float((high - low).max()) + 1e-9
     size, count = high - low + 2 * room, len(titles)
     fitting = 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3
     columns = min(count, columns or fitting, 2 if look.width < NARROW and not columns else count)

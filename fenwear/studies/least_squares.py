@@ -316,12 +316,12 @@ class LeastSquares:
         if problems:
             raise CaseError(problems)
 
-    def cannot_tell(self, z: Vector | None = None) -> list[str]:
+    def cannot_tell(self) -> list[str]:
         """Return the unknowns that these data cannot separate, before any fit; collective.
 
         Only the places and conditions of the data count, not their values: a plan of a measurement will do.
         """
-        jacobian = self.jacobian(np.zeros(len(self.unknowns)) if z is None else z)
+        jacobian = self.jacobian(np.zeros(len(self.unknowns)))
         weighted = self.whitened(np.hstack([jacobian, self._lines]))
         return hardly_known(
             [scaled.unknown.key for scaled in self.unknowns], self.data, without_baselines(weighted, len(self.unknowns))

@@ -320,7 +320,7 @@ def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
             raise CaseError(InputError("--until", f"{level.text!r}: no contact is called {level.contact!r}; {known}"))
     single = asked[0]
     names = [name for name in pair.punch.names if name in surfaces[single.body].names]
-    if len(asked) > 1 or single.contact or single.at is not None or len(names) < 2:
+    if len(asked) > 1 or single.contact or single.at or len(names) < 2:
         return list(asked)
     return [single, *(single.within(name) for name in names)]
 

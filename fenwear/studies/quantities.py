@@ -82,7 +82,7 @@ class Quantity:
         kind: snapshot: of the end of a cycle; steady; life: until a level; whole: of the case.
         unit: Of its value.
         body: punch or strip.
-        at: Place of what has values at nodes, mm: x, in a solid x and y; None of what is one number.
+        at: Place of what has values at nodes, mm: x, in a solid x and y; none of what is one number.
         after: Cycles, distance (mm) or time (s) at which it is taken, with what it is; None for the end of the run.
         level: Up to which a life counts.
         life: Whether that is counted in cycles, distance or time.
@@ -94,7 +94,7 @@ class Quantity:
     kind: Kind
     unit: str
     body: str = "punch"
-    at: tuple[float, ...] | None = None
+    at: tuple[float, ...] = ()
     after: tuple[float, str] | None = None
     level: float = 0.0
     life: str = "cycles"
@@ -132,7 +132,7 @@ class Quantity:
             return float(
                 sum(sign * entry.of_cycle(of_contact.end) for sign, entry in zip((-1, 1), moved, strict=False))
             )
-        if self.at is None:
+        if not self.at:
             return float(self._registered(known, self.name + self.of_strip, of_contact).of_cycle(of_contact.end))
         fields = WARMER if self.name == "temperature" else (self.name + self.of_strip,)
         entries = [self._registered(known, name, of_contact) for name in fields]
@@ -147,7 +147,7 @@ class Quantity:
             return sum(replace(self, body=body).of_snapshot(snapshot) for body in ("punch", "strip"))
         end: Any = snapshot.end
         depth = end.system.pair.opening(end.wear[-1], end.wear_strip[-1])
-        return float(depth.max()) if self.at is None else self._at_place(snapshot, depth, on_strip=False)
+        return self._at_place(snapshot, depth, on_strip=False) if self.at else float(depth.max())
 
     def _at_place(self, snapshot: Snapshot, values: Array, *, on_strip: bool) -> float:
         """Return nodal values (n,) at the place of the quantity.
@@ -196,7 +196,7 @@ class Quantity:
         depth: Array = getattr(of_contact.rate, self.body)
         if self.name == "worn_volume":
             return float(cycle_of(of_contact.end).of(f"volume_{self.body}"))
-        if self.at is not None:
+        if self.at:
             return self._at_place(of_contact, depth, on_strip=self.body == "strip")
         if self.name == "largest_depth":
             return float(depth[int(getattr(of_contact.end, f"wear{self.of_strip}")[-1].argmax())])
@@ -345,9 +345,7 @@ def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quanti
     return Quantity(words, name, "life", LIVES[life], body, at, None, level, life, match["contact"] or "")
 
 
-def _place(
-    name: str, match: re.Match[str], words: str, option: str, names: Names
-) -> tuple[str, tuple[float, ...] | None]:
+def _place(name: str, match: re.Match[str], words: str, option: str, names: Names) -> tuple[str, tuple[float, ...]]:
     """Return the body and the place of a quantity."""
     body = names.role_of(match["body"] or "punch")
     wrong = {
@@ -361,7 +359,7 @@ def _place(
     if match["contact"] and not registered(name, body).nodal:
         raise CaseError(InputError(option, f"{name} is of all contacts together: expected no contact, got {words!r}"))
     if not match["at"]:
-        return body, None
+        return body, ()
     parts = [part.strip() for part in match["at"].split(",")]
     try:
         if len(parts) > 2:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fenwear.case import Case
 from fenwear.results import registry
 from fenwear.results.disk import replacing
-from fenwear.results.quantity import KELVIN, RECORD, Quantity, degrees_of
+from fenwear.results.quantity import KELVIN, RECORD, Quantity, TemperatureScale, degrees_of
 from fenwear.studies.study import Outcome
 from fenwear.studies.sweep_plan import Of, Plan
 from fenwear.surfaces import is_translation
@@ -78,15 +78,12 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     data, coordinates = {}, _coordinates(plan)
     for name in names:
         entry = meaning(name, plan.of, case)
-        scale = degrees_of(case) if entry.unit == KELVIN.unit else None
-        unit = entry.unit if scale is None else scale.unit
-        attributes: dict[str, Any] = {"units": unit, "long_name": case.names.with_names(entry.long_name)}
+        scale = degrees_of(case) if entry.unit == KELVIN.unit else TemperatureScale(entry.unit)
+        attributes: dict[str, Any] = {"units": scale.unit, "long_name": case.names.with_names(entry.long_name)}
         if name == "direction":
             words = make_sliding(case).field.words(3 if case.model.kind == "solid" else 2)
             attributes |= {"flag_values": list(words), "flag_meanings": " ".join(words.values())}
-        arrays = {place: np.asarray(values[name]) for place, values in good.items() if name in values}
-        if scale is not None:
-            arrays = {place: scale.of(values) for place, values in arrays.items()}
+        arrays = {place: scale.of(np.asarray(values[name])) for place, values in good.items() if name in values}
         if name in NODES and len(arrays) == len(good) and _same(list(arrays.values())):
             coordinates[name] = (entry.dims, next(iter(arrays.values())), attributes)
         else:

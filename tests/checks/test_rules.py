@@ -669,7 +669,6 @@ def test_height_of_elements_that_the_layer_is_held_against(tetrahedra: int) -> N
         heat={},
     )
     layer = heated_layer(place_case(case))
-    assert layer is not None
     assert layer.height == pytest.approx(0.25, rel=1e-9)
     assert layer.thickness == pytest.approx(np.sqrt(50.0 / (4.6e8 * 7.8e-9) * 1.0 / 1e4), rel=1e-9)
 

@@ -64,7 +64,7 @@ class _Entry:
 
     line: int
     names: tuple[str, ...] = ()
-    labels: Ints | None = None
+    labels: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     scope: str = ""
     ranges: bool = False
     sides: str = ""
@@ -74,14 +74,12 @@ class _Entry:
 class _Set:
     name: str
     line: int
-    of_elements: bool = False  # a node set that is given by elements
     entries: list[_Entry] = field(default_factory=list)
 
 
 @dataclass
 class _Elements:
     kind: int
-    type: str
     nodes: Ints
     labels: Ints
     lines: Ints
@@ -162,10 +160,8 @@ class _Deck:
         self.system = GLOBAL
         self.passed: Counter[str] = Counter()
         self.shapeless: Counter[str] = Counter()
-        self.notes: list[str] = []
         self.in_step = 0
         self.depth = 0
-        self.after: _Instance | None = None
         self.grammar: Mapping[str, Callable[[int, dict[str, str], list[tuple[int, str]]], None]] = {
             "NODE": self.node, "ELEMENT": self.element, "NSET": self.nset, "ELSET": self.elset, "NGEN": self.ngen,
             "NFILL": self.nfill, "ELGEN": self.elgen, "SURFACE": self.surface, "PART": self.part,
@@ -322,18 +318,13 @@ class _Deck:
         except ValueError:
             return None
 
-    def known_nodes(self, line: int) -> tuple[Ints, Array]:
-        """Return the nodes of the scope so far."""
-        if not self.scope.labels:
-            raise self.fail(line, "expected nodes before this keyword")
-        return np.concatenate(self.scope.labels), np.concatenate(self.scope.points)
-
     def point(self, line: int, label: int) -> Array:
-        labels, points = self.known_nodes(line)
-        found = np.flatnonzero(labels == label)
-        if not len(found):
-            raise self.fail(line, f"node {label} is not defined before this line")
-        return points[found[-1]]
+        """Return the node of a label, as it is given last."""
+        for labels, points in zip(reversed(self.scope.labels), reversed(self.scope.points), strict=True):
+            same = np.flatnonzero(labels == label)
+            if len(same):
+                return points[same[-1]]
+        raise self.fail(line, f"node {label} is not defined before this line")
 
     def ngen(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         self.only(line, "NGEN", given, ("NSET", "LINE", "SYSTEM"))
@@ -386,10 +377,9 @@ class _Deck:
         if found is None:
             raise self.fail(line, f"the node set {name!r} is not defined before this line; known are "
                             f"{listed(s.name for s in self.scope.nsets.values())}")  # fmt: skip
-        labels = [entry.labels for entry in found.entries if entry.labels is not None]
-        if len(labels) < len(found.entries) or not labels:
+        if not found.entries or any(entry.names for entry in found.entries):
             raise self.fail(line, f"the node set {name!r} is one of sets, which is not supported here")
-        return np.concatenate(labels)
+        return np.concatenate([entry.labels for entry in found.entries])
 
     def set_system(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         """Take the local coordinate system of the nodes that follow."""
@@ -422,18 +412,17 @@ class _Deck:
         if kind == 0:
             self.shapeless[name] += len(data)
             labels = np.array([self.integer(number, _split(text)[0]) for number, text in data], dtype=np.int64)
-            block = _Elements(
-                0, name, np.zeros((len(labels), 0), np.int64), labels, np.array([n for n, _ in data], int)
-            )
+            lines = np.array([n for n, _ in data], int)
+            block = _Elements(0, np.zeros((len(labels), 0), np.int64), labels, lines)
         else:
             count = 15 if kind == -15 else KINDS[kind].nodes
             rows, lines = self.rows(line, data, count, name)
             nodes = rows[:, 1:]
             if kind in ORDERS:
                 nodes = nodes[:, ORDERS[kind]]
-            block = _Elements(
-                6 if kind == -15 else kind, name, nodes[:, :6] if kind == -15 else nodes, rows[:, 0], lines
-            )
+            if kind == -15:
+                kind, nodes = 6, nodes[:, :6]
+            block = _Elements(kind, nodes, rows[:, 0], lines)
         self.scope.elements.append(block)
         self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(line, labels=block.labels))
 
@@ -507,7 +496,7 @@ class _Deck:
                 shifts = (shifts[None, :] + of_nodes * steps[:, None]).ravel()
             block, row = master
             nodes = block.nodes[row] + shifts[1:, None]
-            made = _Elements(block.kind, block.type, nodes, labels[1:], np.full(len(labels) - 1, number))
+            made = _Elements(block.kind, nodes, labels[1:], np.full(len(labels) - 1, number))
             self.scope.elements.append(made)
             self.enter(self.scope.elsets, given.get("ELSET"), line, _Entry(number, labels=labels))
 
@@ -529,9 +518,8 @@ class _Deck:
         self.only(line, "NSET", given, ("NSET", "GENERATE", "ELSET", "INSTANCE", "INTERNAL", "UNSORTED", "INPUT"))
         self.any_set(line, "NSET", self.scope.nsets, given, data)
         if given.get("ELSET"):
-            found = self.scope.nsets[_key(given["NSET"])]
-            found.of_elements = True
-            found.entries.append(_Entry(line, names=(given["ELSET"],), scope=given.get("INSTANCE", ""), sides="nodes"))
+            entry = _Entry(line, names=(given["ELSET"],), scope=given.get("INSTANCE", ""), sides="nodes")
+            self.enter(self.scope.nsets, given["NSET"], line, entry)
 
     def elset(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         self.only(line, "ELSET", given, ("ELSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "INPUT"))
@@ -742,8 +730,7 @@ def _assembled(deck: _Deck) -> MeshFile:
     mesh = MeshFile(deck.path.name, points, tuple(assembly.blocks), ())
     resolve = _Resolver(deck, assembly, mesh)
     sets = resolve.all_sets()
-    notes = [*deck.notes, *resolve.notes]
-    notes += [f"no shape: {count:,} elements of type {name}" for name, count in deck.shapeless.items()]
+    notes = resolve.notes + [f"no shape: {count:,} elements of type {name}" for name, count in deck.shapeless.items()]
     used = np.zeros(len(points), dtype=bool)
     for block in assembly.blocks:
         if block.kind != 15:
@@ -815,7 +802,7 @@ class _Resolver:
                 elements = self.members("elset", of, entry.names[0], entry.line, (*within, path))
                 parts += [cells.ravel() for kind, cells in self.mesh.cells(elements).items() if kind != 15]
                 continue
-            if entry.labels is not None and len(entry.labels):
+            if len(entry.labels):
                 parts.append(self.labelled(word, of, entry, deck_set))
             for other in entry.names:
                 instance, dot, number = other.partition(".")
@@ -831,7 +818,7 @@ class _Resolver:
         """Return the numbers of the labelled nodes or elements."""
         placed = self.assembly.placed.get(scope)
         kind = "node" if word == "nset" else "element"
-        labels = np.zeros(0, np.int64) if entry.labels is None else entry.labels
+        labels = entry.labels
         if placed is None:
             raise self.deck.fail(entry.line, f"the set {deck_set.name!r} names {kind} {labels[0]} without its instance")
         known, order = (

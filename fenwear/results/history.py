@@ -24,7 +24,14 @@ from fenwear.common.stack import versions
 from fenwear.results import roughness, time_steps
 from fenwear.results.disk import check_room, replacing, write_text, writing
 from fenwear.results.hdf5 import Netcdf
-from fenwear.results.history_surfaces import Column, conforming, on_mesh, part_columns, surface_columns
+from fenwear.results.history_surfaces import (
+    Column,
+    conforming,
+    on_mesh,
+    part_columns,
+    recorded_surfaces,
+    surface_columns,
+)
 from fenwear.results.quantity import KELVIN, Quantity, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
 from fenwear.steps import Block
@@ -71,7 +78,6 @@ def _of_program(case: Case) -> dict[str, Column]:
 
 
 def _columns(system: Tribosystem) -> dict[str, Column]:
-    pair = system.pair
     if system.case.model.kind != "plane":
         return {
             **surface_columns(system),
@@ -79,21 +85,17 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
             **time_steps.columns(system),
             **roughness.columns(system),
         }
-    arc = pair.punch.arc is not None
-    text = "arc length along the contact" if arc else "position along the contact, x of the geometry"
-    columns = {
-        "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
-        "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
+    along = "position along the contact, x of the geometry"
+    texts = {
+        "": along if system.pair.punch.arc is None else "arc length along the contact",
+        "_strip": "position along the strip, on its material, as x in the middle position",
     }
-    if system.phases.strip_changes:
-        along = "position along the strip, on its material, as x in the middle position"
-        columns["x_strip"] = Column(("x_strip",), pair.strip.abscissa, {"units": "mm", "long_name": along})
-        unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
-        columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
-    if arc:
-        columns |= _outline(pair.punch, "")
-    if system.phases.strip_changes and pair.strip.arc is not None:
-        columns |= _outline(pair.strip, "_strip")
+    columns = dict[str, Column]()
+    for end, surface in recorded_surfaces(system).items():
+        over, text = (f"x{end}",), {"units": "mm", "long_name": f"height z of the unworn {surface.body}"}
+        columns[f"x{end}"] = Column(over, surface.abscissa, {"units": "mm", "long_name": texts[end]})
+        columns[f"height{end}"] = Column(over, surface.unworn[:, 1], text)
+        columns |= {} if surface.arc is None else _outline(surface, end)
     return {**columns, **part_columns(system, plane=True), **time_steps.columns(system), **roughness.columns(system)}
 
 

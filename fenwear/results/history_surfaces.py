@@ -111,18 +111,22 @@ def rim(surface: ContactSurface) -> Mask:
     return on_rim
 
 
+def recorded_surfaces(placed: ContactSetup) -> dict[str, ContactSurface]:
+    """Return the contact surfaces that a history has values on, by how the names of their variables end."""
+    return {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.phases.strip_changes else {})
+
+
 def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
-    pair, chart = placed.pair, sliding_chart(placed.sliding.field, placed.pair)
-    columns = _columns(chart, pair.punch, "")
-    return columns | _columns(chart, pair.strip, "_strip") if placed.phases.strip_changes else columns
+    chart = sliding_chart(placed.sliding.field, placed.pair)
+    columns = [_columns(chart, surface, end) for end, surface in recorded_surfaces(placed).items()]
+    return {name: column for own in columns for name, column in own.items()}
 
 
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:
     """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
-    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.phases.strip_changes else {})
     columns = {}
-    for end, surface in ends.items():
+    for end, surface in recorded_surfaces(placed).items():
         over = (f"{'x' if plane else 'node'}{end}",)
         if surface.contact is not None:
             flags = {"flag_values": np.arange(len(surface.names)), "flag_meanings": " ".join(surface.names)}

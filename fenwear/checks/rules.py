@@ -224,13 +224,13 @@ def _mean_pressure(seen: Seen) -> tuple[float, str]:
 
 def above_shakedown(seen: Seen) -> Fields:
     """Return the largest pressure where it is beyond the shakedown limit, and no hardness caps it."""
-    limit = None if seen.system.layers.hardness < np.inf else shakedown_limit(seen.system)
+    limit, material = shakedown_limit(seen.system)
     row = int(seen.pressure.max(axis=1).argmax())
     pressure = float(seen.pressure[row].max())
-    if limit is None or pressure <= limit[0]:
+    if pressure <= limit or seen.system.layers.hardness < np.inf:
         return {}
-    return {"pressure": pressure, "when": seen.when[row], "limit": limit[0], "factor": factor(seen.system),
-            "material": limit[1]}  # fmt: skip
+    return {"pressure": pressure, "when": seen.when[row], "limit": limit, "factor": factor(seen.system),
+            "material": material}  # fmt: skip
 
 
 def broken(seen: Seen) -> Fields:

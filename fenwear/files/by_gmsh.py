@@ -52,24 +52,18 @@ def gmsh_model() -> Iterator[Any]:
 LONGEST = 600  # s that gmsh may read
 
 
-def read(path: Path) -> MeshFile:
-    """Return the mesh of a file with its groups.
+def read(path: Path, word: str = "") -> MeshFile:
+    """Return the mesh of a file with its groups; of Nastran's bulk data "property N" is the set of a property.
+
+    Args:
+        path: Of the file.
+        word: Names the sets of entities without a group; "" for none.
 
     Raises:
         CaseError: gmsh cannot read it.
         StackError: there is no gmsh.
     """
-    return _mesh(path.name, in_process(path), "")
-
-
-def read_bulk(path: Path) -> MeshFile:
-    """Return the mesh of Nastran's bulk data; "property N" is the set of a property.
-
-    Raises:
-        CaseError: gmsh cannot read it.
-        StackError: there is no gmsh.
-    """
-    return _mesh(path.name, in_process(path), "property")
+    return _mesh(path.name, in_process(path), word)
 
 
 def in_process(path: Path, *, shapes: bool = False) -> dict[str, NDArray[Any]]:

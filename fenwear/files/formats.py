@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,8 @@ READERS: Mapping[str, tuple[str, Callable[[Path], MeshFile]]] = {
     ".med": ("Salome", mesh_formats.read_med),
     ".unv": ("I-deas universal", by_gmsh.read),
     ".cgns": ("CGNS", by_gmsh.read),
-    ".bdf": ("Nastran", by_gmsh.read_bulk),
-    ".nas": ("Nastran", by_gmsh.read_bulk),
+    ".bdf": ("Nastran", partial(by_gmsh.read, word="property")),
+    ".nas": ("Nastran", partial(by_gmsh.read, word="property")),
     ".exo": ("Exodus", mesh_formats.read_exodus),
     ".e": ("Exodus", mesh_formats.read_exodus),
     ".ex2": ("Exodus", mesh_formats.read_exodus),

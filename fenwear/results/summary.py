@@ -39,19 +39,16 @@ from fenwear.system import ContactSetup, Tribosystem
 LINE, POINT = 4.0, 4.7  # p_0 / k
 
 
-def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
-    """Return the limit, MPa, and the material that has it; None for conforming surfaces, or without a yield stress."""
-    case = placed.case
-    if conforming(placed.pair):
-        return None
-    punch, strip = placed.bodies.regions
+def shakedown_limit(placed: ContactSetup) -> tuple[float, str]:
+    """Return the limit (MPa) and its material; infinite where surfaces conform, and without a yield stress."""
+    case, (punch, strip) = placed.case, placed.bodies.regions
     used = case.punch.materials_at(punch) | case.strip.materials_at(strip)
     known = {name: case.materials[name].yield_stress for name in sorted(used)}
-    given = {name: value for name, value in known.items() if value is not None}
-    if not given:
-        return None
-    softest = min(given, key=lambda name: given[name])
-    return float(factor(placed) * given[softest] / np.sqrt(3)), softest
+    limits = {name: float(factor(placed) * value / np.sqrt(3)) for name, value in known.items() if value is not None}
+    if conforming(placed.pair) or not limits:
+        return np.inf, ""
+    softest = min(limits, key=lambda name: limits[name])
+    return limits[softest], softest
 
 
 def factor(placed: ContactSetup) -> float:
@@ -216,7 +213,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **run,
         **sheet_of(last),
         **_contact_summary(system, last),
-        **({} if (limit := shakedown_limit(system)) is None else {"shakedown_limit_MPa": limit[0]}),
+        **({"shakedown_limit_MPa": limit} if (limit := shakedown_limit(system)[0]) < np.inf else {}),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         **({CONTACTS: contacts} if (contacts := contact_sheets(last)) else {}),
         "periodicity": float(last.periodicity[-1]),

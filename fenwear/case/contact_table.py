@@ -242,8 +242,7 @@ class Contact(Part):
         wear = tuple(wear)
         if name == "p" and any(self.splits_pressure(law) for law in wear):
             return True
-        given = (law.given_coefficient for law in wear)
-        return lost or self.friction_asks(name) or any(depends_on(law, name) for law in given)
+        return lost or self.friction_asks(name) or any(law.depends_on(name) for law in wear)
 
     @property
     def uniform_share(self) -> float | None:

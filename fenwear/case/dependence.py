@@ -2,10 +2,10 @@
 
 An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
 position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), debris, the thickness of the third
-body (mm), edge, the distance from the edge of the contact (mm), and of the cycle cs, the cross-shear ratio, and pm, the
-mean pressure over the sliding (MPa). It is parsed, checked node by node and then
-computed with numpy: no other name, call or operation than those below exists for it, so that a case file cannot run
-code.
+body (mm), edge, the distance from the edge of the contact (mm), and
+of the cycle cs, the cross-shear ratio, and pm, the mean pressure over the sliding (MPa). It is parsed, checked node by
+node and then computed with numpy: no other name, call or operation than those below exists for it, so that a case file
+cannot run code.
 
 Laws of one's own are functions that a program in Python has registered by name; a case file alone cannot. A law may
 have states: fields at the contact's nodes that it remembers, such as the thickness of an oxide film or the damage of a
@@ -133,7 +133,7 @@ def evaluate(function: Function, state: Now, shape: tuple[int, ...]) -> Array:
 
 F = TypeVar("F", bound=Function)
 BELOW: Any = object()  # in place of a function that follows a decorator
-WEAR = "wear"  # worn off both bodies at a node, mm/s: rates of states may depend on it
+WEAR = ("wear", "wear_punch", "wear_strip")  # off both bodies and off each at a node, mm/s, for rates of states
 
 
 @dataclass(frozen=True)
@@ -146,12 +146,11 @@ class State:
     Attributes:
         rate: Function of the variables in `of` and of the state itself, by their names at n nodes (n,), that returns
             the change in a second (n,), or one number.
-        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other states, and `wear`, what both
-            bodies lose there (mm/s), the rate depends on.
+        of: What the rate depends on: which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other
+            states, and `wear`, what both bodies lose there (mm/s), or one of them, `wear_punch` and `wear_strip`.
         initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
         unit: Unit of its values in results.
-        fills: Gap that a unit of it fills, mm: 1 of a film's thickness in mm that carries as third bodies do. Such a
-            state is the contact's, and stays with the punch.
+        fills: Gap that a unit of it fills, mm: 1 of a film's thickness in mm that carries as third bodies do.
         least, most: Between which its values are.
         slope: Derivative of the rate to the state itself, a function as the rate; by default by differences.
     """
@@ -200,8 +199,8 @@ def register_law(
     Args:
         name: A word; registered again, the new function takes its place.
         function: Of the state of the contact; without it, what the decorator stands above.
-        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with depth or
-            s nothing ever repeats.
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with
+            depth or s nothing ever repeats.
         states: Its states, by names that are words; laws that name the same state share it.
 
     Returns:
@@ -221,7 +220,7 @@ def register_law(
     known = {**_STATES, **new_states}
     _check_of(key, of, (*VARIABLES, *known))
     for word, state in new_states.items():
-        _check_state(word, state, (*VARIABLES, WEAR, *known))
+        _check_state(word, state, (*VARIABLES, *WEAR, *known))
     _STATES.update(new_states)
     _LAWS[name] = _Law(function, frozenset({*of, *new_states}))
     return function
@@ -242,7 +241,7 @@ def _check_of(key: str, of: Sequence[str], known: Sequence[str]) -> None:
 
 def _check_state(name: str, state: State, known: Sequence[str]) -> None:
     key = f"state {name!r}"
-    taken = (*VARIABLES, *FUNCTIONS, WEAR)
+    taken = (*VARIABLES, *FUNCTIONS, *WEAR)
     if not (isinstance(name, str) and name.isidentifier()) or name in taken:
         raise CaseError(InputError(key, f"expected a word that is none of {', '.join(taken)}"))
     if not isinstance(state, State):

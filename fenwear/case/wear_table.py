@@ -545,6 +545,21 @@ class WearLaw(Part):
         return coefficient
 
     @property
+    def states(self) -> Mapping[str, State]:
+        """The states that it remembers, by their names."""
+        given = self.given_coefficient
+        return given.states if isinstance(given, Dependence) else {}
+
+    def depends_on(self, name: str) -> bool:
+        """Return whether a variable such as T, p or depth is in it."""
+        return depends_on(self.given_coefficient, name)
+
+    @property
+    def varies(self) -> bool:
+        """Whether its wear changes with more than the place, or it remembers a state."""
+        return varies(self.given_coefficient)
+
+    @property
     def scale(self) -> float:
         """The factor from values of a dependent coefficient to its internal unit."""
         if isinstance(self.coefficient, Dependence) and self.coefficient.unit:

@@ -33,6 +33,7 @@ from fenwear.case.dependence import WEAR, State, evaluate_of_state
 from fenwear.common.arrays import Added, Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.laws.friction import ContactConditions
+from fenwear.laws.wear import PhasesWear
 from fenwear.surfaces import ContactPair
 from fenwear.surfaces.placement import in_space
 
@@ -80,9 +81,10 @@ class Memory:
         return Held(*beginnings)
 
     @cached_property
-    def fills(self) -> Array:
-        """Gap that a unit of each state of the contact fills (q,), mm."""
-        return np.array([state.fills for state in self.contact.values()])
+    def fills(self) -> tuple[Array, Array]:
+        """Gap that a unit of each state of the contact fills (q,), and of the strip (q_s,), mm."""
+        contact, strip = (np.array([state.fills for state in own.values()]) for own in (self.contact, self.strip))
+        return contact, strip
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -116,12 +118,12 @@ class Memory:
     @cached_property
     def of_wear(self) -> bool:
         """Whether a rate depends on the wear."""
-        return any(WEAR in state.of for state in self.states)
+        return any(one in state.of for state in self.states for one in WEAR)
 
     @cached_property
     def filling(self) -> bool:
         """Whether a state fills a part of the gap."""
-        return bool(self.fills.any())
+        return any(bool(fills.any()) for fills in self.fills)
 
     def known(self, values: Array) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return the states (Q, n) at the contact's nodes by name, as laws of punch and strip know them."""
@@ -239,7 +241,7 @@ class Evolution:
         conditions: Of each phase; their own states do not count.
         durations: Of the phases (m,), s.
         pairs: The surfaces opposite each other in each phase.
-        worn: Wear rate of both bodies at the contact's nodes (n,), mm/s, in a phase at conditions.
+        worn: Wear of a phase at conditions.
         strip_depth: Worn off the strip (n_s,), mm.
         near: Where steps of many cycles look for their end; by default at their start.
     """
@@ -248,7 +250,7 @@ class Evolution:
     conditions: Sequence[ContactConditions]
     durations: Array
     pairs: Sequence[ContactPair]
-    worn: Callable[[int, ContactConditions], Array]
+    worn: Callable[[int, ContactConditions], PhasesWear]
     strip_depth: Array
     near: Held | None = None
 
@@ -265,7 +267,7 @@ class Evolution:
         chosen = list(phases)
         conditions, pairs = [self.conditions[k] for k in chosen], [self.pairs[k] for k in chosen]
 
-        def worn(k: int, conditions: ContactConditions) -> Array:
+        def worn(k: int, conditions: ContactConditions) -> PhasesWear:
             return self.worn(chosen[k], conditions)
 
         return replace(self, conditions=conditions, durations=self.durations[chosen], pairs=pairs, worn=worn)
@@ -382,8 +384,10 @@ class Evolution:
         """Return the rates at the contact's nodes in a phase."""
         memory, conditions = self.memory, self.conditions[k]
 
-        def worn(values: Array) -> Array:
-            return self.worn(k, replace(conditions, states=memory.known(values)))
+        def worn(values: Array) -> Mapping[str, Array]:
+            at = conditions.remembering(memory.known(values))
+            rates = [depth[0] / self.durations[k] for depth in self.worn(k, at).by_bodies(at.pressure[None])]
+            return dict(zip(WEAR, (sum(rates), *rates), strict=True))
 
         without = [conditions.of(body) for body in memory.bodies]
         return _Rates.of(memory.named, memory.rows, without, conditions.shape, worn if memory.of_wear else None)
@@ -403,7 +407,7 @@ class Evolution:
             "edge": none,
             "cs": none,
             "pm": none,
-            WEAR: none,
+            **dict.fromkeys(WEAR, none),
             **{axis: np.asarray(coordinate) for axis, coordinate in zip("xyz", x.T, strict=True)},
             **dict.fromkeys(memory.contact, none),
         }
@@ -452,14 +456,14 @@ class _Rates:
         given: Variables of each rate that stay constant (n,), by name.
         rows: States that each rate depends on, by name: their rows.
         asked: Variables of each rate.
-        worn: Wear rate of both bodies at states (n,), mm/s; None where no rate asks for it.
+        worn: Wear rates at states (n,), mm/s, by the names of WEAR; None where no rate asks for them.
     """
 
     states: Sequence[tuple[str, State]]
     given: Sequence[Mapping[str, Array]]
     rows: Sequence[Mapping[str, int]]
     asked: Sequence[frozenset[str]]
-    worn: Callable[[Array], Array] | None
+    worn: Callable[[Array], Mapping[str, Array]] | None
 
     @classmethod
     def of(
@@ -468,11 +472,11 @@ class _Rates:
         rows: Sequence[Mapping[str, int]],
         variables: Sequence[Mapping[str, Array]],
         shape: tuple[int, ...],
-        worn: Callable[[Array], Array] | None,
+        worn: Callable[[Array], Mapping[str, Array]] | None,
     ) -> _Rates:
         """Return rates whose states have these rows and whose variables, of each, are these at nodes."""
         asked = [frozenset((*state.of, name)) for name, state in states]
-        moving = () if worn is None else (WEAR,)
+        moving = () if worn is None else WEAR
         given = [
             {
                 name: now[name] if now[name].shape == shape else np.full(shape, now[name])
@@ -488,7 +492,7 @@ class _Rates:
 
     def known(self, values: Array) -> list[Mapping[str, Array]]:
         """Return the variables of each rate at states (Q, n)."""
-        worn = {} if self.worn is None else {WEAR: self.worn(values)}
+        worn = {} if self.worn is None else self.worn(values)
         pairs = zip(self.given, self.rows, strict=True)
         return [{**variables, **{name: values[row] for name, row in at.items()}, **worn} for variables, at in pairs]
 
@@ -530,7 +534,7 @@ class _Rates:
 
 def _feels(name: str, state: State, other: str) -> bool:
     """Return whether the derivative of a state's rate to another one is to be taken by differences."""
-    return other in state.of or WEAR in state.of or (other == name and state.slope is None)
+    return other in state.of or not set(WEAR).isdisjoint(state.of) or (other == name and state.slope is None)
 
 
 def _increment(rate: Array, growth: Array, tau: float) -> Array:

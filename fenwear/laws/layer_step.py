@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.common.arrays import Array
 from fenwear.laws.compliant_layer import CoatedClosure, compressed
@@ -15,7 +17,7 @@ from fenwear.laws.law_states import Evolution, Held
 from fenwear.laws.layers import DEBRIS, PLASTIC, Layers
 from fenwear.laws.wear import PhasesWear, WornDepths
 
-NUDGE = 1e-6  # of the largest pressure, for differences
+NUDGE, LEAST = 1e-6, 1e-300  # of the largest pressure, for differences; what divides where there is nothing
 
 
 @dataclass(frozen=True)
@@ -87,9 +89,10 @@ class LayerEvolution:
             return evolution.rate(held)[0]
         return (evolution.implicit(held, cycles) - held).times(1 / cycles)
 
-    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array:
-        """Return the gap that the states of laws fill more (n,), mm, as `worn`."""
-        return self.layers.memory.fills @ self._evolved(pressure, before, cycles).contact
+    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
+        """Return the gap that states of laws fill more at the contact's nodes (n,) and on the strip (n_s,), mm."""
+        (contact, strip), changes = self.layers.memory.fills, self._evolved(pressure, before, cycles)
+        return contact @ changes.contact, strip @ changes.strip
 
     def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
         """Return the change of the debris' thickness and the ejected debris, as `worn`.
@@ -132,6 +135,35 @@ class LayerEvolution:
 
 
 @dataclass(frozen=True)
+class Filling:
+    """The gap that states of laws fill in a step, linear in the pressures around those of its conditions.
+
+    What all phases change is shared among them as their wear is: a way to the solution, at which conditions have its
+    pressures.
+
+    Attributes:
+        near: These pressures (m, n), MPa.
+        filled: In a cycle, at the contact's nodes (n,) and on the strip (n_s,), mm.
+        share: Of the phases in what pressures change (m, n).
+        onto: From the contact's nodes onto the strip, of each phase.
+        here, below: Change at the end of the step by unit pressures in all phases (n,) and (n_s,), mm/MPa.
+    """
+
+    near: Array
+    filled: tuple[Array, Array]
+    share: Array
+    onto: Sequence[csr_array]
+    here: Array
+    below: Array
+
+    def at(self, pressure: Array, length: float) -> tuple[Array, Array]:
+        """Return the gap that is filled in a cycle at pressures (m, n), in a step of a length."""
+        change = self.share * (pressure - self.near) / length
+        put = sum(place @ own for place, own in zip(self.onto, change, strict=True))
+        return self.filled[0] + self.here * change.sum(axis=0), self.filled[1] + self.below * put
+
+
+@dataclass(frozen=True)
 class LayerStep:
     """The wear of a step at the pressures of its phases, and what lies between, as a compliance of the contact.
 
@@ -168,21 +200,27 @@ class LayerStep:
             closed = closed + self._coatings(pressure).closure(pressure)
         if not self.implicit:
             return closed
-        opened = self._length * self._worn.opening(pressure)
-        if passing.layers.debris.present:
-            added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
-            if passing.layers.strip_carries:
-                added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
-            opened = opened - added
+        added, below = self._added(pressure)
+        found = self._worn.opening(pressure) - added
+        if self._fills_below:
+            found = found - np.array([pair.wear_interpolation @ below for pair in passing.wear.pairs])
+        return self._length * found + closed
+
+    def _added(self, pressure: Array) -> tuple[Array | float, Array | float]:
+        """Return the thickness that debris and states gain in a cycle at the contact's nodes, and on the strip, mm."""
+        passing, added, below = self.passing, 0.0, 0.0
         if self._fills:
-            opened = opened - self._length * passing.filled(pressure, self.before, self.cycles)
-        return opened + closed
+            added, below = self._filling.at(pressure, self._length)
+        if not passing.layers.debris.present:
+            return added, below
+        debris = passing.debris_changes(pressure, self.before, self.cycles)[0]
+        return (added, below + debris) if passing.layers.strip_carries else (added + debris, below)
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
         if not self.implicit:
             return np.zeros_like(pressure)
-        if self.passing.layers.strip_carries:
+        if self._fills_below:
             return None
         by_wear = self._worn.local(pressure)
         if by_wear is None:
@@ -197,13 +235,16 @@ class LayerStep:
         right = self._length * right
         if self.passing.layers.softens:
             left = self._felt_by_border(left, pressure)
-        if self.passing.layers.strip_carries:
-            left, right = self._with_carried(left, right, pressure)
-        if not self._fills and not self.passing.layers.lies_here:
+        if not self._fills_here and not self._fills_below:
             return left, right
+        if self._fills_below:
+            left, right = self._with_carried(left, right, pressure)
+        if not self._fills_here:
+            return left, right
+        covered = self._covered(pressure)
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
-        return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
+        return left, np.concatenate([right, -covered[:, None, :] * unit], axis=1)
 
     def _felt_by_border(self, left: Array, pressure: Array) -> Array:
         """Return L of `border`, reduced by the compression of coatings."""
@@ -215,12 +256,20 @@ class LayerStep:
         return reduced
 
     def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
-        """Return both with the debris that the strip carries, as its wear."""
-        passing, pairs = self.passing, self.passing.wear.pairs
-        slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
-        reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])
-        puts = np.array([pair.wear_projection.toarray() for pair in pairs]) * slopes[:, :, None] * taken[:, None, :]
+        """Return both with what the strip carries, as its wear."""
+        reads = np.array([pair.wear_interpolation.toarray() for pair in self.passing.wear.pairs])
+        onto = np.array([pair.wear_projection.toarray() for pair in self.passing.wear.pairs])
+        puts = sum(onto * slopes[:, :, None] * taken[:, None, :] for slopes, taken in self._puts(pressure))
         return np.concatenate([left, reads], axis=2), np.concatenate([right, -puts], axis=1)
+
+    def _puts(self, pressure: Array) -> list[tuple[Array, Array]]:
+        """Return what unit pressures put on the strip: factors there (m, n_s) and at the contact's nodes (m, n)."""
+        found = []
+        if self.passing.layers.strip_carries:
+            found.append((self.passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)))
+        if self._fills:
+            found.append((np.tile(self._filling.below, (len(pressure), 1)), self._filling.share))
+        return found
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return the openings by unit pressures at the punch's nodes, and the strip's wear (m, n), mm/MPa."""
@@ -230,23 +279,25 @@ class LayerStep:
         if self.passing.layers.softens:
             felt = [share.mean(axis=0) for share in self._felt(pressure)]
         both = zip(self._worn.by_body(pressure), felt, strict=True)
-        punch, strip = (None if compliance is None else self._length * compliance * share for compliance, share in both)
-        if self.passing.layers.strip_carries:
-            return punch, self._carried_below(pressure, strip)
-        if not self.passing.layers.lies_here:
+        punch, strip = (None if own is None else self._length * own * share for own, share in both)
+        if not self._fills_here and not self._fills_below:
+            return punch, strip
+        if self._fills_below:
+            strip = self._carried_below(pressure, strip)
+        if not self._fills_here:
             return punch, strip
         covered = self._covered(pressure)
         return -covered if punch is None else punch - covered, strip
 
     def _carried_below(self, pressure: Array, strip: Array | None) -> Array:
-        """Return the strip's wear by unit pressures less the debris that they put on it (m, n), at places below.
+        """Return the strip's wear by unit pressures less what they put on it (m, n), at places below.
 
         A step to the solution, on grids, whose residual has what is put on the strip as it is.
         """
-        passing = self.passing
-        pairs = zip(passing.wear.pairs, passing.debris.slope(self.cycles), strict=True)
-        below = np.array([pair.wear_interpolation @ slope for pair, slope in pairs])
-        put = below * self._worn.taken_slope(pressure)
+        reads = [pair.wear_interpolation for pair in self.passing.wear.pairs]
+        put = np.zeros_like(pressure)
+        for slopes, taken in self._puts(pressure):
+            put += np.array([read @ slope for read, slope in zip(reads, slopes, strict=True)]) * taken
         return -put if strip is None else strip - put
 
     @property
@@ -287,21 +338,41 @@ class LayerStep:
         return punch, strip
 
     def _covered(self, pressure: Array) -> Array:
-        """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
-        passing, covered = self.passing, np.zeros_like(pressure)
-        if passing.layers.lies_here:
-            covered = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
-        if not self._fills:
-            return covered
-        filled = passing.filled(pressure, self.before, self.cycles)
-        size = NUDGE * max(float(np.abs(pressure).max()), 1e-300)
-        for k in range(len(pressure)):
-            increased = pressure.copy()
-            increased[k] += size
-            covered[k, :] += self._length * (passing.filled(increased, self.before, self.cycles) - filled) / size
-        return covered
+        """Return the thickness at the end by unit pressures at the contact's nodes (m, n), mm/MPa."""
+        found = np.zeros_like(pressure)
+        if self.passing.layers.lies_here:
+            found = self.passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
+        return found + self._filling.here * self._filling.share if self._fills else found
+
+    @cached_property
+    def _filling(self) -> Filling:
+        """The gap that states fill at the pressures that the conditions of the phases have, and nearby."""
+        passing, evolution = self.passing, self.passing.evolution
+        assert evolution is not None
+        near = np.array([one.pressure for one in evolution.conditions])
+        size = NUDGE * max(float(np.abs(near).max()), LEAST)
+        less, more = (passing.filled(own, self.before, self.cycles) for own in (near, near + size))
+        wearing = np.maximum(self._worn.taken_slope(near), LEAST)
+        share = wearing / wearing.sum(axis=0)
+        onto = [pair.wear_projection for pair in passing.wear.pairs]
+        below = sum(place @ own for place, own in zip(onto, share, strict=True))
+        by_here, by_below = ((after - begin) / size for begin, after in zip(less, more, strict=True))
+        length = self._length
+        return Filling(near, less, share, onto, length * by_here, length * by_below / np.maximum(below, LEAST))
 
     @property
     def _fills(self) -> bool:
         """Whether states of laws fill a part of the gap."""
         return self.passing.evolution is not None and self.passing.layers.memory.filling
+
+    @property
+    def _fills_here(self) -> bool:
+        """Whether what lies at the contact's nodes fills a part of the gap."""
+        layers = self.passing.layers
+        return layers.lies_here or (self._fills and bool(layers.memory.fills[0].any()))
+
+    @property
+    def _fills_below(self) -> bool:
+        """Whether what the strip carries fills a part of the gap."""
+        layers = self.passing.layers
+        return layers.strip_carries or (self._fills and bool(layers.memory.fills[1].any()))

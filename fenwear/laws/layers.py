@@ -99,6 +99,14 @@ class Layers:
         """Return the number of a row of the state, by its name in `rows`."""
         return self.rows.index(name)
 
+    @cached_property
+    def _fills(self) -> tuple[Array, Array]:
+        """Gap that a unit of each row fills: of those at the contact's nodes, and of those that the strip carries."""
+        fills = {DEBRIS[0]: 1.0, DEBRIS[1]: 0.0, PLASTIC: -1.0}
+        contact, strip = self.memory.fills
+        first = [fills[name] for name in self.rows[: len(self.rows) - len(contact)]]
+        return np.array([*first, *contact]), np.array([*(fills[name] for name in self.carried_rows), *strip])
+
     @property
     def lies_here(self) -> bool:
         """Whether debris lies at the contact's nodes, and not on a strip that carries it."""
@@ -261,18 +269,13 @@ class Layers:
     def opening(self, pair: ContactPair, worn: WornDepths) -> Array | float:
         """Return the gap that the layers open at one place (n,), mm."""
         gap = self.opened(worn.between)
-        if self.strip_carries and len(worn.carried):
-            gap = gap - pair.wear_interpolation @ worn.carried[0]
+        if len(worn.carried) and self._fills[1].any():
+            gap = gap - pair.wear_interpolation @ (self._fills[1] @ worn.carried)
         return gap
 
     def opened(self, state: Array) -> Array | float:
         """Return the gap that a state at the contact's nodes opens (n,), mm."""
-        if not len(state):
-            return 0.0
-        gap = -state[0] if self.lies_here else np.zeros(self.nodes)
-        if self.memory.filling:
-            gap = gap - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
-        return gap + state[self.row(PLASTIC)] if self.hardness < np.inf else gap
+        return -(self._fills[0] @ state) if len(state) else 0.0
 
     def closing(self, pressure: Array, *, capped: bool = False) -> Array:
         """Return the closure by pressures (m, n) in a step of layers that are not linear, mm.
@@ -388,34 +391,14 @@ def layers_of(
         life = third.life if varies else place_values(third.life, place, n, "mm", LIFE)
         debris = Debris(third.share, life, third.initial, third.edge_life or np.inf, third.edge_length or 1.0)
     hardness = np.inf if contact.hardness is None else contact.hardness
-    memory = memory_of(contact.friction, wear, temperature)
+    of_friction = contact.friction.states if isinstance(contact.friction, Dependence) else {}
+    punch, strip = wear[0].states, wear[1].states
+    here = {**punch, **{name: state for name, state in of_friction.items() if name not in strip or name in punch}}
+    memory = Memory(here, strip, frozenset(punch), temperature)
     begun = memory.beginning(pair)
     on_strip = debris.present and strip_carries
     soft = soft_coatings(pair, (wear[0], wear[1]))
     return Layers(n, closure, winkler, debris, hardness, 0.0, memory, begun, on_strip, soft)
-
-
-def memory_of(friction: object, wear: Sequence[WearLaw], temperature: float) -> Memory:
-    """Return the states of the laws of friction and wear, and the bodies that carry them.
-
-    Args:
-        friction: The coefficient.
-        wear: The wear laws of punch and strip.
-        temperature: The initial one, K.
-    """
-    given = [law.given_coefficient for law in wear]
-    punch, strip, both = (
-        dict(coefficient.states) if isinstance(coefficient, Dependence) else {}
-        for coefficient in (given[0], given[1], friction)
-    )
-    on_strip = {name: state for name, state in strip.items() if not state.fills}
-    filling = {name: state for name, state in strip.items() if state.fills}
-    contact = {
-        **punch,
-        **filling,
-        **{name: state for name, state in both.items() if name not in on_strip or name in punch},
-    }
-    return Memory(contact, on_strip, frozenset(punch), temperature)
 
 
 def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[str, Array], n: int) -> list[Array]:

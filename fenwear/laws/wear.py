@@ -235,7 +235,12 @@ class PhasesWear:
 
     def taken(self, pressure: Array) -> Array:
         """Return the depths worn off both bodies together at the contact nodes in each phase (m, n), mm."""
-        return np.asarray(sum((body.at(pressure).depth(pressure) for body in self.bodies), np.zeros_like(pressure)))
+        return np.asarray(sum(self.by_bodies(pressure)))
+
+    def by_bodies(self, pressure: Array) -> tuple[Array, Array]:
+        """Return the depths worn off punch and strip at the contact nodes in each phase (m, n), mm."""
+        punch, strip = (body.at(pressure).depth(pressure) for body in (self.punch, self.strip))
+        return punch, strip
 
     def taken_slope(self, pressure: Array) -> Array:
         """Return the derivatives of `taken` to the pressures (m, n), mm/MPa."""
@@ -306,11 +311,7 @@ def stays(wear: tuple[WearLaw, WearLaw], friction: Friction) -> bool:
     """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
     laws = [layer_law for law in wear for layer_law in (law, law.of_coating) if layer_law is not None]
     of_friction = any(law.energy is not None for law in laws)
-    dependent = any(
-        isinstance(coefficient, Dependence) and coefficient.varies
-        for coefficient in (law.given_coefficient for law in laws)
-    )
-    dependent = dependent or any(map(friction.contact.splits_pressure, laws))
+    dependent = any(law.varies or friction.contact.splits_pressure(law) for law in laws)
     return not dependent and not friction.mixed and (friction.constant or not of_friction)
 
 

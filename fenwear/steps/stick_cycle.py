@@ -426,10 +426,10 @@ class PartialSlipProblem:
             return None
         pairs = self.pairs(records, begin)
 
-        def wearing(k: int, at: ContactConditions) -> Array:
+        def wearing(k: int, at: ContactConditions) -> PhasesWear:
             row, wears = slice(k, k + 1), [laws.wear_at(at)]
             wear = self._wear(wears, records.slip_magnitude[row], records.duration[row], pairs[row])
-            return np.asarray(wear.begun(begin.worn, 0.0).taken(at.pressure[None])[0] / records.duration[k])
+            return wear.begun(begin.worn, 0.0)
 
         conditions = self.of_steps(records, begin)
         return Evolution(memory, conditions, records.duration, pairs, wearing, begin.worn.strip)

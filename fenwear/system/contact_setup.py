@@ -205,10 +205,8 @@ class PhaseLaws:
         chosen = list(range(len(self.sliding.motion.phases)) if phases is None else phases)
         durations = np.array([self.sliding.motion.phases[k].duration for k in chosen])
 
-        def wearing(k: int, at: ContactConditions) -> Array:
-            phase_wear = self.wear.phases([at], [chosen[k]]).begun(self.unworn if worn is None else worn)
-            taken = phase_wear.taken(at.pressure[None])[0]
-            return np.asarray(taken / durations[k])
+        def wearing(k: int, at: ContactConditions) -> PhasesWear:
+            return self.wear.phases([at], [chosen[k]]).begun(self.unworn if worn is None else worn)
 
         depth = np.zeros(len(self.sliding.middle.strip.weights)) if worn is None else worn.strip
         return Evolution(

@@ -42,11 +42,11 @@ def laws_that_remember() -> Iterator[None]:
     """Register a film that pressure rubs off and that grows again, and the wear and friction that it makes."""
 
     def growth(now: Any) -> Any:
-        return 20 * (1 - now["film"]) - now["p"] * now["v"] * now["film"] / 5
+        return 20 * (1 - now["oxide"]) - now["p"] * now["v"] * now["oxide"] / 5
 
     film = State(growth, of=["p", "v"], initial=1.0, least=0.0)
-    register_law("filmed", lambda now: 5e-8 * (1.5 - now["film"]), states={"film": film})
-    register_law("slippery", lambda now: 0.75 - 0.1 * now["film"], of=["film"])
+    register_law("filmed", lambda now: 5e-8 * (1.5 - now["oxide"]), states={"oxide": film})
+    register_law("slippery", lambda now: 0.75 - 0.1 * now["oxide"], of=["oxide"])
     yield
     forget_laws()
 
@@ -129,7 +129,7 @@ def resumed(feature: str, law: str, folder: Path) -> None:
         "normal_force",
         "largest_temperature",
         "debris_thickness",
-        "state_film",
+        "state_oxide",
     ):
         if name in one:
             scale = np.abs(one[name].values).max()

@@ -2,7 +2,7 @@
 
 An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
 position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), debris, the thickness of the third
-body (mm), edge, the distance from the edge of the contact (mm), and
+body (mm), edge, the distance from the edge of the contact (mm), film, the thickness of the film on the body (mm), and
 of the cycle cs, the cross-shear ratio, and pm, the mean pressure over the sliding (MPa). It is parsed, checked node by
 node and then computed with numpy: no other name, call or operation than those below exists for it, so that a case file
 cannot run code.
@@ -30,9 +30,9 @@ import numpy as np
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 
-VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm")
+VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm", "film")
 UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm",
-         "debris": "mm", "edge": "mm", "cs": "", "pm": "MPa"}  # fmt: skip
+         "debris": "mm", "edge": "mm", "cs": "", "pm": "MPa", "film": "mm"}  # fmt: skip
 LONGEST = 500  # characters of an expression
 DEEPEST = 30  # levels of its operations
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -146,7 +146,7 @@ class State:
     Attributes:
         rate: Function of the variables in `of` and of the state itself, by their names at n nodes (n,), that returns
             the change in a second (n,), or one number.
-        of: What the rate depends on: which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other
+        of: What the rate depends on: which of T, p, v, x, y, z, depth, s, debris, edge, cs, pm and film, which other
             states, and `wear`, what both bodies lose there (mm/s), or one of them, `wear_punch` and `wear_strip`.
         initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
         unit: Unit of its values in results.
@@ -199,7 +199,7 @@ def register_law(
     Args:
         name: A word; registered again, the new function takes its place.
         function: Of the state of the contact; without it, what the decorator stands above.
-        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs, pm and film it depends on, and which states; with
             depth or s nothing ever repeats.
         states: Its states, by names that are words; laws that name the same state share it.
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 FINER = "with heat: a contact finer than the meshes heats a layer as thin as its node spacing, too thin for the meshes"
 NO_HEAT = "depends on the temperature T. Add the table heat"
+NO_FILM = "depends on the thickness of a film. Add the table wear.punch.film"
 NO_DEBRIS = "depends on the thickness of debris. Add the table contact.third_body"
 POISSON = {"strain": "in plane strain", "axisymmetric": "in rings", "solid": "in solids"}
 
@@ -257,6 +258,8 @@ def coefficient_problems(case: Case) -> Iterator[str]:
         own_law = isinstance(value, Dependence) and value.law
         if not case.heat and not own_law and depends_on(value, "T"):
             yield f"{key}: {NO_HEAT}"
+        if not any(law.film for law in case.wear.laws) and depends_on(value, "film"):
+            yield f"{key}: {NO_FILM}"
         if not case.contact.third_body and depends_on(value, "debris"):
             yield f"{key}: {NO_DEBRIS}"
         if isinstance(value, Dependence) and value.regions:

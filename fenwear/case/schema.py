@@ -235,7 +235,8 @@ class Case(Part):
         if contact.third_body:
             coefficients["contact.third_body.life"] = contact.third_body.life
         wear = self.wear.by_body.items()
-        return coefficients | {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in wear}
+        coefficients |= {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in wear}
+        return coefficients | {f"wear.{body}.film.growth": law.film.growth for body, law in wear if law.film}
 
     @property
     def passing_laws(self) -> list[str]:

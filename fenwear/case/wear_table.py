@@ -31,6 +31,7 @@ from fenwear.case.table_parts import (
     OverCycle,
     Pairs,
     Part,
+    Speed,
     Stress,
     Unit,
     quantity,
@@ -58,12 +59,13 @@ class _State(Part):
         default=None,
         description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid); "
         "debris (mm, thickness of the third body), edge (mm, distance from the edge of the contact); "
-        "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
+        "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding); film (mm, thickness of the "
+        "body's film)",
     )
     table: Annotated[Pairs, rising("at least two pairs [argument, value] with rising arguments")] | None = Field(
         default=None, description="[argument, value] pairs; the end values hold beyond the ends"
     )
-    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm"] = Field(
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm", "film"] = Field(
         default="T", description="argument of the table"
     )
 
@@ -327,6 +329,7 @@ class Stick(Part):
 
 
 COEFFICIENTS = ("coefficient", "archard", "energy", "per_area")
+FILM = "film"  # the state of a film
 TOUCHING = 0.1  # MPa: the pressure above which a place touches, by default
 
 
@@ -373,6 +376,38 @@ class Coating(Part):
             "coefficient: expected a finite number above zero",
         ),
     )
+
+
+class Film(Part):
+    """A film that grows on a body: dh/dt = growth - R dw/dt, with R its Pilling-Bedworth ratio and w the worn depth.
+
+    R volumes of oxide grow from one volume of metal, so that a film h has lowered its metal by h / R, and the surface
+    stands h (1 - 1/R) above the unworn one. Wear counts metal, that in the worn oxide as well: it takes off R times its
+    depth of film (T. F. J. Quinn, Wear 199, 1996, 169). A film that consumes no metal, as that of an additive, stands
+    by all of h, and its growth has what takes it off.
+    """
+
+    growth: constant_or_dependence(  # type: ignore[valid-type]
+        Annotated[Speed, Field(ge=0)], "mm/s", forms=("expression", "table")
+    ) = Field(description="rate at which the film thickens, such as an expression of T, p and film, its thickness")
+    initial: Annotated[Length, Field(ge=0)] = Field(default=0.0, description="thickness at the start")
+    pilling_bedworth: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None,
+        description="volume of the film over that of the metal that it grows from; by default it consumes no metal, "
+        "and wear takes nothing off it",
+    )
+
+    def state(self, body: str) -> State:
+        """Return the thickness (mm) as a state of a body's wear law."""
+        metal = 0.0 if self.pilling_bedworth is None else 1 / self.pilling_bedworth
+        worn, key = f"wear_{body}", f"wear.{body}.film.growth"
+
+        def rate(now: Mapping[str, Array]) -> Array:
+            growth = place_values(self.growth, now, len(now[FILM]), "mm/s", key, -math.inf)
+            return growth - now[worn] / metal if metal else growth
+
+        asked = [name for name in (*VARIABLES, worn) if depends_on(self.growth, name) or (name == worn and metal)]
+        return State(rate, asked, self.initial, "mm", 1 - metal, least=0.0)
 
 
 def _zero_or_more(key: str) -> Check:
@@ -431,6 +466,9 @@ class WearLaw(Part):
     coating: Coating | None = Field(
         default=None,
         description="coating above this base, which wears where the coating is worn through; by default none",
+    )
+    film: Film | None = Field(
+        default=None, description="film of oxide or tribofilm that grows on this body; by default none"
     )
 
     wears: ClassVar[bool] = True
@@ -500,6 +538,7 @@ class WearLaw(Part):
             lambda s: s.coating and not s.coating.present("coefficient") and s.exponents != (1.0, 1.0),
             "coating: expected a coefficient with other exponents than 1",
         ),
+        Check(lambda s: s.film and s.coating, "film: expected without coating"),
     )
 
     @property
@@ -544,20 +583,22 @@ class WearLaw(Part):
         coefficient: float | Dependence | None = self.coefficient if self.per_area is None else self.per_area
         return coefficient
 
-    @property
-    def states(self) -> Mapping[str, State]:
-        """The states that it remembers, by their names."""
+    def states_of(self, body: str) -> Mapping[str, State]:
+        """Return the states that the law of a body remembers, by their names."""
         given = self.given_coefficient
-        return given.states if isinstance(given, Dependence) else {}
+        states = given.states if isinstance(given, Dependence) else {}
+        return {**states, FILM: self.film.state(body)} if self.film else states
 
     def depends_on(self, name: str) -> bool:
         """Return whether a variable such as T, p or depth is in it."""
-        return depends_on(self.given_coefficient, name)
+        return depends_on(self.given_coefficient, name) or (
+            self.film is not None and depends_on(self.film.growth, name)
+        )
 
     @property
     def varies(self) -> bool:
         """Whether its wear changes with more than the place, or it remembers a state."""
-        return varies(self.given_coefficient)
+        return self.film is not None or varies(self.given_coefficient)
 
     @property
     def scale(self) -> float:

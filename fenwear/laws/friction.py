@@ -38,6 +38,7 @@ from scipy.sparse import csr_array
 
 from fenwear.case import Contact, Dependence, WearLaw
 from fenwear.case.contact_table import Lubrication
+from fenwear.case.wear_table import FILM
 from fenwear.common.arrays import Array
 from fenwear.common.errors import CaseError, InputError
 from fenwear.laws.sliding_tensors import CycleShear
@@ -266,6 +267,7 @@ class ContactConditions:
             "edge": none if self.edge is None else self.edge,
             "cs": none if self.cycle is None else self.cycle.ratio[body_index],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
+            FILM: none,
             **self.regions[body_index].variables,
             **self.states[body_index],
         }

@@ -30,6 +30,7 @@ import numpy as np
 import scipy.linalg
 
 from fenwear.case.dependence import WEAR, State, evaluate_of_state
+from fenwear.case.wear_table import FILM
 from fenwear.common.arrays import Added, Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.laws.friction import ContactConditions
@@ -407,7 +408,7 @@ class Evolution:
             "edge": none,
             "cs": none,
             "pm": none,
-            **dict.fromkeys(WEAR, none),
+            **dict.fromkeys((*WEAR, FILM), none),
             **{axis: np.asarray(coordinate) for axis, coordinate in zip("xyz", x.T, strict=True)},
             **dict.fromkeys(memory.contact, none),
         }

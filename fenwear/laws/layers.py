@@ -392,7 +392,7 @@ def layers_of(
         debris = Debris(third.share, life, third.initial, third.edge_life or np.inf, third.edge_length or 1.0)
     hardness = np.inf if contact.hardness is None else contact.hardness
     of_friction = contact.friction.states if isinstance(contact.friction, Dependence) else {}
-    punch, strip = wear[0].states, wear[1].states
+    punch, strip = wear[0].states_of("punch"), wear[1].states_of("strip")
     here = {**punch, **{name: state for name, state in of_friction.items() if name not in strip or name in punch}}
     memory = Memory(here, strip, frozenset(punch), temperature)
     begun = memory.beginning(pair)

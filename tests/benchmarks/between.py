@@ -48,8 +48,8 @@ TERMS: dict[str, tuple[str, ...]] = {
 
 def film() -> None:
     """Register a film that grows, that sliding rubs off, and that protects."""
-    grows = State(lambda now: (1 - now["film"]) / 60 - 2e-5 * now["p"] * now["v"] * now["film"], of=["p", "v"])
-    register_law("film", lambda now: 4e-8 * (1 - 0.9 * now["film"]), of=["film"], states={"film": grows})
+    grows = State(lambda now: (1 - now["oxide"]) / 60 - 2e-5 * now["p"] * now["v"] * now["oxide"], of=["p", "v"])
+    register_law("film", lambda now: 4e-8 * (1 - 0.9 * now["oxide"]), of=["oxide"], states={"oxide": grows})
 
 
 def systems(name: str, wanted: Sequence[str]) -> dict[str, Tribosystem]:

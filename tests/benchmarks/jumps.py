@@ -45,7 +45,7 @@ def counted(owner: Any, name: str) -> None:
 
 
 def growth(now: Any) -> Any:
-    return 20 * (1 - now["film"]) - now["p"] * now["v"] * now["film"] / 5
+    return 20 * (1 - now["oxide"]) - now["p"] * now["v"] * now["oxide"] / 5
 
 
 def ends(feature: str, law: str, **how: Any) -> tuple[Array, Array, int]:
@@ -89,9 +89,9 @@ def row(feature: str, law: str) -> str:
 def main() -> None:
     """Print the table."""
     register_law(
-        "filmed", lambda now: 5e-8 * (1.5 - now["film"]), states={"film": State(growth, of=["p", "v"], initial=1.0)}
+        "filmed", lambda now: 5e-8 * (1.5 - now["oxide"]), states={"oxide": State(growth, of=["p", "v"], initial=1.0)}
     )
-    register_law("slippery", lambda now: 0.75 - 0.1 * now["film"], of=["film"])
+    register_law("slippery", lambda now: 0.75 - 0.1 * now["oxide"], of=["oxide"])
     counted(Stepper, "stage")
     counted(PartialSlipProblem, "_half_cycle")
     of = " | ".join(f"{tolerance:g}: solved: depth, pressure, depth to finest, pressure" for tolerance in TOLERANCES)

@@ -155,20 +155,20 @@ def test_states_that_depend_on_each_other() -> None:
 def test_friction_and_wear_share_a_state(law: str) -> None:
     """A film that pressure rubs off and that grows again: marches and jumps agree, and rest where the end is."""
     grown = State(
-        lambda now: 3.0 * (1 - now["film"]) - now["p"] * now["v"] / 20 * now["film"], of=["p", "v"], initial=1.0
+        lambda now: 3.0 * (1 - now["oxide"]) - now["p"] * now["v"] / 20 * now["oxide"], of=["p", "v"], initial=1.0
     )
-    register_law("mine", lambda now: 1e-6 * (1.5 - now["film"]), of=["film"], states={"film": grown})
-    register_law("slippery", lambda now: 0.7 - 0.2 * now["film"], of=["film"])
+    register_law("mine", lambda now: 1e-6 * (1.5 - now["oxide"]), of=["oxide"], states={"oxide": grown})
+    register_law("slippery", lambda now: 0.7 - 0.2 * now["oxide"], of=["oxide"])
     more = (OWN, "contact.friction={law='slippery'}", "motion.period='1 s'")
     system = assemble(case_of(law, "run.half_cycles=24", *more))
-    assert system.layers.rows == ("state film",)
+    assert system.layers.rows == ("state oxide",)
     marched, jumped = (end(system, how) for how in ("explicit", "jump"))
     for row in (lambda block: block.end.worn.punch, lambda block: block.end.worn.between[0]):
         assert np.abs(row(marched) - row(jumped)).max() < 2e-2 * np.abs(row(marched)).max()
     assert np.ptp(marched.end.worn.between[0]) > 0.03
     if law == "gross-sliding":
         state, far = steady(system), end(assemble(case_of(law, "run.half_cycles=40000", *more)), "jump", 1e-2)
-        assert far.end.worn.between[0] == pytest.approx(state.states["film"], rel=1e-4)
+        assert far.end.worn.between[0] == pytest.approx(state.states["oxide"], rel=1e-4)
         assert far.pressure[-1] == pytest.approx(state.pressure[-1], rel=1e-2, abs=1e-3 * far.pressure.max())
         assert growth_rate(system, state.phase_pressure) < 0
 
@@ -223,12 +223,12 @@ def test_what_goes_on_for_ever_has_no_steady_state() -> None:
     ("name", "state", "text"),
     [
         ("p", State(abs), "expected a word that is none of"),
-        ("film", State(3), "expected functions as its rate"),  # type: ignore[arg-type]
-        ("film", 3, "expected a fenwear.State"),
-        ("film", State(abs, of=["q"]), "expected a list of some of"),
-        ("film", State(abs, least=1, most=0), "expected least < most"),
-        ("film", State(abs, initial=-1, least=0), "expected an initial value from 0 to inf, got -1"),
-        ("film", State(abs, fills=-1), "expected fills of zero or more"),
+        ("oxide", State(3), "expected functions as its rate"),  # type: ignore[arg-type]
+        ("oxide", 3, "expected a fenwear.State"),
+        ("oxide", State(abs, of=["q"]), "expected a list of some of"),
+        ("oxide", State(abs, least=1, most=0), "expected least < most"),
+        ("oxide", State(abs, initial=-1, least=0), "expected an initial value from 0 to inf, got -1"),
+        ("oxide", State(abs, fills=-1), "expected fills of zero or more"),
     ],
 )
 def test_states_that_make_no_sense(name: str, state: Any, text: str) -> None:
@@ -240,10 +240,10 @@ def test_states_that_make_no_sense(name: str, state: Any, text: str) -> None:
 def test_rates_that_fail_say_so() -> None:
     """With the state's name, and what it was asked at."""
     for wrong, text in (
-        (lambda now: now["T"], "state 'film': .*'T'"),
-        (lambda now: now["film"] / 0 * np.inf, r"state 'film': expected finite numbers, got inf at film = 1"),
+        (lambda now: now["T"], "state 'oxide': .*'T'"),
+        (lambda now: now["oxide"] / 0 * np.inf, r"state 'oxide': expected finite numbers, got inf at oxide = 1"),
     ):
-        mine(lambda now: BARE * now["film"], film=State(wrong, of=[], initial=1.0))
+        mine(lambda now: BARE * now["oxide"], oxide=State(wrong, of=[], initial=1.0))
         system = assemble(load_case("example2", [*PLAIN, "run.half_cycles=2", OWN]))
         with pytest.raises(CaseError, match=text), np.errstate(all="ignore"):
             end(system, "explicit")

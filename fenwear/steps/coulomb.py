@@ -377,8 +377,9 @@ class HalfCycles(_Run):
         stroke, earlier = state.half_cycle % self.strokes, np.ones((self.strokes, len(problem.weights)))
         stuck = np.array((earlier if state.memory is None else state.memory.stuck) > 0)
         stuck[stroke] = records.stuck
-        ratio = _energy_ratio(records, problem.weights)
-        steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, 0.0, first, lost)
+        steps = Steps(
+            records, before, np.asarray(stuck.all(axis=0)), _energy_ratio(records, problem.weights), 0.0, first, lost
+        )
         record = self.half_cycle(number, steps, (worn, totals), adds, load)
         contacts = list(state.contacts)
         contacts[stroke] = record.phases[0].contact
@@ -426,10 +427,10 @@ class Jumps(_Run):
         depths, sums, made = counted_back(then.worn, lost), counted_back(totals, adds), []
         for k, ((first, records, _), (_, earlier, _)) in enumerate(zip(parts, old, strict=True)):
             before = records.pressure - (records.pressure - earlier.pressure) / cycles
-            ratio, at_all = _energy_ratio(records, problem.weights), np.asarray(stuck.all(axis=0))
-            steps = Steps(records, before, at_all, ratio, then.error, first, lost[k])
-            ends = depths[k], sums[k]
-            made.append(self.half_cycle(number - strokes + 1 + k, steps, ends, adds[k], then.end.load))
+            ratio = _energy_ratio(records, problem.weights)
+            steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, then.error, first, lost[k])
+            record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
+            made.append(record)
         contacts = tuple(record.phases[0].contact for record in made)
         warm, after = state.temperature, tuple[HeatState, ...]()
         if exchange.conducts:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import reduce
 
 import numpy as np
 
@@ -239,9 +239,6 @@ class Stepper(JumpLaw[JumpMoment]):
         temperature = before.temperature + cycles * rate.heated
         return JumpMoment(before.worn + lost, contact, stage.time, temperature, before.totals + adds, rate)
 
-    def _wear(self, before: WornDepths, cycles: float, pressure: Array) -> WornDepths:
-        return self.wear.begun(before, cycles).worn(pressure)  # as last taken
-
     def _press(self, cycles: float) -> None:
         """Take the time and the loads so many cycles after the begin of the jump."""
         self._done = self._begin.half_cycle + cycles * self.system.motion.half_cycles
@@ -264,7 +261,13 @@ class Stepper(JumpLaw[JumpMoment]):
             np.inf if self.periodic else cycles - 0.5,
             near,
             lambda thermal, coupling, near: self._solve(gap + thermal, near, (before.worn, cycles), coupling),
-            DepthEvolution(before.worn, cycles, partial(self._wear, before.worn, cycles), self._done, self._follows),
+            DepthEvolution(
+                before.worn,
+                cycles,
+                lambda pressure: self.wear.begun(before.worn, cycles).worn(pressure),  # as last taken
+                self._done,
+                self._follows,
+            ),
         )
         contact, begin = solved.contact, solved.temperature
         heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin

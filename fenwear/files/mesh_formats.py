@@ -207,7 +207,8 @@ def read_vtu(path: Path) -> MeshFile:
     try:
         import pyvista
     except ImportError:
-        raise ValueError("VTU files need `pip install pyvista`") from None
+        needs = "needs pyvista: `pip install pyvista`, or the image of `docker/fenwear --build`. Or save it as .msh"
+        raise ValueError(needs) from None
     grid = pyvista.UnstructuredGrid(path)
     ends, kinds, nodes = grid.offset[1:], grid.celltypes, np.asarray(grid.cell_connectivity, dtype=np.int64)
     blocks, kept, notes = [], [np.zeros(0, dtype=np.int64)], []

@@ -79,8 +79,8 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
         file = resources.files("fenwear") / "cases" / f"{source}.toml"
         if not file.is_file():
             known = ", ".join(builtin_cases())
-            hint = did_you_mean(source, builtin_cases())
-            raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known}){hint}"))
+            hint = did_you_mean(source, builtin_cases()) or "."
+            raise CaseError(InputError(source, f"no such case file, nor a built-in case{hint} Built-in cases: {known}"))
         text, folder = file.read_text("utf-8"), None
     else:
         text, folder = _read_text(path), path.parent

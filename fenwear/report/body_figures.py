@@ -367,8 +367,8 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View) -> Figure:
     name, unit, colours = SHOWN[field]
     unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]
-    wide, high = view.box[1] - view.box[0], view.box[3] - view.box[2]
-    figure = Figure(figsize=(7.0, min(6.3 * high / wide + 1.4, 8.0)), layout="constrained")
+    wide, tall = view.box[1] - view.box[0], view.box[3] - view.box[2]
+    figure = Figure(figsize=(7.0, min(6.3 * tall / wide + 1.4, 8.0)), layout="constrained")
     ax: Any = figure.subplots()
     most = low
     for body in BODIES:

@@ -62,8 +62,8 @@ TEXTS = {
     "follows it, and it is smooth where the edge of the contact moves.",
     "tracks": "Sliding over the last cycle. (a) Tracks of the strip's material; dots mark their start. (b) Cross-shear "
     "ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
-    "cuts_along": "Pressure, worn depths and temperatures along the sliding at {chosen}.",
-    "cuts_across": "Pressure, worn depths and temperatures across the sliding at {chosen}.",
+    "cuts_along": "Pressure and worn depths{warm} along the sliding at {chosen}.",
+    "cuts_across": "Pressure and worn depths{warm} across the sliding at {chosen}.",
     "between": "State between the surfaces along the contact at {chosen}: debris, plastic depth, remaining coatings, "
     "and what laws remember there, where there are any.",
     "program": "Load, sliding speed and ambient temperature over the run, where they change.",
@@ -187,6 +187,7 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
         size="width" if "contact_width" in history else "area",
         axis=axis,
         hot=" and largest temperature of the contact surfaces" if "largest_temperature" in history else "",
+        warm=" and temperatures" if "largest_temperature" in history else "",
         last=f"{int(history.half_cycle[-1]):,}",
     )
     if name in ALONG and (sides := sides_of(history)) is not None:

@@ -233,7 +233,7 @@ def _draw(
     top = pressure_top(history, half_cycles) if field.variable == "pressure" else np.inf
     for colour, n in shades(nearest_half_cycles(direction_history, half_cycles)):
         values = field.factor * direction_history[field.variable].sel(half_cycle=n).values
-        beyond = f" (to {values.max():.3g} MPa)" if values.max() > top else ""
+        beyond = f" (to {readable(values.max(), 3)} MPa)" if values.max() > top else ""
         style: dict[str, Any] = {"color": colour, "linestyle": "--" if direction < 0 else "-"}
         ax.plot(*track.line(values, field.body), label=look.name(history, n) + beyond, gid=str(n), **style)
     if field.variable in (known := levels(history)):

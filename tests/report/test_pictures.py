@@ -13,6 +13,7 @@ from matplotlib.image import imread
 from fenwear.report.body_figures import (
     FIELDS,
     DrawingError,
+    bodies_figure,
     common_view,
     deformed,
     draw_pictures,
@@ -107,7 +108,9 @@ def test_curved_surfaces_are_drawn_as_they_are(tmp_path: Path) -> None:
 def test_colours_leave_out_single_points_of_stress(tmp_path: Path) -> None:
     """One corner of a thousand times the stress does not turn everything else pale; temperature is shown whole."""
     data = _write(tmp_path, 1)
-    usual = common_view([data]).ranges
+    view = common_view([data])
+    usual = view.ranges
+    assert bodies_figure(data, "von_mises", view).axes[0].collections[0].get_clim() == usual["von_mises"]
     data.punch_von_mises.values[0] = 1e5
     spiked = common_view([data]).ranges
     assert spiked["von_mises"][1] < 2 * usual["von_mises"][1]

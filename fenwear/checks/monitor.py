@@ -9,6 +9,7 @@ import numpy as np
 
 from fenwear.checks.rules import RULES, Made, Seen, remarks
 from fenwear.common.arrays import Array, Mask
+from fenwear.heat.heat_exchange import HeatExchange
 from fenwear.heat.temperature import HeatState
 from fenwear.steps import Block, heat_gain, heat_warnings
 from fenwear.steps.stick_program import passes
@@ -22,9 +23,9 @@ GAIN = "heat_gain"
 KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is said of each
 
 
-def fineness_text(system: Tribosystem) -> str:
+def fineness_text(exchange: HeatExchange) -> str:
     """Return how fine the steps and bases of the heat are, "" without heat."""
-    fineness = system.exchange.fineness
+    fineness = exchange.fineness
     if not fineness.steps:
         return ""
     parts = [f"heat: {fineness.steps} steps in a half-cycle"]

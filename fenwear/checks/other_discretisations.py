@@ -17,7 +17,8 @@ from fenwear.steps import Block, follow_program
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import jump_within, march_within
 from fenwear.steps.run_state import RunState
-from fenwear.system import ContactSetup, Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
+from fenwear.surfaces import ContactPair
+from fenwear.system import Tribosystem, answers_anywhere, relaid, renewed, with_case, with_reduced_heat
 
 LONGEST = 100  # phases that are marched again one by one; longer runs go by jumps
 LARGER, LESS = 8.0, 0.25  # by which the tolerance of jumps is raised where they are dear, and their error then falls
@@ -111,15 +112,15 @@ class Coarser:
         return self.ratio > 1
 
 
-def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser:
+def coarser(case: Case, pair: ContactPair, across: int = 0) -> Coarser:
     """Return the case on elements of the next lower degree, on a grid half or a quarter as fine.
 
     Args:
         case: The problem.
-        placed: Its bodies.
+        pair: Its surfaces.
         across: Nodes across the contact.
     """
-    degree, grid, wanted = case.geometry.degree, placed.pair.punch.grid, case.grid
+    degree, grid, wanted = case.geometry.degree, pair.punch.grid, case.grid
     if wanted is None or grid is None:
         lower = changed(case, geometry={"degree": max(degree - 1, 1)})
         return Coarser(lower, degree / max(degree - 1, 1))
@@ -135,9 +136,9 @@ def coarser(case: Case, placed: ContactSetup, across: int = 0) -> Coarser:
     return Coarser(changed(case, grid=numbers), every, fewer)
 
 
-def nodes_across(placed: ContactSetup, pressure: Array) -> int:
+def nodes_across(pair: ContactPair, pressure: Array) -> int:
     """Return how many nodes of a grid there are across the contact by pressures (..., n); 0 without a grid."""
-    grid, touched = placed.pair.punch.grid, (pressure > 0).any(axis=tuple(range(pressure.ndim - 1)))
+    grid, touched = pair.punch.grid, (pressure > 0).any(axis=tuple(range(pressure.ndim - 1)))
     if grid is None or not touched.any():
         return 0
     return int(np.ptp(grid.places[touched], axis=0).max()) + 1

@@ -229,7 +229,7 @@ def above_shakedown(seen: Seen) -> Fields:
     pressure = float(seen.pressure[row].max())
     if pressure <= limit or seen.system.layers.hardness < np.inf:
         return {}
-    return {"pressure": pressure, "when": seen.when[row], "limit": limit, "factor": factor(seen.system),
+    return {"pressure": pressure, "when": seen.when[row], "limit": limit, "factor": factor(seen.system.pair),
             "material": material}  # fmt: skip
 
 
@@ -297,7 +297,7 @@ def clipped(seen: Seen) -> Fields:
     if not rows.any():
         return {}
     load = float(seen.system.pair.weights @ seen.pressure[-1])
-    needed = 0.0 if seen.kind == "steady" else limits.width_needed(opened(seen.made.system, seen.end), load)
+    needed = 0.0 if seen.kind == "steady" else limits.width_needed(opened(seen.made.system.pair, seen.end), load)
     key = "grid.size" if limits.of_grid else "geometry.parameters.contact_width"
     known = limits.of_grid or "contact_width" in case.geometry.parameters
     then = {

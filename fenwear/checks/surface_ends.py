@@ -30,6 +30,7 @@ from fenwear.case import Case
 from fenwear.common.arrays import Array, Mask
 from fenwear.common.compat import facet_nodes
 from fenwear.laws.wear import WornDepths
+from fenwear.surfaces import ContactPair
 from fenwear.system import Tribosystem
 
 SMOOTH = np.cos(np.radians(20))  # cosine of the angle between two facets up to which the boundary goes on
@@ -228,7 +229,7 @@ def contact_limits(system: Tribosystem) -> Limits:
             slack = BESIDE * pair.strip.extent() + 0.6 * float(np.median(apart))
             clips &= cKDTree(edge).query(pair.punch.x)[0] > slack
         width = float(np.ptp(_along(pair.punch.x, pair.normal.mean(axis=0)), axis=0).max())
-    return Limits(clips, pair.punch.x, width, curvatures(system), contact_modulus(system.case), around, of_grid)
+    return Limits(clips, pair.punch.x, width, curvatures(system.pair), contact_modulus(system.case), around, of_grid)
 
 
 def _clipped_by_grid(punch: ElasticBody, grid: RegularGrid, rim: Rim) -> tuple[Mask, bool]:
@@ -254,9 +255,9 @@ def _clipped_by_grid(punch: ElasticBody, grid: RegularGrid, rim: Rim) -> tuple[M
     return clips, bool((within & last).any())
 
 
-def opened(system: Tribosystem, worn: WornDepths) -> float:
+def opened(pair: ContactPair, worn: WornDepths) -> float:
     """Return the gap that worn depths open in the middle position: mm² in a plane, mm³ of rings and solids."""
-    return float(system.pair.weights @ system.pair.opening(worn.punch, worn.strip))
+    return float(pair.weights @ pair.opening(worn.punch, worn.strip))
 
 
 def contact_modulus(case: Case) -> float:
@@ -273,9 +274,8 @@ def _along(x: Array, normal: Array) -> Array:
     return np.asarray((x - x.mean(axis=0)) @ np.linalg.svd(normal[None])[2][1:].T)
 
 
-def curvatures(system: Tribosystem) -> tuple[float, ...]:
+def curvatures(pair: ContactPair) -> tuple[float, ...]:
     """Return the principal curvatures, descending, of the paraboloid nearest to the unworn gap; none of other gaps."""
-    pair = system.pair
     s = _along(pair.punch.x, pair.normal.mean(axis=0))
     rows, columns = np.triu_indices(s.shape[1])
     powers = np.column_stack([np.ones(len(s)), s, s[:, rows] * s[:, columns]])

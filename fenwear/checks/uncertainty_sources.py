@@ -148,7 +148,9 @@ def uncertainty(case: Case, last: Block) -> Uncertainty:
     values, until = values_of(last), int(last.half_cycle[-1])
     contributions: dict[str, Contribution] = {}
     untold: dict[str, str] = {}
-    lower = coarser(case, last.system, nodes_across(last.system, last.pressure[-last.system.motion.half_cycles :]))
+    lower = coarser(
+        case, last.system.pair, nodes_across(last.system.pair, last.pressure[-last.system.motion.half_cycles :])
+    )
     if not lower.differs:
         untold["mesh"] = NOTHING_BELOW
     try:
@@ -290,7 +292,7 @@ def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     begin = time.perf_counter()
     system, values = state.system, values_of_steady(state)
     case = system.case
-    lower = coarser(case, system, nodes_across(system, np.array(state.pressure)))
+    lower = coarser(case, system.pair, nodes_across(system.pair, np.array(state.pressure)))
     contributions, untold = dict[str, Contribution](), dict[str, str]()
     if not lower.differs:
         untold["mesh"] = NOTHING_BELOW

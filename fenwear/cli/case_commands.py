@@ -171,7 +171,7 @@ def _check_sliding(system: Tribosystem, heat_seconds: float, *, full: bool) -> N
     if full:
         print_case(loaded)
     if warm.exchange.conducts:
-        log(fineness_text(warm))
+        log(fineness_text(warm.exchange))
         if loaded.run.integration == "jump":
             log(f"heat: jumps keep the maps of its steps in a cycle, about {memory_size(cycle_memory(warm.exchange))}")
     log(f"the case is valid: {len(system.pair.x)} contact nodes, {size}")

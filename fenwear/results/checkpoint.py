@@ -249,7 +249,7 @@ def _check_sizes(directory: Path, kept: Checkpoint, system: Tribosystem) -> None
     expected = system.unworn()
     worn = kept.state.worn
     followed = kept.followed or worn
-    for stored, like in ((worn, expected), (followed, expected), (kept.state.totals, none_yet(system))):
+    for stored, like in ((worn, expected), (followed, expected), (kept.state.totals, none_yet(system.pair))):
         pairs = [(getattr(stored, field.name), getattr(like, field.name)) for field in fields(like)]
         if any(values.shape != wanted.shape for values, wanted in pairs):
             raise damaged(directory)

@@ -33,6 +33,7 @@ from fenwear.steps import march
 from fenwear.steps.coulomb import Steps
 from fenwear.steps.run_state import all_phases
 from fenwear.steps.stick_state import TimeStepRecords
+from fenwear.surfaces import ContactPair
 from fenwear.surfaces.motion import Motion
 from fenwear.system import (
     ContactSetup,
@@ -184,7 +185,7 @@ class Heating:
     @property
     def grid(self) -> RegularGrid:
         """The contact."""
-        return grid_of(self.placed)
+        return grid_of(self.placed.pair)
 
     @property
     def touching(self) -> Mask:
@@ -197,9 +198,9 @@ class Heating:
         return self.window.extent(self.touching)
 
 
-def grid_of(placed: ContactSetup) -> RegularGrid:
-    """Return the contact grid of placed bodies, which have one."""
-    grid = placed.pair.punch.grid
+def grid_of(pair: ContactPair) -> RegularGrid:
+    """Return the contact grid of surfaces that have one."""
+    grid = pair.punch.grid
     assert grid is not None
     return grid
 
@@ -238,7 +239,7 @@ def _of_positions(case: Case, directory: Path) -> Heating:
     if stage is not None or kept.followed is not None:
         placed = place_case(case, followed=kept.followed)
     if kept.grid is not None:
-        placed = placed_on(placed, grid_of(placed).with_numbers(kept.grid))
+        placed = placed_on(placed, grid_of(placed.pair).with_numbers(kept.grid))
     motion, reached = placed.motion, all_phases(last.contacts).pressure
     if reached.shape != (len(motion.phases), len(placed.pair.weights)):
         raise CaseError(InputError(str(directory), "expected a run that has done a whole cycle"))
@@ -247,7 +248,7 @@ def _of_positions(case: Case, directory: Path) -> Heating:
         conditions = placed.phases.conditions(k, reached[k], worn=last.worn, half_cycles=last.half_cycle)
         heat[k] = reached[k] * heating_friction(placed, placed.laws.friction.values(conditions), k)
     along = _along(placed, reached)
-    window = Window.around(grid_of(placed), reached)
+    window = Window.around(grid_of(placed.pair), reached)
     heat *= placed.pair.weights / window.cell
     pressure, heat = reached[:, window.nodes], heat[:, window.nodes]
     if motion.one_way:
@@ -329,7 +330,7 @@ def _of_time_steps(case: Case, directory: Path) -> Heating:
     steps = count if even else int(np.clip(2 * count, FEWEST, MOST))
     times = period * (np.arange(steps) + 0.5) / steps
     step = np.minimum(np.searchsorted(edges[1:], times), count - 1)
-    window = Window.around(grid_of(system), records.pressure)
+    window = Window.around(grid_of(system.pair), records.pressure)
     done = records.dissipated * system.pair.weights / window.cell
     work = np.concatenate([np.zeros((1, done.shape[1])), done.cumsum(axis=0)])[:, window.nodes]
     parts = np.array([_read(edges, work, t) for t in period * np.arange(steps + 1) / steps])
@@ -370,7 +371,7 @@ def _along(placed: ContactSetup, pressure: Array) -> Array:
     mean = placed.pair.weights * pressure.mean(axis=0)
     if not mean.any():
         raise CaseError(InputError("geometry", "nothing touches in the last cycle, so that there is no heat"))
-    velocity = placed.sliding.field.velocity(placed.pair.punch.x)[:, grid_of(placed).axes]
+    velocity = placed.sliding.field.velocity(placed.pair.punch.x)[:, grid_of(placed.pair).axes]
     middle = mean @ velocity / mean.sum()
     differs = np.linalg.norm(velocity[mean > 0] - middle, axis=1).max()
     if not differs <= VARIES * np.linalg.norm(middle):

@@ -35,7 +35,7 @@ from fenwear.heat.moving_sources import Instants, Periodic, Response, cell_integ
 from fenwear.results.flash_source import Heating, Past, heating_of
 from fenwear.results.history import CASE
 from fenwear.results.quantity import BODIES
-from fenwear.system import ContactSetup, build_conduction
+from fenwear.system import Bodies, build_conduction
 
 NEEDED = ("conductivity", "heat_capacity", "density")
 TAKEN = (
@@ -107,11 +107,11 @@ class Conductor:
     material: Material
 
 
-def conductors(placed: ContactSetup, case: Case, heat: Heat, touching: Mask) -> list[Conductor]:
+def conductors(bodies: Bodies, case: Case, heat: Heat, touching: Mask) -> list[Conductor]:
     """Return the conducting materials of punch and strip where they touch.
 
     Args:
-        placed: The bodies.
+        bodies: Both.
         case: With the materials.
         heat: Whose initial temperature they are taken at.
         touching: Nodes of the punch (n,).
@@ -120,7 +120,7 @@ def conductors(placed: ContactSetup, case: Case, heat: Heat, touching: Mask) -> 
         CaseError: a property is missing, or several materials touch.
     """
     conducting: list[Conductor] = []
-    for name, body, shares in zip(case.bodies, case.bodies.values(), placed.bodies.regions, strict=True):
+    for name, body, shares in zip(case.bodies, case.bodies.values(), bodies.regions, strict=True):
         used = touching if name == "punch" else np.full(len(next(iter(shares.values()))), True)
         names = {body.regions[region] for region, share in shares.items() if (share[used] > 0).any()}
         materials = {key: case.materials[key].at(heat.initial, f"materials.{key}") for key in sorted(names)}
@@ -203,7 +203,7 @@ def flash_temperatures(directory: Path | str, settings: Sequence[str] = ()) -> F
     heating = heating_of(run_case_of(folder / CASE, ())[0], folder)
     ever = np.zeros(len(heating.placed.pair.weights), dtype=bool)
     ever[heating.window.nodes] = heating.touching.any(axis=0)
-    both = conductors(heating.placed, case, heat, ever)
+    both = conductors(heating.placed.bodies, case, heat, ever)
     friction = (1 - heat.debris) * heating.heat
     bulks, remarks = _bulks(case, heat, heating, both)
     sides = [

@@ -26,6 +26,7 @@ from fenwear.common.arrays import Array, Mask
 from fenwear.laws.wear import WornDepths
 from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.steps import Block
+from fenwear.surfaces import RigidEquilibrium
 from fenwear.surfaces.equilibrium import is_translation
 from fenwear.system import ContactSetup
 
@@ -90,12 +91,12 @@ class Bore(NamedTuple):
     nodes: Mask
 
 
-def motions(placed: ContactSetup) -> list[str]:
+def motions(rigid: RigidEquilibrium) -> list[str]:
     """Return the names of the free motions of both bodies: moved_z, turned_y_left, moved_x_strip."""
     names = []
-    for k, mode in enumerate(placed.rigid.mode_names):
+    for k, mode in enumerate(rigid.mode_names):
         kind, part = "_".join(mode.split("_")[:2]), mode.split("_")[2:]
-        end = [] if k < placed.rigid.of_punch else ["strip"]
+        end = [] if k < rigid.of_punch else ["strip"]
         names.append("_".join([MOVED[kind], *part, *end]))
     return names
 
@@ -103,7 +104,7 @@ def motions(placed: ContactSetup) -> list[str]:
 def quantities(placed: ContactSetup) -> list[Quantity]:
     """Return the quantities of the bodies' place: their free motions, and that of a shaft in its bores."""
     place_quantities: list[Quantity] = []
-    for number, (name, mode) in enumerate(zip(motions(placed), placed.rigid.mode_names, strict=True)):
+    for number, (name, mode) in enumerate(zip(motions(placed.rigid), placed.rigid.mode_names, strict=True)):
         body = "strip" if name.endswith("_strip") else "punch"
         axis = name.split("_")[1]
         unit, text = ("mm", f"moved along {axis}") if is_translation(mode) else ("rad", f"turned about {axis}")

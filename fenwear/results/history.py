@@ -35,6 +35,7 @@ from fenwear.results.history_surfaces import (
 from fenwear.results.quantity import KELVIN, Quantity, computed, degrees_in, degrees_of
 from fenwear.results.registry import quantities_of
 from fenwear.steps import Block
+from fenwear.surfaces import ContactPair
 from fenwear.system import Tribosystem, grows, kept_volume, node_maps, on_nodes
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -113,9 +114,9 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
     }
 
 
-def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:
+def grid_of(directory: Path, pair: ContactPair) -> RegularGrid | None:
     """Return the contact grid that the history in a folder stands on, where grids grow; None where there is none."""
-    grid = system.pair.punch.grid
+    grid = pair.punch.grid
     try:
         with h5py.File(directory / HISTORY, "r") as file:
             numbers = file.attrs.get(GRID)

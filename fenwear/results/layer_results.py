@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.common.arrays import Array, Mask
+from fenwear.laws import Layers
 from fenwear.laws.coating import CoatedBody, left_of
 from fenwear.laws.layers import DEBRIS, PLASTIC
 from fenwear.laws.wear import coefficient
@@ -95,9 +96,9 @@ DEBRIS_ON_STRIP = Quantity("debris_thickness_strip", ON_STRIP, "mm", "thickness 
 STATE, STATES = "state_", "states"  # how variables of states begin; where summary.json has them
 
 
-def _of_states(placed: ContactSetup) -> list[Quantity]:
+def _of_states(layers: Layers) -> list[Quantity]:
     """Return the states that laws remember, at the contact nodes and on the strip's material."""
-    layers, memory = placed.layers, placed.layers.memory
+    memory = layers.memory
     state_quantities = []
     for states, first, kept, dims, end, body in (
         (memory.contact, len(layers.rows) - len(memory.contact), "between", ALONG, "", ""),
@@ -123,7 +124,7 @@ def states(last: Block) -> dict[str, dict[str, Any]]:
             "unit": quantity.unit,
             **_extent(weights[quantity.dims], quantity.compute(last)[-1]),
         }
-        for quantity in _of_states(last.system)
+        for quantity in _of_states(last.system.layers)
     }
 
 
@@ -250,7 +251,7 @@ def quantities(system: Tribosystem) -> list[Quantity]:
         *(OF_FLOW if PLASTIC in layers.rows else ()),
         *(OF_DEBRIS if layers.debris.present else ()),
         *([DEBRIS_ON_STRIP] if layers.strip_carries else ()),
-        *_of_states(system),
+        *_of_states(system.layers),
         *(
             quantity
             for body, thickness in zip(BODIES, system.laws.coatings, strict=True)

@@ -17,6 +17,7 @@ from fenwear.common.arrays import Array
 from fenwear.results.history_surfaces import Column
 from fenwear.results.quantity import BODIES, RECORD, InTable, Quantity
 from fenwear.steps import Block
+from fenwear.surfaces import ContactPair
 from fenwear.system import Tribosystem
 
 FEWEST = 8  # nodes along each axis of a place as large, below which the whole grid is taken
@@ -27,9 +28,9 @@ NAMES = {
 }
 
 
-def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
+def _rough(pair: ContactPair) -> dict[str, ContactSurface]:
     """Return the surfaces with a topography, by their bodies."""
-    both = {"punch": system.pair.punch, "strip": system.pair.strip}
+    both = {"punch": pair.punch, "strip": pair.strip}
     return {body: surface for body, surface in both.items() if surface.grid is not None and surface.heights.any()}
 
 
@@ -42,14 +43,14 @@ def columns(system: Tribosystem) -> dict[str, Column]:
             np.asarray(surface.heights),
             {"units": "mm", "long_name": f"height of the unworn {body} over its smooth shape, out of it"},
         )
-        for body, surface in _rough(system).items()
+        for body, surface in _rough(system.pair).items()
         if body == "punch" or system.phases.strip_changes
     }
 
 
 def quantities(system: Tribosystem) -> list[Quantity]:
     """Return the quantities of rough surfaces."""
-    return [quantity for body in _rough(system) for quantity in of_body(body)]
+    return [quantity for body in _rough(system.pair) for quantity in of_body(body)]
 
 
 def of_body(body: str) -> list[Quantity]:
@@ -74,7 +75,7 @@ def sa_sq(z: Array) -> tuple[float, float]:
 
 def worn_heights(block: Block, body: str, row: int) -> Array:
     """Return heights of a rough surface at the end of a half-cycle, without its form, mm, as `levelled`."""
-    surface, depth = _rough(block.system)[body], {"punch": block.wear, "strip": block.wear_strip}[body][row]
+    surface, depth = _rough(block.system.pair)[body], {"punch": block.wear, "strip": block.wear_strip}[body][row]
     assert surface.grid is not None
     return levelled(surface.grid.places, surface.heights - depth, depth > 0)
 

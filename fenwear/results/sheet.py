@@ -27,7 +27,7 @@ from fenwear.common.arrays import Array
 from fenwear.results.history_surfaces import ScarGeometry, scar_geometry, without_noise
 from fenwear.results.quantity import BODIES, RECORD, InTable, Quantity, numbers
 from fenwear.steps import Block
-from fenwear.system import ContactSetup
+from fenwear.system import Bodies, ContactSetup
 
 SHARES = {"": 0.01, "_5_percent": 0.05}  # of the largest depth, where widths are read, and how their names end
 ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and width differ by a tenth at most
@@ -209,7 +209,7 @@ def of_body(placed: ContactSetup, body: str) -> list[Quantity]:
     geometry = scar_geometry(placed, surface := getattr(placed.pair, body))
     weighed = placed.bodies.densities[number] is not None
     return [
-        *(of_a_plane_body(body) if _is_plane(placed) else ()),
+        *(of_a_plane_body(body) if _is_plane(placed.bodies) else ()),
         *(quantity for quantity in of_a_body(body) if weighed or "mass" not in quantity.name),
         *of_the_scar(body, places(placed, surface, geometry), geometry.names),
     ]
@@ -230,11 +230,11 @@ def axes(placed: ContactSetup) -> tuple[str, ...]:
     """Return the names of coordinates on the contact surface: x in the plane, r of rings, x, y and z of solids."""
     if placed.pair.punch.dim == 3:
         return ("x", "y", "z")
-    return ("x",) if _is_plane(placed) else ("r",)
+    return ("x",) if _is_plane(placed.bodies) else ("r",)
 
 
-def _is_plane(placed: ContactSetup) -> bool:
-    return placed.bodies.punch.law.kind in ("stress", "strain")
+def _is_plane(bodies: Bodies) -> bool:
+    return bodies.punch.law.kind in ("stress", "strain")
 
 
 def turns(placed: ContactSetup) -> bool:

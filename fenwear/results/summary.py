@@ -34,6 +34,7 @@ from fenwear.results.registry import quantities_of
 from fenwear.steps import Block
 from fenwear.steps.run_state import SUMS, approach
 from fenwear.steps.steady_cycle import SteadyCycle
+from fenwear.surfaces import ContactPair
 from fenwear.system import ContactSetup, Tribosystem
 
 LINE, POINT = 4.0, 4.7  # p_0 / k
@@ -44,16 +45,18 @@ def shakedown_limit(placed: ContactSetup) -> tuple[float, str]:
     case, (punch, strip) = placed.case, placed.bodies.regions
     used = case.punch.materials_at(punch) | case.strip.materials_at(strip)
     known = {name: case.materials[name].yield_stress for name in sorted(used)}
-    limits = {name: float(factor(placed) * value / np.sqrt(3)) for name, value in known.items() if value is not None}
+    limits = {
+        name: float(factor(placed.pair) * value / np.sqrt(3)) for name, value in known.items() if value is not None
+    }
     if conforming(placed.pair) or not limits:
         return np.inf, ""
     softest = min(limits, key=lambda name: limits[name])
     return limits[softest], softest
 
 
-def factor(placed: ContactSetup) -> float:
+def factor(pair: ContactPair) -> float:
     """Return p_0 / k: in space of a point, else of a line."""
-    return POINT if placed.pair.punch.dim == 3 else LINE
+    return POINT if pair.punch.dim == 3 else LINE
 
 
 CONTACTS = "contacts"  # the table of summary.json
@@ -244,16 +247,16 @@ def net_of(placed: ContactSetup) -> ContactNet:
     return contact_net(placed.pair, placed.sliding.field, sheet.axes(placed))
 
 
-def _places(system: Tribosystem) -> NDArray[np.float64]:
+def _places(pair: ContactPair) -> NDArray[np.float64]:
     """Return three places along a contact that is a line, mm."""
-    x = system.pair.x
+    x = pair.x
     places = (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
     return without_noise(places, float(np.ptp(x)))
 
 
 def _at(system: Tribosystem, values: NDArray[np.float64]) -> list[float | None]:
     """Return nodal values at the three places; None in a gap between parts of the contact."""
-    nodal_values = at_places(system.pair.punch, values, _places(system))
+    nodal_values = at_places(system.pair.punch, values, _places(system.pair))
     return [None if np.isnan(value) else float(value) for value in nodal_values]
 
 
@@ -282,7 +285,7 @@ def _contact_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     plane = system.case.model.kind == "plane"
     contacts: dict[str, Any] = {f"{name}_MPa": value for name, value in nominal.items()}
     if plane:
-        contacts |= {"x_mm": _places(system).tolist(), "wear_mm": _at(system, last.wear[-1])}
+        contacts |= {"x_mm": _places(system.pair).tolist(), "wear_mm": _at(system, last.wear[-1])}
     for k, pressure in enumerate(map(np.asarray, last.pressure[cycle])):
         at = {"pressure_MPa": _at(system, pressure)} if plane else {}
         numbers = {key: row[k].item() for key, row in rows.items() if key != "direction"}

@@ -39,7 +39,7 @@ from fenwear.heat.heat_exchange import HeatExchange
 from fenwear.heat.temperature import HeatState
 from fenwear.laws.friction import ContactConditions
 from fenwear.laws.wear import PhasesWear, WornDepths
-from fenwear.surfaces import RigidEquilibrium
+from fenwear.surfaces import ContactPair, RigidEquilibrium
 from fenwear.surfaces.placement import in_model
 from fenwear.system import ContactSetup, Tribosystem, carried, node_maps, on_nodes
 
@@ -72,9 +72,9 @@ class Totals(Added):
         return values
 
 
-def none_yet(system: ContactSetup) -> Totals:
+def none_yet(pair: ContactPair) -> Totals:
     """Return the totals at the start: zero."""
-    nodes = len(system.pair.weights)
+    nodes = len(pair.weights)
     return Totals(np.zeros(len(SUMS)), np.zeros(nodes), np.zeros(nodes))
 
 
@@ -192,7 +192,7 @@ def phase_totals(system: ContactSetup, pressure: Array, conditions: Sequence[Con
 
 def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
     """Return the additions of a cycle, as `phase_totals`."""
-    return sum(phase_totals(system, pressure, conditions), none_yet(system))
+    return sum(phase_totals(system, pressure, conditions), none_yet(system.pair))
 
 
 def stacked(totals: Sequence[Totals]) -> Totals:
@@ -255,7 +255,7 @@ def with_phases(state: RunState | None, count: int) -> RunState | None:
 def beginning(system: Tribosystem, temperature: HeatState | None = None) -> RunState:
     """Return the unworn bodies at a temperature, by default the initial one."""
     contacts = (ContactState.unsolved(len(system.pair.weights)),) * len(system.motion.phases)
-    return RunState(0, system.unworn(), contacts, temperature, none_yet(system))
+    return RunState(0, system.unworn(), contacts, temperature, none_yet(system.pair))
 
 
 def on_exchange(state: RunState, exchange: HeatExchange) -> RunState:

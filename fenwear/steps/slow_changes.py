@@ -153,7 +153,7 @@ class _Leaving:
             return self.given.get(state.half_cycle)
         if team.lead(partial(self._mesh_update_due, state.worn)):
             return Renewal.MESHES
-        if warming_key(self.system) and is_warm(state):
+        if warming_key(self.system.case) and is_warm(state):
             return Renewal.PROPERTIES
         grows = team.lead(lambda: outgrown(self.system, carried_by(state)) is not None)
         return Renewal.GRID if grows else None
@@ -227,7 +227,7 @@ def with_own_properties(
         CaseError: a property is not positive at a temperature.
         ConvergenceError: the properties do not come to rest.
     """
-    state, key = solve(system), warming_key(system)
+    state, key = solve(system), warming_key(system.case)
     if not key or system.case.heat is None:
         return state, 0
     share = LEFT if within is None else within / system.case.heat.property_tolerance

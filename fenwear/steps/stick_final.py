@@ -517,7 +517,7 @@ def cycle_of_final(shape: FinalShape) -> SteadyCycle:
     system = shape.system
     strokes, steps = system.motion.half_cycles, system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
-    adds, rate = stacked([none_yet(system)] * strokes), shape.worn.times(0.0)
+    adds, rate = stacked([none_yet(system.pair)] * strokes), shape.worn.times(0.0)
     warm = shape.temperature
     heat = None if warm is None else heat_of(*(np.tile(side, (strokes, 1)) for side in warm))
     return SteadyCycle(system, shape.pressures[ends], shape.pressures, adds, rate, {}, heat, moves=False)

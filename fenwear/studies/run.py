@@ -227,7 +227,7 @@ class _Run:
         self.extremes: dict[str, float] = {}  # of all half-cycles so far
         if resume:
             system, start, self.extremes = checkpoint.load(directory, system)
-            laid = on_root(self.comm, lambda: grid_of(directory, system))
+            laid = on_root(self.comm, lambda: grid_of(directory, system.pair))
             if laid is not None and laid != system.pair.punch.grid:  # killed just after it had grown
                 before, system = system, regridded(system, laid)
                 start = on_other_grid(start, before, system)

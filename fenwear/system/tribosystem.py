@@ -388,7 +388,7 @@ def with_exchange(
         system.case.heat,
         system.bodies.heat,
         system.pair,
-        expansions(system),
+        expansions(system.elastic),
         system.sliding.field,
         system.motion,
         heating_frictions(system),
@@ -430,7 +430,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         system.case.heat,
         system.bodies.heat,
         system.pair,
-        expansions(system, in_middle=True),
+        expansions(system.elastic, in_middle=True),
         system.sliding.field,
         velocities,
         heating_friction(system, mean_friction(system)),
@@ -439,17 +439,17 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     return exchange.through(layer_conductance(system))
 
 
-def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:
+def expansions(elastic: ElasticContact, *, in_middle: bool = False) -> tuple[Array, Array]:
     """Return the motion of each surface along the normal by each kelvin of this rank's nodes, mm/K.
 
     Args:
-        system: With condensed bodies.
+        elastic: The condensed bodies.
         in_middle: Whether the strip is in its middle position, even where it passes under the punch.
 
     Returns:
         At the contact nodes (n, owned) each, or of a strip that passes under the punch at its passage's (q, owned).
     """
-    condensed = system.elastic.condensed
+    condensed = elastic.condensed
     punch, strip = condensed.punch.by_temperature, condensed.strip.by_temperature
     if condensed.passed is not None and not in_middle:
         strip = condensed.passed

@@ -224,9 +224,8 @@ def taken_at(system: Tribosystem) -> tuple[Array, ...]:
     return system.bodies.warmed or start
 
 
-def warming_key(system: Tribosystem) -> str:
+def warming_key(case: Case) -> str:
     """Return the key of a property that depends on the temperature; "" where none does."""
-    case = system.case
     used = sorted(case.used_materials)
     return next((f"materials.{name}.{key}" for name in used for key in case.materials[name].dependent), "")
 

@@ -77,7 +77,7 @@ def test_the_gap_by_rows_and_by_displacements() -> None:
     system = assemble(load_case("example2-heat", COARSE))
     elastic, warm = (system.bodies.punch, system.bodies.strip), system.bodies.heat
     assert warm is not None
-    for body, other, rows in zip(elastic, warm, expansions(system, in_middle=True), strict=True):
+    for body, other, rows in zip(elastic, warm, expansions(system.elastic, in_middle=True), strict=True):
         x = other.space.tabulate_dof_coordinates()[: other.owned]
         fields = np.column_stack([np.ones(len(x)), x[:, 0] ** 2, np.sin(x[:, 1])])
         moved = partial(free_expansion, body, other)
@@ -97,4 +97,4 @@ def test_a_basis_that_cannot_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     (told,) = (text for text in Seen.of_system(system).warnings("heat") if "whole mesh" in text)
     assert told.startswith("heat.reduction_tolerance: ")
     assert "heat.reduction_difference = 0.002" in told
-    assert f"{100 * fineness.difference:.2g} %" in fineness_text(system)
+    assert f"{100 * fineness.difference:.2g} %" in fineness_text(system.exchange)

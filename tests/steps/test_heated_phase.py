@@ -220,7 +220,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
     return RunState(
-        0, WornDepths(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic), none_yet(system)
+        0, WornDepths(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic), none_yet(system.pair)
     ), state
 
 
@@ -288,7 +288,7 @@ def test_tangent_of_a_half_cycle(assembled: Assemble, name: str) -> None:
     def end(temperature: Array, worn: Array) -> tuple[Array, Array, Array]:
         start = heat.exchange.at(before.values + temperature)
         moment = RunState(
-            0, WornDepths(state.shape + worn, 0 * system.pair.strip.weights), contacts, start, none_yet(system)
+            0, WornDepths(state.shape + worn, 0 * system.pair.strip.weights), contacts, start, none_yet(system.pair)
         )
         block = run(system, 1, implicit=True, start=moment)
         return block.end.temperature.values, block.end.worn.punch, block.pressure[0]
@@ -339,7 +339,9 @@ def test_growth_with_friction_by_temperature(assembled: Assemble) -> None:
     for sign in (1, -1):
         temperature = heat.exchange.at(states[0].values + sign * mode[:dim])
         worn = WornDepths(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
-        ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature, none_yet(system))))
+        ends.append(
+            run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature, none_yet(system.pair)))
+        )
     apart = np.linalg.norm(ends[0].pressure - ends[1].pressure, axis=1)[1::2]
     rate = growth_rate(system, pressure)
     assert rate == pytest.approx(np.log(values[largest].real) / system.motion.period, rel=1e-12)

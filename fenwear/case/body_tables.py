@@ -1,4 +1,8 @@
-"""The tables of the two bodies: geometry, model, supports, loads, held temperatures, profiles and rough surfaces."""
+"""The tables of the two bodies, in this order.
+
+What both share: `Geometry`, the contact `Grid`, `Model`. The parts of a body: `Support`, `Load` with its course over a
+cycle, `Prescribed` temperatures, `Profile` and `Topography` of its surface. The `Body` itself comes last.
+"""
 
 from __future__ import annotations
 
@@ -27,12 +31,6 @@ from fenwear.case.table_parts import (
 )
 from fenwear.common.arrays import Array
 from fenwear.common.units import convert, shown
-
-NOTHING = 1e-9  # of a load: what is called a factor still
-AUTO = (
-    "auto"  # operator of a body whose contact decides: on a grid of its own "fine" where that may be, else "condensed"
-)
-CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
 
 
 def _parameter(value: object) -> float:
@@ -168,6 +166,9 @@ class Support(Part):
     def moves(self) -> bool:
         """Whether it prescribes a displacement."""
         return any(self.by or ())
+
+
+NOTHING = 1e-9  # of a load: what is called a factor still
 
 
 class Load(Part):
@@ -374,6 +375,10 @@ class Topography(Part):
             "shortest: expected less than longest",
         ),
     )
+
+
+AUTO = "auto"  # operator that the contact decides: "fine" on a grid of its own where that may be, else "condensed"
+CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
 
 
 class Body(Part):

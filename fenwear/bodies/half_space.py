@@ -69,7 +69,7 @@ class HalfSpace(GridOperator):
 
     @property
     def dim(self) -> int:
-        """D."""
+        """Number of the model's axes."""
         return len(self.axes)
 
     @cached_property
@@ -124,7 +124,7 @@ def _influences(
         influences, (-2, -1), (0, 1)
     )
     displacements /= np.prod(spacing)
-    for axis, count in enumerate(shape):  # the other way along an axis what that axis has one share in changes its sign
+    for axis, count in enumerate(shape):  # mirrored along an axis, components with one share in it change their sign
         turned = np.ones(d)
         turned[axis] = -1.0
         behind, ahead = ([*every, *every[: len(shape)]] for _ in range(2))

@@ -75,7 +75,7 @@ class Held:
 
     @property
     def key(self) -> str:
-        """That of the step."""
+        """The key of the step in a case."""
         return f"program.steps.{self.step}"
 
 

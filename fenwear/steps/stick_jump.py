@@ -3,7 +3,7 @@
 A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
 bodies, so that dy/dn = F(y) over the number n of cycles. Where the strip passes it takes many cycles to forget: there
 the contact runs in at y over as many cycles as the jump has, or until one ends as it begins.
-With M(y) the wear of a cycle whose nodes slip as in the last one (`stick_frozen`), and R = F - M what cycles do beside
+With M(y) the wear of a cycle whose nodes slip as in the last one (`Frozen`), and R = F - M what cycles do beside
 it, a jump is that of `fenwear.steps.jump_method`, as in gross sliding, where nothing is beside M.
 
 R is known from the cycle at the begin and one halfway, to which a first step with R as it is at the begin leads. A

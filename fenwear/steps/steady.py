@@ -262,7 +262,7 @@ def _check_sinks(system: Tribosystem) -> None:
 
 def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays, or no one rigid motion can follow it."""
-    if system.sliding.track_deepens:
+    if system.sliding.strip_wears and system.sliding.to_and_fro:
         raise ConvergenceError(
             "no cyclic steady state exists: the strip wears, and under a punch that moves to and fro its track deepens "
             "without end. Follow the wear by `run` with run.integration = "

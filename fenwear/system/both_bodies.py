@@ -221,7 +221,8 @@ def build_bodies(
     """
     check_operators(case)
     release(comm)  # what earlier systems have left
-    known, owners = case.diffusion, _owners(case, comm)
+    known = case.diffusion
+    owners = (1 % comm.size, 0) if case.setup.reproducible else None  # sums within a body are then those of one rank
     given = case.given.meshes
     meshes = (
         (given["punch"], given["strip"])
@@ -250,14 +251,6 @@ def with_surfaces(case: Case, bodies: Bodies) -> Bodies:
         for shares, description in zip(regions, (case.punch, case.strip), strict=True)
     )
     return replace(bodies, regions=regions, densities=(of_punch, of_strip))
-
-
-def _owners(case: Case, comm: MPI.Comm) -> tuple[int, int] | None:
-    """Return the ranks that have the whole punch and the whole strip; None where all share both.
-
-    Sums within a body are then those of one rank.
-    """
-    return (1 % comm.size, 0) if case.setup.reproducible else None
 
 
 def build_conduction(

@@ -9,7 +9,6 @@ those of `ContactLaw`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -28,12 +27,7 @@ LAWS: dict[str, Any] = {GROSS: "fenwear.steps.gross_sliding", "coulomb": "fenwea
 def law_named(name: str) -> ContactLaw:
     """Return a law of contact by its name in cases; `auto` gives gross sliding."""
     law = LAWS[GROSS if name == AUTO else name]
-    return _law_of(law) if isinstance(law, str) else law
-
-
-@cache
-def _law_of(module: str) -> Any:
-    return import_module(module).LAW
+    return import_module(law).LAW if isinstance(law, str) else law
 
 
 def register_contact_law(name: str, law: Any) -> None:

@@ -99,11 +99,6 @@ class Sliding:
         """Whether the strip has a wear law."""
         return self.wear[1].wears
 
-    @property
-    def track_deepens(self) -> bool:
-        """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
-        return self.strip_wears and self.to_and_fro
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedSliding(Sliding):

@@ -293,7 +293,7 @@ class CutPlace(NamedTuple):
 def cut_places(history: xarray.Dataset) -> list[CutPlace]:
     """Return where contacts are cut: each that has a name, or of parts that lie behind each other each."""
     punch = surface_of(history)
-    strip = surface_of(history, "strip") if "x_strip" in history else None
+    opposite = {"strip": surface_of(history, "strip")} if "x_strip" in history else {}
     if len(punch.contact):
         owns = {name: punch.contact == name for name in history.contact.attrs["flag_meanings"].split()}
     elif punch.overlaps:
@@ -302,11 +302,8 @@ def cut_places(history: xarray.Dataset) -> list[CutPlace]:
         owns = {"": np.ones(len(punch.x), dtype=bool)}
     cuts = []
     for name, contact_nodes in owns.items():
-        nodes = (
-            {"punch": contact_nodes}
-            if strip is None
-            else {"punch": contact_nodes, "strip": _opposite(strip, name, punch.x[contact_nodes])}
-        )
+        there = {body: _opposite(surface, name, punch.x[contact_nodes]) for body, surface in opposite.items()}
+        nodes = {"punch": contact_nodes, **there}
         cuts.append(CutPlace(name, centre_of_wear(history, nodes), nodes))
     return cuts
 
@@ -319,7 +316,10 @@ def _opposite(strip: Surface, name: str, x: Array) -> Mask:
     return np.asarray(strip.part == strip.part[np.linalg.norm(strip.x - middle, axis=1).argmin()])
 
 
-def centre_of_wear(history: xarray.Dataset, nodes: Mapping[str, Mask] | None = None) -> Array:
+ALL: Mapping[str, Mask | slice] = {body: slice(None) for body in BODIES}  # nodes
+
+
+def centre_of_wear(history: xarray.Dataset, nodes: Mapping[str, Mask | slice] = ALL) -> Array:
     """Return the places along and across the sliding of the centre of what is worn off at the end (2,), mm.
 
     Of the punch, or of the strip where it alone wears; of the contact where nothing is worn yet.
@@ -329,17 +329,16 @@ def centre_of_wear(history: xarray.Dataset, nodes: Mapping[str, Mask] | None = N
         nodes: That count of each body (n,); by default all.
     """
     last = history.isel(half_cycle=-1)
-    chosen: dict[str, Any] = {body: slice(None) for body in BODIES} if nodes is None else dict(nodes)
 
     def centre(weights: Array, body: str) -> Array:
         end = BODIES[body]
-        ways = [last[f"{name}{end}"].values[chosen[body]] for name in ("along", "across")]
-        return np.array([np.average(way, weights=weights[chosen[body]]) for way in ways])
+        ways = [last[f"{name}{end}"].values[nodes[body]] for name in ("along", "across")]
+        return np.array([np.average(way, weights=weights[nodes[body]]) for way in ways])
 
     for body, end in BODIES.items():
         if f"wear{end}" in last:
             volume = (last[f"wear{end}"] * last[f"weight{end}"]).values
-            if volume[chosen[body]].sum() > 0:
+            if volume[nodes[body]].sum() > 0:
                 return centre(volume, body)
     return centre(last.weight.values, "punch")
 
@@ -369,11 +368,11 @@ def gaps_of(history: xarray.Dataset) -> Array:
     return np.unique(np.concatenate(last_place), axis=0)
 
 
-def sides_of(history: xarray.Dataset) -> tuple[str, str] | None:
-    """Return the names of two contacts at the same places, such as the sides of a groove; None of others."""
+def sides_of(history: xarray.Dataset) -> list[str]:
+    """Return the names of two contacts at the same places, such as the sides of a groove; none of others."""
     gaps = gaps_of(history)
     names = history["contact"].attrs.get("flag_meanings", "").split() if "contact" in history else []
-    return (names[0], names[1]) if len(names) == 2 and (gaps[:, 1] < gaps[:, 0]).any() else None
+    return names if len(names) == 2 and (gaps[:, 1] < gaps[:, 0]).any() else []
 
 
 def parted(x: Array, values: Array, gaps: Array) -> tuple[Array, Array]:

@@ -190,7 +190,7 @@ def caption(name: str, history: xarray.Dataset, look: Style) -> str:
         warm=" and temperatures" if "largest_temperature" in history else "",
         last=f"{int(history.half_cycle[-1]):,}",
     )
-    if name in ALONG and (sides := sides_of(history)) is not None:
+    if name in ALONG and (sides := sides_of(history)):
         sentences += f" Solid: the contact {sides[0]}; dotted: {sides[1]}."
     if name.startswith("cuts") and len(cut_places(history)) > 1:
         sentences += " Each contact through the middle of its own wear."

@@ -41,7 +41,7 @@ def test_sides_of_a_groove_are_two_lines() -> None:
     r, side = np.tile([31.0, 33.0, 38.0], 2), np.repeat([0, 1], 3)
     names = {"flag_meanings": "lower upper"}
     history = xarray.Dataset({"contact": ("node", side, names), "wear": ("node", side)}, {"r": ("node", r)})
-    assert sides_of(history) == ("lower", "upper")
+    assert sides_of(history) == ["lower", "upper"]
     figure = Figure()
     ax = figure.subplots()
     ax.plot(r, side + 1.0)

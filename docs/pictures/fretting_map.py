@@ -1,4 +1,7 @@
-"""Draws docs/static/case-fretting-map.png, the regime over amplitude and load: python3 docs/pictures/fretting_map.py."""
+"""Draws docs/static/case-fretting-map.png, the regime over amplitude and load.
+
+python3 docs/pictures/fretting_map.py
+"""
 
 from __future__ import annotations
 

@@ -376,7 +376,7 @@ class Worn(Phases):
         (1 + sum of D_k A_k^-1) y = sum of D_k A_k^-1 b_k
 
     with the phases' factors, which do not change with the length of a step: by GMRES from the factor of another step.
-    It is made anew where it does not lead there in few iterations.
+    Another factor is made where it does not lead there in few iterations.
     """
 
     def __init__(self, blocks: Blocks, wear: Array) -> None:
@@ -425,7 +425,7 @@ class Worn(Phases):
         matrix = np.zeros((self.blocks.nodes, self.blocks.nodes))
         for k, (nodes, factor) in enumerate(zip(cut.nodes, cut.solves, strict=True)):
             low, high = cut.cuts[k]
-            by_depth = factor(np.eye(high - low, len(nodes)))
+            by_depth = factor(np.eye(int(high - low), len(nodes)))
             matrix[np.ix_(nodes, nodes)] += self.wear[k, nodes, None] * by_depth[: len(nodes)]
         return matrix
 

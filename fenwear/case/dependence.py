@@ -146,7 +146,7 @@ class State:
     Attributes:
         rate: Function of the variables in `of` and of the state itself, by their names at n nodes (n,), that returns
             the change in a second (n,), or one number.
-        of: What the rate depends on: which of T, p, v, x, y, z, depth, s, debris, edge, cs, pm and film, which other
+        of: Variables of the rate: which of T, p, v, x, y, z, depth, s, debris, edge, cs, pm and film, which other
             states, and `wear`, what both bodies lose there (mm/s), or one of them, `wear_punch` and `wear_strip`.
         initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
         unit: Unit of its values in results.

@@ -211,19 +211,20 @@ def read_vtu(path: Path) -> MeshFile:
         raise ValueError(needs) from None
     grid = pyvista.UnstructuredGrid(path)
     ends, kinds, nodes = grid.offset[1:], grid.celltypes, np.asarray(grid.cell_connectivity, dtype=np.int64)
-    blocks, kept, notes = [], [np.zeros(0, dtype=np.int64)], []
+    blocks, notes = [], []
+    kept: list[Ints] = [np.zeros(0, dtype=np.int64)]
     for kind in np.unique(kinds).tolist():
-        own = np.flatnonzero(kinds == kind)
+        cells_of_kind = np.flatnonzero(kinds == kind)
         if kind not in VTK_KINDS:
-            notes.append(f"{len(own):,} cells of VTK's type {kind} are left out")
+            notes.append(f"{len(cells_of_kind):,} cells of VTK's type {kind} are left out")
             continue
         number = VTK_KINDS[kind]
         count = KINDS[number].nodes
         table = known_nodes(
-            nodes[ends[own][:, None] - count + np.arange(count)], grid.n_points, f"type {kind} of cells"
+            nodes[ends[cells_of_kind][:, None] - count + np.arange(count)], grid.n_points, f"type {kind} of cells"
         )
         blocks.append(Block.of(number, table[:, ORDERS.get(number, slice(None))]))
-        kept.append(own)
+        kept.append(cells_of_kind)
     cells = np.concatenate(kept)
     sets = _sets({name: np.asarray(values)[cells] for name, values in grid.cell_data.items()})
     return MeshFile(path.name, np.asarray(grid.points, dtype=np.float64), tuple(blocks), tuple(sets), tuple(notes))

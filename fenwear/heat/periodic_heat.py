@@ -229,7 +229,7 @@ class CycleHeat:
 
     def conductances(self, pressure: Array) -> Array:
         """Return the conductance of each phase's nodes (m, n)."""
-        return np.array([self.exchange.conductance(p, phase) for phase, p in enumerate(pressure)])
+        return np.array([self.exchange.conductance(pressure[phase], phase) for phase in range(len(pressure))])
 
     def cycle(self, conductances: Array) -> Cycle:
         """Return the cycle for the conductances of its phases (m, n); the last few are kept."""

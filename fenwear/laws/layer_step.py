@@ -138,7 +138,7 @@ class LayerEvolution:
 class Filling:
     """The gap that states of laws fill in a step, linear in the pressures around those of its conditions.
 
-    What all phases change is shared among them as their wear is: a way to the solution, at which conditions have its
+    The change by all phases is shared among them as their wear is: a way to the solution, at which conditions have its
     pressures.
 
     Attributes:
@@ -208,7 +208,9 @@ class LayerStep:
 
     def _added(self, pressure: Array) -> tuple[Array | float, Array | float]:
         """Return the thickness that debris and states gain in a cycle at the contact's nodes, and on the strip, mm."""
-        passing, added, below = self.passing, 0.0, 0.0
+        passing = self.passing
+        added: Array | float = 0.0
+        below: Array | float = 0.0
         if self._fills:
             added, below = self._filling.at(pressure, self._length)
         if not passing.layers.debris.present:

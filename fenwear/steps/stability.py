@@ -505,7 +505,7 @@ def _gain(opened: Array, modes: int, solve: Solve) -> float:
 def largest_eigenvalue(apply: Solve, start: Array, size: Callable[[NDArray[Any]], NDArray[Any]]) -> float:
     """Return the eigenvalue of a product with a vector (n,) that is largest by `size`, which is np.abs or np.real.
 
-    All of few nodes are found, and of many those that Arnoldi's method does not tell apart: modes of two shoes that are
+    All of few nodes are found, and of many those that Arnoldi's method does not separate: modes of two shoes that are
     alike lie together.
     """
     operator = LinearOperator((len(start),) * 2, matvec=apply, dtype=float)

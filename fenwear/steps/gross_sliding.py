@@ -282,7 +282,8 @@ class GrossSliding:
         Loads, friction, wear, motion and the exchange of heat factor no stiffness again; another motion prepares the
         steps of heat again.
         """
-        before, bodies, condensed, sliding = system.case, system.bodies, system.elastic.condensed, system.sliding
+        before, bodies, condensed = system.case, system.bodies, system.elastic.condensed
+        sliding: Sliding = system.sliding
         if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
             sliding = _sliding_as(system, case)
         if before.loading != case.loading:

@@ -32,6 +32,7 @@ from fenwear.surfaces.sliding_field import SlidingField
 RINGS = 2000  # at most
 FINER = 2  # rings over the width of a node's area
 WHOLE = 0.9  # of a node's area, beyond which it counts as swept
+LEAST_SWEPT = 1e-9  # of a node's area: less is rounding of the place where a surface ends
 THIN = 1e-12  # of a surface's width across the track
 SAME = 1e-6  # of a surface's extent: heights that are one
 LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s is the radius
@@ -87,7 +88,7 @@ class Border:
 
     @classmethod
     def _of(cls, share: Array, strip: ContactSurface) -> Border:
-        inward, swept, part = np.arange(len(share)), share > THIN, strip.part
+        inward, swept, part = np.arange(len(share)), share > LEAST_SWEPT, strip.part
         for k in range(part.max() + 1):
             inside, beyond = (np.flatnonzero((part == k) & mask) for mask in (swept, ~swept))
             if len(inside) and len(beyond):

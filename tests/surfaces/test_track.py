@@ -168,3 +168,12 @@ def test_part_of_a_triangle() -> None:
     s = np.sort(np.array([[0.0, 1.0, 2.0]] * 5), axis=1)
     found = _part_below(s, np.array([-1.0, 0.5, 1.0, 1.5, 3.0]))
     np.testing.assert_allclose(found, [0, 0.125, 0.5, 0.875, 1], atol=1e-14)
+
+
+def test_rounding_sweeps_no_area(assembled: Callable[..., Tribosystem]) -> None:
+    """The ball's rim ends where two nodes' areas meet, at either end of the stroke: both ends are swept alike."""
+    sizes = "radius=5, contact_width=0.4, stroke=0.1, core=0.166, core_elements=4, across=6"
+    whole = ("geometry.degree=1", "geometry.order=1", f"geometry.parameters={{{sizes}}}", "motion.amplitude='0.1 mm'")
+    strip = assembled("ball-on-flat", *whole, "motion.positions=3").pair.strip
+    ends = [strip.weights[np.abs(strip.x - (x, 0, 0)).sum(axis=1).argmin()] for x in (-0.3, 0.3)]
+    assert ends[1] == pytest.approx(ends[0], rel=1e-6)

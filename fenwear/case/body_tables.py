@@ -1,6 +1,6 @@
 """The tables of the two bodies, in this order.
 
-What both share: `Geometry`, the contact `Grid`, `Model`. The parts of a body: `Support`, `Load` with its course over a
+Both share `Geometry`, the contact `Grid` and `Model`. The parts of a body: `Support`, `Load` with its course over a
 cycle, `Prescribed` temperatures, `Profile` and `Topography` of its surface. The `Body` itself comes last.
 """
 

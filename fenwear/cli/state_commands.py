@@ -372,7 +372,7 @@ def _optimum_text(system: ContactSetup, optima: dict[str, Optimum], of_step: str
         names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
         at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
         rows.append((f"pressure at {at} mm (MPa)", [float(optimum.pressure[end]) for optimum in states]))
-        angles = [round(math.degrees(optimum.tilt[end]), DIGITS_OF_ANGLE) for optimum in states]
+        angles = [round(math.degrees(optimum.tilt[end]), DIGITS_OF_ANGLE) + 0.0 for optimum in states]
         rows.append((f"angle chi at {at} mm (degrees)", angles))
     return "\n".join([*([f"of {of_step}"] if of_step else []), columns_text(list(optima), rows)])
 

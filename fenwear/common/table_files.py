@@ -30,7 +30,7 @@ from fenwear.common.errors import did_you_mean
 
 MISSING = ("", "nan", "na", "n/a", "-", "--", "null", "none", "#n/a", "inf", "-inf")
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
-SUGGESTED, LIKE = 8, 0.5  # names of columns in a message, and how alike they are to an unknown one
+SUGGESTED, LIKE = 8, 0.7  # names of columns in a message, and how alike they are to an unknown one
 MOST_HEAD = 200  # lines that an instrument may write before the heading
 _HEADING = re.compile(
     r"\s*(?P<name>[^\W\d][\w \-]*?)\s*(?:[(\[]\s*(?P<unit>.*?)\s*[)\]]|\s/\s*(?P<slash>\S.*?)|/(?P<tight>[^\s()]+))?\s*"
@@ -365,9 +365,8 @@ def check_names(heads: Sequence[Head], known: Collection[str], where: str) -> No
         TableError: names the column.
     """
     for name in (head.name for head in heads if known and head.name not in known):
-        near = difflib.get_close_matches(name, known, SUGGESTED, LIKE) or list(known)[:SUGGESTED]
-        hint = did_you_mean(name, known) or "."
-        message = f"not known{where}{hint} Expected a name with its unit, such as {', '.join(near)}"
+        hint = did_you_mean(name, known, LIKE) or "."
+        message = f"not known{where}{hint} Expected a name with its unit, such as {', '.join(list(known)[:SUGGESTED])}"
         raise TableError(f"column {name!r}", message)
 
 

@@ -34,6 +34,7 @@ ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and
 PLACES = {**{axis: axis for axis in "rxyz"}, "across": "place across the sliding"}
 WEAR_RATE = "mm3/(N m)"
 UNCERTAINTY, WITHIN = "uncertainty", "... numerical uncertainty"
+ROUNDING = 1e-9  # share of a number below which its uncertainty is zero
 COLUMN = 12  # characters of a column of the printed sheet
 
 
@@ -386,7 +387,7 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
         tables = next(([table] for table in (summary.get("sliding", {}), heat, summary) if key in table), bodies)
         if any(key in table for table in tables):
             rows.append((line.label, line.unit, [shown(table.get(key), line) for table in tables]))
-            rows += _within(key, line, of_bodies if tables is bodies else [uncertain])
+            rows += _within(key, line, of_bodies if tables is bodies else [uncertain], tables)
     for name, state in summary.get("states", {}).items():
         unit = "" if state["unit"] == "1" else state["unit"]
         labels = (f"{name.replace('_', ' ')}, mean", "... smallest", "... largest")
@@ -396,15 +397,21 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
     return rows
 
 
-def _within(key: str, line: Line, uncertain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, list[float | None]]]:
+def _within(
+    key: str, line: Line, uncertain: Sequence[Mapping[str, Any]], tables: Sequence[Mapping[str, Any]]
+) -> list[tuple[str, str, list[float | None]]]:
     """Return the line below one of the sheet that says how uncertain its numbers are; none where that is not known."""
     if not any(key in table for table in uncertain):
         return []
-    return [(WITHIN, line.unit, [_two_digits(shown(table.get(key), line)) for table in uncertain])]
+    pairs = zip(uncertain, tables, strict=True)
+    return [(WITHIN, line.unit, [_two_digits(shown(by.get(key), line), shown(of.get(key), line)) for by, of in pairs])]
 
 
-def _two_digits(value: float | None) -> float | None:
-    return value if value is None or not np.isfinite(value) else float(f"{value:.1e}")
+def _two_digits(value: float | None, of: float | None) -> float | None:
+    """Return an uncertainty in two digits, zero where it is rounding of the number that it is of."""
+    if value is None or not np.isfinite(value):
+        return value
+    return 0.0 if value < ROUNDING * abs(of or 0.0) else float(f"{value:.1e}")
 
 
 def shown(value: Any, line: Line) -> Any:
@@ -422,7 +429,7 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     for key, line in OF_CONTACT.items():
         if any(key in summary[way] for way in ways):
             contact.append((line.label, line.unit, [shown(summary[way].get(key), line) for way in ways]))
-            contact += _within(key, line, uncertain)
+            contact += _within(key, line, uncertain, [summary[way] for way in ways])
     first = next((k for k, (label, _, _) in enumerate(rows) if label.startswith("worn ")), len(rows))
     tables = [
         (heads, [(names.with_names(Line(label, unit).heading), values) for label, unit, values in table])

@@ -147,7 +147,11 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     sliding = replace(system.sliding, motion=system.motion.in_parts(parts))
     placed = place(system.bodies, sliding, system.case)
     cut = joined(placed, system.elastic.condensed)
-    return with_exchange(cut, reduced=system.exchange.reduced) if system.exchange.conducts else cut
+    if not system.exchange.conducts:
+        return cut
+    # Of a stage of a program, whose surroundings are not those of the case.
+    case = system.case.model_copy(update={"heat": system.exchange.heat})
+    return replace(with_exchange(replace(cut, case=case), reduced=system.exchange.reduced), case=system.case)
 
 
 def set_up_by(case: Case) -> tuple[object, ...]:

@@ -11,6 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import ConvergenceError, Tribosystem, jump
+from fenwear.case.program import stages_of
 from fenwear.common.errors import FULL_START, INTERIOR, MARCHED, SHORTER_JUMPS, SMALLER_STEPS, SOFTER_START
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import Inequality
@@ -18,12 +19,24 @@ from fenwear.steps import Block
 from fenwear.steps.driver import RunLimits
 from fenwear.steps.evolve import march_within
 from fenwear.steps.phase import PhaseEnd, PhaseStep
+from fenwear.steps.program_stages import at_stage
+from fenwear.system import in_parts
 
 Assemble = Callable[..., Tribosystem]
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 # So much heat in a half-cycle that contact and heat taken together have no solution.
 HOT = (*COARSE, "motion.amplitude=20", "heat.convecting_faces=true", "heat.debris=0")
 MEAN = 1e4 / 600
+
+
+def test_parts_of_a_later_stage(assembled: Assemble) -> None:
+    """Phases cut into parts keep the clock and the surroundings of their stage."""
+    steps = "program.steps=[{cycles=2}, {cycles=2, ambient='50 K'}]"
+    system = assembled("example1-heat", *COARSE, steps, "run.half_cycles=8")
+    staged = at_stage(system, stages_of(system.case)[1])
+    parts = in_parts(staged, 3)
+    assert parts.sliding.clock == staged.sliding.clock != system.sliding.clock
+    assert parts.exchange.ambient == staged.exchange.ambient == 50.0
 
 
 def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:

@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenwear.common.arrays import Array, Mask
 from fenwear.report.style import ALONG_CONTACT
-from fenwear.results.sheet import BODIES
+from fenwear.results.quantity import BODIES
 
 POINTS = 301  # along a cut
 TICKS = 2  # intervals between those of each of several parts on a map

@@ -29,7 +29,7 @@ from fenwear.report.run_figures import course_figures
 from fenwear.report.stick_figures import stick_figures, with_sums
 from fenwear.report.style import STANDARD, Style, direction_words, name_bodies, save, strip_moves, wrapped
 from fenwear.results.disk import write_text
-from fenwear.results.sheet import BODIES
+from fenwear.results.quantity import BODIES
 from fenwear.results.stored_history import by_cycles, read_history, resolves
 
 FOLDER = "figures"

@@ -30,7 +30,7 @@ from fenwear.report.style import (
     panels,
     shades,
 )
-from fenwear.results.sheet import BODIES
+from fenwear.results.quantity import BODIES
 
 LAST = 0.1  # of what is done, that a mean pressure is of
 LATE = "late_pressure"  # the variable that has it

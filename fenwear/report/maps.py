@@ -33,8 +33,8 @@ from fenwear.report.style import (
     panels_of_maps,
     row_of,
 )
+from fenwear.results.quantity import BODIES
 from fenwear.results.roughness import evaluated, levelled
-from fenwear.results.sheet import BODIES
 
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other

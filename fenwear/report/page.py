@@ -25,8 +25,9 @@ from fenwear.report.key_numbers import Number, answers, flat, names_in, read_cas
 from fenwear.report.style import STANDARD, Style
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.quantity import BODIES
 from fenwear.results.registry import known
-from fenwear.results.sheet import BODIES, UNCERTAINTY
+from fenwear.results.sheet import UNCERTAINTY
 from fenwear.results.stored_history import read_history
 
 REPORT = "report.html"

@@ -28,7 +28,7 @@ from fenwear.report.style import (
     run_style,
     strip_moves,
 )
-from fenwear.results.sheet import BODIES
+from fenwear.results.quantity import BODIES
 
 BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least

@@ -34,6 +34,7 @@ ANSWERS = ("worn_volume_mm3", "largest_depth_", "largest_pressure_MPa", "largest
 SHOWN_FIRST = ("worn_volume_mm3", "largest_depth_mm", "largest_pressure_MPa", "mean_pressure_MPa",
                "largest_temperature_")  # fmt: skip
 STATIONARY = 1e-3  # change in a cycle below which pressures repeat
+LEAST = 1e-3  # %: pressures that repeat better are not known better
 CERTAIN, BELOW = 1e-3, "below 0.1 %"  # of a number: uncertainties that are not given as a number
 # What is no line of the sheet, which has words for the others.
 LABELS = {
@@ -199,7 +200,8 @@ def states(summary: Mapping[str, Any]) -> list[str]:
     if change is None or math.isnan(change):
         stationary = "Stationary: not known."
     elif change < STATIONARY:
-        stationary = f"Stationary: pressures repeat in each cycle, to {readable(100 * change)} % of the pressure scale."
+        within = readable(max(100 * change, LEAST))
+        stationary = f"Stationary: pressures repeat in each cycle, to {within} % of the pressure scale."
     else:
         stationary = f"Not stationary: pressures change by {readable(100 * change)} % of the pressure scale in a cycle."
     if rate is not None and math.isfinite(rate):

@@ -309,7 +309,7 @@ class LeastSquares:
         """
         scale = float(np.abs(self._tried(np.asarray(z, dtype=float))).max()) or 1.0
         problems = [
-            InputError(f"--unknown {scaled.unknown.key}", "has no influence on the measured values")
+            InputError(f"--unknown {scaled.unknown.key}", "has no influence on the measured values. Leave it out")
             for scaled, column in zip(self.unknowns, jacobian.T, strict=True)
             if np.abs(column).max() <= NO_INFLUENCE * scale
         ]

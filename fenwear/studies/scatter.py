@@ -114,8 +114,8 @@ class Scatter:
                     problems.append(
                         InputError(
                             f"--scatter {key}",
-                            f"gives impossible values with a probability of {share:.2g}, such as {value:.4g} "
-                            f"({error.problems[0].message}); expected one of possible values, such as lognormal",
+                            f"gives impossible values with a probability of {100 * share:.2g} %, such as {value:.4g}: "
+                            f"{error.problems[0].message}. Use a distribution of possible values, such as lognormal",
                         )
                     )
                     break

@@ -117,9 +117,9 @@ class Derivative:
     method: str
 
     @property
-    def shown(self) -> float:
-        """The derivative, zero where it is rounding."""
-        return 0.0 if abs(self.elasticity) < ROUNDING else self.derivative
+    def shown(self) -> tuple[float, float]:
+        """Elasticity and derivative, zero where they are rounding."""
+        return (0.0, 0.0) if abs(self.elasticity) < ROUNDING else (self.elasticity, self.derivative)
 
     @property
     def error_of(self) -> str:
@@ -159,8 +159,9 @@ class Sensitivity:
             f"  {'key':36} {'% per %':>9} {'derivative':>13} {'error':>9}  {'-' + head:>11} {'+' + head:>11}  by"
         )
         for row in self.ranked():
+            elasticity, derivative = row.shown
             lines.append(
-                f"  {row.key:36} {row.elasticity:9.4f} {row.shown:13.5e} {row.error:9.1e}  "
+                f"  {row.key:36} {elasticity:9.4f} {derivative:13.6g} {row.error:9.1e}  "
                 f"{row.low:11.5g} {row.high:11.5g}  {row.method}"
             )
         if any(row.method != "window" for row in self.derivatives):

@@ -18,7 +18,7 @@ import numpy as np
 from fenwear.common.arrays import Array
 from fenwear.heat.heat_exchange import CROSSING, TERMS
 from fenwear.results import forces_and_place, layer_results, roughness, sheet, time_steps
-from fenwear.results.quantity import RECORD, Quantity
+from fenwear.results.quantity import BODIES, RECORD, Quantity
 from fenwear.steps import Block
 from fenwear.steps.run_state import all_phases
 from fenwear.steps.steady_cycle import SteadyCycle
@@ -186,7 +186,7 @@ def quantities_of(system: Tribosystem) -> dict[str, Quantity]:
 @cache
 def _prototypes() -> dict[str, Quantity]:
     listed = [*IN_RUN, *OF_STRIP, *OF_PROGRAM, *OF_HEAT, *OF_TRACK, *sheet.SLIDING, *sheet.TURNING]
-    for body in sheet.BODIES:
+    for body in BODIES:
         listed += [*sheet.of_a_body(body), *sheet.of_a_plane_body(body)]
         listed += sheet.of_the_scar(body, sheet.PLACES, ("length", "width"))
         listed += [*layer_results.of_creeping(body), *layer_results.of_coated(body), *roughness.of_body(body)]

@@ -29,7 +29,7 @@ from fenwear.laws.wear import WornDepths
 from fenwear.results import forces_and_place, layer_results, sheet, time_steps
 from fenwear.results.forces_and_place import node_forces
 from fenwear.results.history_surfaces import ContactNet, at_places, conforming, contact_net, without_noise
-from fenwear.results.quantity import degrees_of, numbers
+from fenwear.results.quantity import BODIES, degrees_of, numbers
 from fenwear.results.registry import quantities_of
 from fenwear.steps import Block
 from fenwear.steps.run_state import SUMS, approach
@@ -76,7 +76,7 @@ LINES = {
     **{f"largest_temperature_{unit}": sheet.LINES[f"largest_temperature_{unit}"] for unit in ("K", "degC")},
     **{
         f"{body}.{key}": sheet.LINES[key]._replace(label=f"{body}: {sheet.LINES[key].label}")
-        for body in sheet.BODIES
+        for body in BODIES
         for key in (
             "worn_volume_mm3",
             "largest_depth_mm",
@@ -111,7 +111,7 @@ def within(records: R, contact: str, rate: WornDepths) -> R:
             nodes, volume = surface.nodes_of(contact), SUMS.index(f"volume_{body}")
             adds[:, volume] *= _share(surface.weights, getattr(rate, body), nodes)
             if isinstance(records, Block):
-                key = f"wear{sheet.BODIES[body]}"
+                key = f"wear{BODIES[body]}"
                 sums[:, volume] *= _share(surface.weights, depths[key], nodes)
                 changed[key] = np.where(nodes, depths[key], 0.0)
     pressure = np.where(of_contact, records.pressure, 0.0)
@@ -136,7 +136,7 @@ def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
         part = last if name not in pair.punch.names else within(last, name, rate)
         if name in pair.punch.names:
             table |= _carried(part, name)
-        for body in sheet.BODIES:
+        for body in BODIES:
             if name in getattr(pair, body).names and (worn := sheet.body_numbers(part, body, known.values())):
                 table[body] = {key: value for key, value in worn.items() if key in OF_BODIES}
     return sheets
@@ -185,7 +185,7 @@ def contact_text(summary: Mapping[str, Any]) -> str:
     """Return the sheets of a summary's named contacts as lines for people, a column each; "" where it has none."""
     contacts = summary.get(CONTACTS, {})
     columns = [
-        contact | {f"{body}.{key}": value for body in sheet.BODIES for key, value in contact.get(body, {}).items()}
+        contact | {f"{body}.{key}": value for body in BODIES for key, value in contact.get(body, {}).items()}
         for contact in contacts.values()
     ]
     names = Names(**summary.get("names", {}))
@@ -233,7 +233,7 @@ def sheet_of(last: Block) -> dict[str, Any]:
     known = list(quantities_of(last.system).values())
     sliding = {"half_cycles": int(last.half_cycle[-1]), "time_s": float(last.time[-1])}
     sliding |= numbers(last, "sliding", known)
-    bodies = {body: values for body in sheet.BODIES if (values := sheet.body_numbers(last, body, known))}
+    bodies = {body: values for body in BODIES if (values := sheet.body_numbers(last, body, known))}
     cycle = time_steps.table_cycle(last)
     if cycle is not None:
         sliding |= time_steps.sliding_numbers(last, cycle)

@@ -242,9 +242,9 @@ class Depths:
         return self._factored[0][1].factor(touched)
 
 
-def _unlike(one: Array, other: Array) -> float:
+def _unlike(wear: Array, other: Array) -> float:
     """Return the largest ratio of two wears (n,)."""
-    both = np.array([one, other])
+    both = np.array([wear, other])
     least, most = both.min(axis=0), both.max(axis=0)
     return float((most / np.where(least > 0, least, np.where(most > 0, TINY, 1.0))).max(initial=0.0))
 

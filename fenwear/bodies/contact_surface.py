@@ -101,9 +101,9 @@ class ContactSurface:
     @cached_property
     def number(self) -> NDArray[np.int64]:
         """Number of each trace node among the contact's nodes (N,); -1 of one that carries no pressure."""
-        found = np.full(len(self.trace), -1)
-        found[self.nodes] = np.arange(len(self.nodes))
-        return found
+        numbers = np.full(len(self.trace), -1)
+        numbers[self.nodes] = np.arange(len(self.nodes))
+        return numbers
 
     @cached_property
     def rounds(self) -> tuple[list[Round], NDArray[np.int64]]:

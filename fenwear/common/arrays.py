@@ -26,8 +26,8 @@ class Added:
         return type(self)(*(factor * part for part in vars(self).values()))
 
 
-def _added(one: Array, other: Array) -> Array:
+def _added(first: Array, other: Array) -> Array:
     """Return the sum of two parts; an empty one adds nothing."""
     if not len(other):
-        return one
-    return one + other if len(one) else other
+        return first
+    return first + other if len(first) else other

@@ -373,13 +373,13 @@ class _Deck:
 
     def nodes_now(self, line: int, name: str) -> Ints:
         """Return the numbers of a node set that is complete, in their order."""
-        found = self.scope.nsets.get(_key(name))
-        if found is None:
+        node_set = self.scope.nsets.get(_key(name))
+        if node_set is None:
             raise self.fail(line, f"the node set {name!r} is not defined before this line; known are "
                             f"{listed(s.name for s in self.scope.nsets.values())}")  # fmt: skip
-        if not found.entries or any(entry.names for entry in found.entries):
+        if not node_set.entries or any(entry.names for entry in node_set.entries):
             raise self.fail(line, f"the node set {name!r} is one of sets, which is not supported here")
-        return np.concatenate([entry.labels for entry in found.entries])
+        return np.concatenate([entry.labels for entry in node_set.entries])
 
     def set_system(self, line: int, given: dict[str, str], data: list[tuple[int, str]]) -> None:
         """Take the local coordinate system of the nodes that follow."""
@@ -502,9 +502,9 @@ class _Deck:
 
     def one_element(self, line: int, label: int) -> tuple[_Elements, int]:
         for block in self.scope.elements:
-            found = np.flatnonzero(block.labels == label)
-            if len(found) and block.kind:
-                return block, int(found[0])
+            matches = np.flatnonzero(block.labels == label)
+            if len(matches) and block.kind:
+                return block, int(matches[0])
         raise self.fail(line, f"element {label} is not defined before this line")
 
     # ------------------------------------------------------------------------------------------------- sets

@@ -124,8 +124,8 @@ class SharedClosure:
 
     def at(self, phases: int | Sequence[int]) -> SharedClosure:
         """Return the closure in phases of the motion."""
-        own = {name: value[phases] if value.ndim > 1 else value for name, value in self.variables.items()}
-        return replace(self, variables=own)
+        variables = {name: value[phases] if value.ndim > 1 else value for name, value in self.variables.items()}
+        return replace(self, variables=variables)
 
     def carried(self, pressure: Array) -> Array:
         """Return the pressure of the asperities (...), MPa."""

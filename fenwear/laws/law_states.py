@@ -84,7 +84,7 @@ class Memory:
     @cached_property
     def fills(self) -> tuple[Array, Array]:
         """Gap that a unit of each state of the contact fills (q,), and of the strip (q_s,), mm."""
-        contact, strip = (np.array([state.fills for state in own.values()]) for own in (self.contact, self.strip))
+        contact, strip = (np.array([state.fills for state in states.values()]) for states in (self.contact, self.strip))
         return contact, strip
 
     @cached_property
@@ -119,7 +119,7 @@ class Memory:
     @cached_property
     def of_wear(self) -> bool:
         """Whether a rate depends on the wear."""
-        return any(one in state.of for state in self.states for one in WEAR)
+        return any(variable in state.of for state in self.states for variable in WEAR)
 
     @cached_property
     def filling(self) -> bool:

@@ -159,7 +159,7 @@ class Filling:
     def at(self, pressure: Array, length: float) -> tuple[Array, Array]:
         """Return the gap that is filled in a cycle at pressures (m, n), in a step of a length."""
         change = self.share * (pressure - self.near) / length
-        put = sum(place @ own for place, own in zip(self.onto, change, strict=True))
+        put = sum(place @ change_there for place, change_there in zip(self.onto, change, strict=True))
         return self.filled[0] + self.here * change.sum(axis=0), self.filled[1] + self.below * put
 
 
@@ -201,10 +201,10 @@ class LayerStep:
         if not self.implicit:
             return closed
         added, below = self._added(pressure)
-        found = self._worn.opening(pressure) - added
+        opened = self._worn.opening(pressure) - added
         if self._fills_below:
-            found = found - np.array([pair.wear_interpolation @ below for pair in passing.wear.pairs])
-        return self._length * found + closed
+            opened = opened - np.array([pair.wear_interpolation @ below for pair in passing.wear.pairs])
+        return self._length * opened + closed
 
     def _added(self, pressure: Array) -> tuple[Array | float, Array | float]:
         """Return the thickness that debris and states gain in a cycle at the contact's nodes, and on the strip, mm."""
@@ -266,12 +266,12 @@ class LayerStep:
 
     def _puts(self, pressure: Array) -> list[tuple[Array, Array]]:
         """Return what unit pressures put on the strip: factors there (m, n_s) and at the contact's nodes (m, n)."""
-        found = []
+        factors = []
         if self.passing.layers.strip_carries:
-            found.append((self.passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)))
+            factors.append((self.passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)))
         if self._fills:
-            found.append((np.tile(self._filling.below, (len(pressure), 1)), self._filling.share))
-        return found
+            factors.append((np.tile(self._filling.below, (len(pressure), 1)), self._filling.share))
+        return factors
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return the openings by unit pressures at the punch's nodes, and the strip's wear (m, n), mm/MPa."""
@@ -281,7 +281,7 @@ class LayerStep:
         if self.passing.layers.softens:
             felt = [share.mean(axis=0) for share in self._felt(pressure)]
         both = zip(self._worn.by_body(pressure), felt, strict=True)
-        punch, strip = (None if own is None else self._length * own * share for own, share in both)
+        punch, strip = (None if compliance is None else self._length * compliance * share for compliance, share in both)
         if not self._fills_here and not self._fills_below:
             return punch, strip
         if self._fills_below:
@@ -341,26 +341,26 @@ class LayerStep:
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures at the contact's nodes (m, n), mm/MPa."""
-        found = np.zeros_like(pressure)
+        covered = np.zeros_like(pressure)
         if self.passing.layers.lies_here:
-            found = self.passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
-        return found + self._filling.here * self._filling.share if self._fills else found
+            covered = self.passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
+        return covered + self._filling.here * self._filling.share if self._fills else covered
 
     @cached_property
     def _filling(self) -> Filling:
         """The gap that states fill at the pressures that the conditions of the phases have, and nearby."""
         passing, evolution = self.passing, self.passing.evolution
         assert evolution is not None
-        near = np.array([one.pressure for one in evolution.conditions])
+        near = np.array([condition.pressure for condition in evolution.conditions])
         size = NUDGE * max(float(np.abs(near).max()), LEAST)
-        less, more = (passing.filled(own, self.before, self.cycles) for own in (near, near + size))
+        smaller, larger = (passing.filled(pressures, self.before, self.cycles) for pressures in (near, near + size))
         wearing = np.maximum(self._worn.taken_slope(near), LEAST)
         share = wearing / wearing.sum(axis=0)
         onto = [pair.wear_projection for pair in passing.wear.pairs]
-        below = sum(place @ own for place, own in zip(onto, share, strict=True))
-        by_here, by_below = ((after - begin) / size for begin, after in zip(less, more, strict=True))
+        below = sum(place @ share_there for place, share_there in zip(onto, share, strict=True))
+        by_here, by_below = ((after - begin) / size for begin, after in zip(smaller, larger, strict=True))
         length = self._length
-        return Filling(near, less, share, onto, length * by_here, length * by_below / np.maximum(below, LEAST))
+        return Filling(near, smaller, share, onto, length * by_here, length * by_below / np.maximum(below, LEAST))
 
     @property
     def _fills(self) -> bool:

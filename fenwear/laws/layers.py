@@ -130,7 +130,7 @@ class Layers:
         closure = self.closure
         if not conditions or not isinstance(closure, SharedClosure) or "T" not in closure.variables:
             return self
-        warmth = np.array([one.of("friction")["T"] for one in conditions])
+        warmth = np.array([condition.of("friction")["T"] for condition in conditions])
         return replace(self, closure=replace(closure, variables={**closure.variables, "T": warmth}))
 
     @property

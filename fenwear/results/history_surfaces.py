@@ -120,7 +120,7 @@ def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
     chart = sliding_chart(placed.sliding.field, placed.pair)
     columns = [_columns(chart, surface, end) for end, surface in recorded_surfaces(placed).items()]
-    return {name: column for own in columns for name, column in own.items()}
+    return {name: column for of_surface in columns for name, column in of_surface.items()}
 
 
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:

@@ -82,7 +82,7 @@ class Sliding:
         self, middle: ContactPair, pairs: Sequence[ContactPair], passage: Passage | None = None, *, passes: bool = True
     ) -> PlacedSliding:
         """Return the sliding of surfaces opposite each other, see `PlacedSliding`."""
-        given = {one.name: getattr(self, one.name) for one in fields(Sliding)}
+        given = {field.name: getattr(self, field.name) for field in fields(Sliding)}
         return PlacedSliding(**given, middle=middle, pairs=tuple(pairs), passage=passage, passes=passes)
 
     def time(self, half_cycle: NDArray[np.int64]) -> Array:

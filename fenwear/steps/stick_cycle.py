@@ -400,7 +400,7 @@ class PartialSlipProblem:
         laws = self.laws
         evolution, conditions = self.evolution(records, begin), list[ContactConditions]()
         if evolution is not None:
-            conditions = evolution.through(self.interface.layers.held(begin.worn))[0]
+            conditions = evolution.through(begin.held or self.interface.layers.held(begin.worn))[0]
         elif laws is not None:
             conditions = self.of_steps(records, begin)
         chosen = range(len(records))[which]

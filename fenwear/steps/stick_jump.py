@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 from fenwear.common.arrays import Array
 from fenwear.common.errors import ConvergenceError
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
+from fenwear.laws.law_states import Held
 from fenwear.laws.layer_step import LayerStep
 from fenwear.laws.wear import WornDepths
 from fenwear.steps.jump_method import FINE, HALVES, Attempt, Estimate, JumpLaw, Lengths, Moment, Sizes, attempt
@@ -277,11 +278,18 @@ def first_cycle(
 def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, cycles: int) -> PartialSlipState:
     """Return the state at a shape from which the last of so many cycles there begins.
 
-    Slip and distance are those of a cycle whose middle is `at`. Where the strip passes, the contact runs in from cycle
-    to cycle until they close. Elsewhere it forgets within one, or half a one where nothing else changes in a cycle.
+    Slip, distance and states of laws are those of a cycle whose middle is `at`. Where the strip passes, the contact
+    runs in from cycle to cycle until they close. Elsewhere it forgets within one, or half a one where nothing else
+    changes in a cycle.
     """
     program, interface, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
-    at = problem.shaped(at, interface.layers.flown_as(worn, at.worn))
+    layers, memory = interface.layers, interface.layers.memory
+    at = problem.shaped(at, layers.flown_as(worn, at.worn))
+    middle = layers.held(at.worn)
+
+    def begun(before: PartialSlipState, after: PartialSlipState) -> Held:
+        return memory.bounded(middle - ((after.held or middle) - (before.held or middle)).times(0.5))
+
     if interface.moves:
         for _ in range(min(cycles - 1, MOST_RUN_IN)):
             before = at
@@ -290,14 +298,14 @@ def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths,
             last = at.contact.traction
             if np.abs(last - before.contact.traction).sum() <= CLOSED * np.abs(last).sum():
                 break
-        return replace(at, slid=slid - half)
+        return replace(at, slid=slid - half, held=begun(before, at))
     # What goes to and fro in a cycle is its own; what laws know of a whole one is of the shape before.
-    constant = not interface.layers.memory.names and not interface.creep.creeps and not problem.asks_cycle
+    constant = not memory.names and not interface.creep.creeps and not problem.asks_cycle
     if program.half_cycles == 2 and constant and problem.heat is None:
         at, _ = problem.half_cycle(at)
         return replace(at, slid=2 * slid - at.slid)
-    at, _ = problem.cycle(at)
-    return replace(at, slid=slid - (at.slid - slid) / 2)
+    after, _ = problem.cycle(at)
+    return replace(after, slid=slid - (after.slid - slid) / 2, held=begun(at, after))
 
 
 def _cycle_after(
@@ -345,7 +353,7 @@ def _recorded(
 ) -> FrettingCycle:
     """Return the cycle at a shape from a state; its nodes have slid so far (n,), mm, in its middle."""
     layers, creep = problem.interface.layers, problem.interface.creep
-    begin = problem.shaped(at, layers.flown_as(worn, at.worn))
+    begin = replace(problem.shaped(at, layers.flown_as(worn, at.worn)), held=at.held)
     first, warm = begin.next_step, begin.temperature
     at, parts = problem.cycle(begin)
     records = TimeStepRecords.joined(parts)

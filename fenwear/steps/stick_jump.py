@@ -285,7 +285,7 @@ def _led_to(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths,
     program, interface, slid, half = problem.program, problem.interface, at.slid, np.zeros_like(at.slid)
     layers, memory = interface.layers, interface.layers.memory
     at = problem.shaped(at, layers.flown_as(worn, at.worn))
-    middle = layers.held(at.worn)
+    middle, before = layers.held(at.worn), at
 
     def begun(before: PartialSlipState, after: PartialSlipState) -> Held:
         return memory.bounded(middle - ((after.held or middle) - (before.held or middle)).times(0.5))

@@ -40,7 +40,7 @@ def agree(feature: str, how: str, *more: str, sticks: bool = False) -> Block:
         other = last_block(feature, how, *more, sticks=sticks)
     assert (other.pressure >= 0).all()
     assert ((other.pressure > 0) == (one.pressure > 0)).all()
-    gives = one.pressure.max() * one.system.elastic_length
+    gives = one.pressure.max() * one.system.elastic.interface.elastic_length
     for what, scale in (("pressure", 0.0), ("gap", gives), ("wear", 0.0), ("wear_strip", 0.0)):
         expected, found = getattr(one, what), getattr(other, what)
         assert np.abs(found - expected).max() <= CLOSE * max(scale, np.abs(expected).max()), what

@@ -257,7 +257,7 @@ def test_own_law_in_python(assembled: Assemble) -> None:
         fenwear.register_law("my law", abs)
     with pytest.raises(CaseError, match="expected a function"):
         fenwear.register_law("mine", 3)
-    with pytest.raises(CaseError, match="law 'mine': .*got 'q'"):
+    with pytest.raises(CaseError, match=r"law 'mine': .*got 'q'"):
         fenwear.register_law("mine", abs, of=["p", "q"])
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Any
+from typing import Any, TypeVar
 from unittest.mock import patch
 
 from fenwear.contact import SlidingContact
-from fenwear.steps import stick_increment
+from fenwear.steps import driver, stick_increment
 from fenwear.system import Bodies, Tribosystem
 from fenwear_verify.full_space.contact import FullContact
 from fenwear_verify.full_space.step import FullStep
+
+T = TypeVar("T")
 
 __all__ = ["FullContact", "FullStep", "nothing_condensed"]
 
@@ -38,12 +40,15 @@ def nothing_condensed() -> Iterator[None]:
         both = [(system.loaded[phase].punch, system.loaded[phase].strip)]
         return FullContact([SlidingContact(interface, system.phases.ratios()[phase])], both, softer)
 
+    def on_every_rank(_system: Tribosystem, function: Callable[[], T]) -> T:
+        return function()
+
     with ExitStack() as patches:
         for owner, name, new in (
             (Tribosystem, "contact", middle),
             (Tribosystem, "phase_contact", phases_of),
             (Tribosystem, "passed_contact", passed),
-            (Tribosystem, "replicated", False),
+            (driver, "led", on_every_rank),
             (stick_increment, "_step", FullStep),
         ):
             patches.enter_context(patch.object(owner, name, new))

@@ -151,7 +151,10 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "ring-on-ring",
         ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",
          "geometry.follow_wear='never'", "output.report=false", "output.uncertainty=false",
-         "output.fields_at=[]"),
+         "output.fields_at=[]", "motion={kind='oscillation', axis=[0, 0, 1], amplitude='4e-6 rad', period='1 s'}",
+         "geometry.parameters.margin_inside=0", "geometry.parameters.margin_outside=0",
+         "materials.bronze={young='210 GPa', poisson=0.3}", "punch.supports=[{on='punch_far', fix=['x']}]",
+         "contact.friction=0.3", "wear={punch={coefficient='1e-5 1/MPa'}, strip={coefficient='1e-6 1/MPa'}}"),
     ),
     "in solids": (
         "fretting-sphere",
@@ -164,7 +167,6 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
 WAYS = ("march", "jump", "steady", "program", "resume", "ranks", "sweep", "sensitivity", "calibrate", "life")
 
 SLIDES = "what slides one way slips at every node after the first of it: gross sliding is the answer"
-AROUND = "the model of rings has no displacement around the axis, along which they slide"
 PASSES = "changes throughout a run: a cyclic steady state does not exist"
 DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
 KEEPS = "slipping nodes keep any pressure below the threshold, as the way there has left it: no end is known without it"
@@ -174,7 +176,6 @@ FLOWS = "what flows beyond the hardness depends on the way there: no end is know
 CLOSED: dict[tuple[str, str | None, str | None], str] = {
     ("heat, one way", "stick (Coulomb)", None): SLIDES,
     ("heat on a closed track", "stick (Coulomb)", None): SLIDES,
-    ("in rings", "stick (Coulomb)", None): AROUND,
     ("wear by depth and distance", "gross sliding", "steady"): PASSES,
     ("both bodies worn", "gross sliding", "steady"): DEEPENS,
     ("debris on the strip", "gross sliding", "steady"): DEEPENS,

@@ -103,7 +103,7 @@ def steadied(feature: str, law: str, _: Path) -> None:
 def programmed(feature: str, law: str, _: Path) -> None:
     """Loads are those of its steps."""
     steps = "program={steps=[{cycles=1}, {cycles=1, load_factor=0.8}]}"
-    one_way = feature in ("heat, one way", "heat on a closed track", "in rings", "a cycle as a table")
+    one_way = feature in ("heat, one way", "heat on a closed track", "a cycle as a table")
     system = assemble(case_of(feature, law, f"run.half_cycles={2 if one_way else 4}", steps))
     block = list(evolve(system, 2 * system.motion.half_cycles))[-1]
     check(block)

@@ -12,7 +12,7 @@ import ufl
 from dolfinx.mesh import CellType, create_mesh, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march, own_mesh, steady, to_dataset
+from fenwear import Tribosystem, assemble, load_case, make_case, march, own_mesh, steady, to_dataset
 from fenwear.bodies.distributed_mesh import BodyMesh
 from fenwear.results import registry
 
@@ -101,15 +101,45 @@ def test_heat_of_sliding_out_of_the_plane() -> None:
     assert heat[-1] == pytest.approx(0.2 * 200 * 100 * 0.1, rel=1e-9)  # mu F v t, mJ
 
 
-def test_rings_cannot_stick() -> None:
-    """Around their axis, where they slide, they do not give way: said with what does, and nothing of plane models."""
-    with pytest.raises(CaseError, match=r"model\.kind.*fretting-sphere") as said:
-        load_case("ring-on-ring", ["contact.law=coulomb"])
-    assert "motion.axis" not in str(said.value)
+def test_rings_stick_in_torsion() -> None:
+    """A rigid sphere on a half-space turns it: in partial slip as a solid on grids does, and as a whole.
+
+    With a Poisson's ratio near one half pressure moves nothing along r, as between like bodies.
+    `test_a_solid_sticks_in_torsion` gives 0.55486 N mm with friction 0.3, `grid.nodes=65`, 8 steps and 1e-3 rad.
+    """
+    shear, radius = 2.1e5 / 2.6, (3 * 50 * 10 / (4 * 1.1538e5)) ** (1 / 3)
+    young = 2.1e5 / 0.91 * (1 - 0.49**2)
+    turn, drop = 0.5 * shear / (young / 2.98), [[float(x), float(x**2 / 40)] for x in np.linspace(0, 0.2, 401)]
+    size = (
+        "{inner_radius=0, outer_radius=0.2, punch_height=0.2, strip_height=4, margin_inside=0, margin_outside=4, "
+        "across=30, edge_grading=1, margin_elements=14, spread=1.3, punch_layers=6, strip_layers=16, growth=1.35}"
+    )
+    arms = (0.55486, 3 * np.pi * 0.3 * 50 * radius / 16)  # N mm
+    for amplitude, expected in zip((1e-3, 1e-2), arms, strict=True):
+        case = load_case(
+            "ring-on-ring",
+            [
+                *(f"geometry.parameters={size}", "geometry.degree=2", "contact.law=coulomb", "contact.friction=0.3"),
+                "materials.bronze={young='1e9 MPa', poisson=0.3}",
+                f"materials.steel={{young='{young} MPa', poisson=0.49}}",
+                *("punch.loads=[{on='punch_far', force=['0 N', '-50 N']}]", f"punch.profile.points={drop}"),
+                *("wear.strip.coefficient=1e-9", "stick.steps=8", "stick.step_tolerance=1", "run.half_cycles=4"),
+                f"motion={{kind='oscillation', axis=[0, 0, 1], amplitude='{turn * amplitude} rad', period='1 s'}}",
+            ],
+        )
+        block = list(march(assemble(case, MPI.COMM_SELF), 4))[-1]
+        history, pair = to_dataset(block), block.system.pair
+        torque = history.tangential_force.values
+        assert np.abs(torque[-1]).max() == pytest.approx(expected, rel=3e-3)
+        by_tractions = history.traction.values @ (pair.weights * pair.punch.x[:, 0])
+        np.testing.assert_allclose(np.abs(by_tractions), np.abs(torque), atol=1e-9 * expected)
+        np.testing.assert_allclose(history.step_pressure.values @ pair.weights, 50.0, rtol=1e-9)
+        assert float(history.energy_balance_error.max()) < 1e-8
+        assert block.end.worn.strip.max() > 0
 
 
 def test_a_solid_sticks_in_torsion(assembled: Callable[..., Tribosystem]) -> None:
-    """What is offered in place of rings: two half-spaces that stick turn by T = 8/3 G a^3 (R. D. Mindlin, 1949)."""
+    """Two half-spaces that stick turn by T = 8/3 G a^3 (R. D. Mindlin, 1949)."""
     small = "{radius=10, contact_width=0.4, stroke=0, across=4, margin_elements=1, ball_layers=2, flat_layers=2}"
     system = assembled(
         *("fretting-sphere", f"geometry.parameters={small}", "geometry.degree=1", "grid.nodes=33"),

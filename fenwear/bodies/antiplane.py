@@ -8,6 +8,7 @@ is taken to be held from turning where it is loaded.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import basix.ufl
@@ -16,11 +17,15 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from fenwear.algebra.assembled import assembled
 from fenwear.algebra.factor import factored
+from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.elastic_material import measure
 from fenwear.bodies.elasticity import PREFIX, ElasticBody
+from fenwear.bodies.response import Request
+from fenwear.bodies.surface_operators import SurfaceOperator
 from fenwear.case import Kind
 from fenwear.common.arrays import Array
 
@@ -35,53 +40,104 @@ def shear_strain(u: Any, kind: Kind) -> Any:
     return ufl.as_vector((u.dx(0) - u / r, u.dx(1)))
 
 
-def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: Array) -> fem.Function:
-    """Return u_y under nodal forces along y; collective.
+class OutOfPlane:
+    """Stiffness of a body against displacements out of the plane, factored; collective.
 
     Args:
         elastic: The body.
-        blocks: Global numbers of the blocks of displacements at the loaded nodes (n,).
-        force: Per thickness (n,), N/mm; of whole rings, N.
     """
-    mesh, shear_modulus = elastic.body.mesh, elastic.law.shear_modulus
-    element = basix.ufl.element("Lagrange", mesh.basix_cell(), elastic.space.ufl_element().degree)
-    space = fem.functionspace(mesh, element)
-    # A space of one component may number its nodes in another way: go by the cells.
-    to_node = np.empty(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.int64)
-    to_node[space.dofmap.list.ravel()] = elastic.space.dofmap.list.ravel()
-    index_map = elastic.space.dofmap.index_map
-    given, held = fem.Function(elastic.space), fem.Function(elastic.space)
-    start, stop = index_map.local_range
-    local = (blocks >= start) & (blocks < stop)
-    given.x.array[2 * (blocks[local] - start)] = force[local]
-    held.x.array[2 * (_held(elastic) // 2)] = 1.0
-    held.x.scatter_forward()
 
-    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    strains = ufl.inner(shear_strain(u, elastic.law.kind), shear_strain(v, elastic.law.kind))
-    a = shear_modulus * strains * measure(mesh, elastic.law.kind) * ufl.dx
-    supports = np.flatnonzero(held.x.array[2 * to_node] > 0).astype(np.int32)
-    bc = fem.dirichletbc(PETSc.ScalarType(0), supports, space)
-    matrix = assembled(a, [bc])
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    solution = fem.Function(space, name="displacement_out_of_plane")
-    owned = space.dofmap.index_map.size_local
-    load = given.x.array[2 * to_node[:owned]]
-    load[supports[supports < owned]] = 0.0
+    def __init__(self, elastic: ElasticBody) -> None:
+        self._elastic = elastic
+        mesh, kind = elastic.body.mesh, elastic.law.kind
+        element = basix.ufl.element("Lagrange", mesh.basix_cell(), elastic.space.ufl_element().degree)
+        self.space = space = fem.functionspace(mesh, element)
+        # A space of one component may number its nodes in another way: go by the cells.
+        self._to_node = np.empty(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.int64)
+        self._to_node[space.dofmap.list.ravel()] = elastic.space.dofmap.list.ravel()
+        self._owned = space.dofmap.index_map.size_local
+        held = fem.Function(elastic.space)
+        held.x.array[2 * (_held(elastic) // 2)] = 1.0
+        held.x.scatter_forward()
+        u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+        strains = ufl.inner(shear_strain(u, kind), shear_strain(v, kind))
+        a = elastic.law.shear_modulus * strains * measure(mesh, kind) * ufl.dx
+        self._supports = np.flatnonzero(held.x.array[2 * self._to_node] > 0).astype(np.int32)
+        matrix = assembled(a, [fem.dirichletbc(PETSc.ScalarType(0), self._supports, space)])
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self._factor = factored(matrix, PREFIX, "cholesky", comm=mesh.comm, dim=elastic.dim)
+        matrix.destroy()
 
-    factor = factored(matrix, PREFIX, "cholesky", comm=mesh.comm, dim=elastic.dim)
-    solution.x.array[:owned] = factor.solve(load)
-    factor.free()
-    matrix.destroy()
-    solution.x.scatter_forward()
+    def free(self) -> None:
+        """Free the factor; collective."""
+        self._factor.free()
+
+    def displaced(self, force: Array) -> fem.Function:
+        """Return u_y under forces along y; collective.
+
+        Args:
+            force: At the trace nodes of the mesh (N,), per thickness, N/mm; of whole rings, N.
+        """
+        given = fem.Function(self._elastic.space)
+        placed = self._elastic.trace.place(np.stack([force, np.zeros_like(force)], axis=1)[:, :, None])
+        given.x.array[: len(placed)] = placed[:, 0]
+        given.x.scatter_forward()
+        load = given.x.array[2 * self._to_node[: self._owned]]
+        load[self._supports[self._supports < self._owned]] = 0.0
+        solution = fem.Function(self.space, name="displacement_out_of_plane")
+        solution.x.array[: self._owned] = self._factor.solve(load)
+        solution.x.scatter_forward()
+        return solution
+
+    def on_trace(self, solution: fem.Function) -> Array:
+        """Return u_y at the trace nodes of the mesh (N,), equal on every rank; collective."""
+        moved = fem.Function(self._elastic.space)
+        moved.x.array[2 * self._to_node] = solution.x.array
+        owned = 2 * self._elastic.space.dofmap.index_map.size_local
+        return self._elastic.trace.pick(moved.x.array[:owned, None])[:, 0, 0]
+
+
+def shear_out_of_plane(elastic: ElasticBody, force: Array) -> fem.Function:
+    """Return u_y under forces along y at the trace nodes of the mesh (N,), as `OutOfPlane.displaced`; collective."""
+    body = OutOfPlane(elastic)
+    solution = body.displaced(force)
+    body.free()
     return solution
+
+
+class TurningRings(CondensedBody):
+    """A condensed ring with displacements along r, around the axis, and along z: d = 3."""
+
+    def under(self, elastic: ElasticBody) -> TurningRings:
+        """Return the condensed body under other loads, those of `elastic`; collective."""
+        return replace(self, by_load=np.insert(super().under(elastic).by_load, 1, 0.0, axis=1))
+
+
+def turning(request: Request, rings: SurfaceOperator) -> TurningRings:
+    """Return the operator of rings that turn as well: that of their cross-section, and torsion beside it; collective.
+
+    Args:
+        request: The body and its patterns.
+        rings: Its operator along r and z.
+    """
+    body, patterns = OutOfPlane(request.elastic), csr_array(request.patterns)
+    moved = [body.on_trace(body.displaced(force)) for force in patterns.T.toarray()]
+    body.free()
+    torsion, q = np.array(moved) @ patterns, patterns.shape[1]
+    response = np.zeros((q, 3, q, 3))
+    every = slice(None)
+    response[:, ::2, :, ::2] = rings.entries(every, every).transpose(2, 3, 0, 1)
+    response[:, 1, :, 1] = (torsion + torsion.T) / 2
+    along, by_load = np.broadcast_to(np.eye(3), (q, 3, 3)), np.insert(rings.by_load, 1, 0.0, axis=1)
+    return TurningRings(request.patterns, along, response, by_load)
 
 
 def _held(elastic: ElasticBody) -> NDArray[np.int64]:
     """Return owned degrees of freedom of the nodes that are held; collective."""
-    if elastic.law.kind != "axisymmetric" or not elastic.rigid_modes:
-        return elastic.supported.astype(np.int64)
+    supported = elastic.supported.astype(np.int64)
+    if elastic.law.kind != "axisymmetric":
+        return supported
     owned = elastic.space.dofmap.index_map.size_local
     radius = elastic.space.tabulate_dof_coordinates()[:owned, 0]
     on_axis = 2 * np.flatnonzero(radius < ON_AXIS * elastic.surface.trace[:, 0].max())
-    return np.concatenate([np.flatnonzero(elastic.load), on_axis])
+    return np.concatenate([np.flatnonzero(elastic.load) if elastic.rigid_modes else supported, on_axis])

@@ -122,9 +122,8 @@ AGAINST_STICK = (
         "contact.transverse_friction: expected 0, as friction opposes the computed slip,",
     ),
     Check(
-        lambda c: c.model.kind == "axisymmetric",
-        "model.kind: rings slide around their axis, and displacements along r and z cannot follow torsion. "
-        "Expected a solid, such as fretting-sphere with motion.kind = 'oscillation', or a plane model,",
+        lambda c: c.model.kind == "axisymmetric" and c.stick.bulk_stress != 0,
+        "stick.bulk_stress: expected 0, as a stress along x does not keep rings round,",
     ),
     Check(
         lambda c: c.heat and c.heat.operator == "full",

@@ -243,13 +243,14 @@ def check_text(system: Tribosystem) -> tuple[str, list[str]]:
     thick, weights = system.case.model.thickness, problem.weights
     stuck = float(weights @ records.sticking.all(axis=0)) / float(weights @ (records.pressure > 0).any(axis=0))
     seen = Seen.of_pressure(system, records.pressure, "in the first cycle")
+    dragged, unit = ("torque", "N mm") if any(problem.interface.field.turn) else ("tangential force", "N")
     texts = [RULES[name].text(seen) for name in ("unit", "depth", "few", "shakedown", "large")]
     warnings = (*texts, *law_warnings(system), unique_text(records.unique.astype(bool)))
     text = (
         f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle\n"
         f"first cycle: {REGIMES[regime_of(records, stuck)]}, "
-        f"tangential force up to {thick * abs(records.force).max():.4g} N, of the contact "
+        f"{dragged} up to {thick * abs(records.force).max():.4g} {unit}, of the contact "
         f"{100 * stuck:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
     )
     return text, [warning for warning in warnings if warning]

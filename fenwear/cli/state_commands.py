@@ -193,8 +193,9 @@ def final_of(system: Tribosystem) -> tuple[FinalShape, dict[str, Any]]:
     pair, weights = problem.interface.middle.pair, problem.weights
     x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
     scar, seen = x[final.depth > 0], np.einsum("id,id->i", pair.normal, approach(problem.interface.middle.rigid))
-    size, worn, unit = ("stick_area", "worn_volume", "mm3") if solid else ("stick_width", "worn_area", "mm2")
-    of_size = "mm2" if solid else "mm"
+    area = problem.interface.dim == 3
+    size, worn, unit = ("stick_area", "worn_volume", "mm3") if area else ("stick_width", "worn_area", "mm2")
+    of_size = "mm2" if area else "mm"
     numbers = {
         f"{size}_{of_size}": final.size,
         f"{size}_within_{of_size}": final.within,
@@ -221,7 +222,7 @@ def final_text(numbers: dict[str, Any]) -> str:
     """Return the key numbers of a final shape as a table: each with the interval that the node spacing leaves."""
     from fenwear.results.sheet import LINES, OF_CONTACT, columns_text, shown
 
-    rows = [("scar along the sliding, from (mm)", [numbers["scar_from_mm"]]), ("... to (mm)", [numbers["scar_to_mm"]])]
+    rows = [("scar, from (mm)", [numbers["scar_from_mm"]]), ("... to (mm)", [numbers["scar_to_mm"]])]
     for key, line in (LINES | OF_CONTACT).items():
         if key in numbers and "within" not in key:
             name, _, unit = key.rpartition("_")

@@ -139,7 +139,7 @@ def _solve(elastic: ElasticBody, load: Array, rigid: Array, warm: tuple[HeatBody
     fields["displacement"] = displacement = _displacement(elastic, load, rigid, thermal)
     out_of_plane = None
     if elastic.dim == 2 and load[:, 1].any():
-        out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, elastic.on_trace(load)[:, 1])
+        out_of_plane = shear_out_of_plane(elastic, elastic.on_trace(load)[:, 1])
         fields["displacement_out_of_plane"] = out_of_plane
     components = _stress(elastic, displacement, out_of_plane, change)
     fields["stress"] = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))

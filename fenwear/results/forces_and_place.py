@@ -28,6 +28,7 @@ from fenwear.results.quantity import RECORD, InTable, Quantity
 from fenwear.steps import Block
 from fenwear.surfaces import RigidEquilibrium
 from fenwear.surfaces.equilibrium import is_translation
+from fenwear.surfaces.placement import in_model
 from fenwear.system import ContactSetup
 
 
@@ -35,7 +36,7 @@ def node_forces(block: Block) -> Array:
     """Return the forces on the punch at the contact nodes in each half-cycle of a block (k, n, d), N."""
     system = block.system
     area = system.bodies.punch.thickness * system.pair.weights
-    traction = system.pair.normal + np.array(block.friction_ratio)
+    traction = system.pair.normal + in_model(np.array(block.friction_ratio), system.pair.punch.dim)
     return np.asarray((area * block.pressure)[:, :, None] * traction)
 
 

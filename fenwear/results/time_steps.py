@@ -28,8 +28,7 @@ from fenwear.steps import Block
 from fenwear.steps.block import HeatRecord
 from fenwear.steps.run_state import all_phases
 from fenwear.steps.stick_final import beside, stick_edges, zone_width
-from fenwear.steps.stick_position import along_sliding, directions
-from fenwear.surfaces import ContactPair
+from fenwear.steps.stick_position import Position, along_sliding, directions
 from fenwear.surfaces.placement import in_space
 from fenwear.system import Tribosystem
 
@@ -101,7 +100,7 @@ def _step_quantities(system: Tribosystem) -> list[Quantity]:
     if not system.law.sticks:
         return []
     step_quantities, turns = [*IN_STEPS, *(OF_HEAT if system.exchange.conducts else ())], any(system.sliding.field.turn)
-    if system.pair.punch.dim == 3:
+    if system.law_state.problem.interface.dim == 3:
         step_quantities = [*(quantity for quantity in step_quantities if quantity.name not in IN_SOLIDS), *of_solids()]
     if turns:
         step_quantities = [
@@ -174,7 +173,7 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
     program, pair = problem.program.steps, system.pair
     turn = along_sliding(problem.interface.middle)
     traction, slip = (np.einsum("nam,knm->akn", turn, v) for v in (records.traction, records.slip))
-    stuck, within = stuck_size(pair, steps)
+    stuck, within = stuck_size(problem.interface.middle, steps)
     share = float(pair.weights @ (steps.stuck & records.touched)) / max(float(pair.weights @ records.touched), 1e-300)
     row: dict[str, Any] = {
         "step_fraction": [program[steps.first + k].fraction for k in range(len(records))],
@@ -219,13 +218,13 @@ def regime_of(records: TimeStepRecords, share: float) -> int:
     return 0 if share > 1 - ROUNDING else 1
 
 
-def stuck_size(pair: ContactPair, steps: Steps) -> tuple[float, float]:
-    """Return the width, in a solid the area, that sticks all through a cycle, and half the interval left of it.
+def stuck_size(position: Position, steps: Steps) -> tuple[float, float]:
+    """Return the width, or area in solids and rings, that sticks all through a cycle, and half the interval left of it.
 
-    In a solid it is the area of the nodes, to half of what those beside it stand for.
+    An area is that of the nodes, to half of what those beside it stand for.
     """
-    records, stuck = steps.records, steps.stuck
-    if pair.punch.dim == 3:
+    records, stuck, pair = steps.records, steps.stuck, position.pair
+    if position.frame.shape[1] == 3:
         rim = beside(pair.punch, stuck) & records.touched
         return float(pair.weights @ stuck), float(pair.weights @ rim) / 2
     return zone_width(stick_edges(pair.x, stuck, records.slip_magnitude.sum(axis=0), records.touched))
@@ -255,7 +254,7 @@ def _of_cycle(last: Block) -> dict[str, float]:
     numbers = _rows(last)
     cycle = slice(-system.motion.half_cycles, None)
     traction = np.abs(numbers["traction"][cycle])
-    if system.pair.punch.dim == 3:
+    if "traction_across" in numbers:
         traction = np.hypot(traction, numbers["traction_across"][cycle])
     stuck = traction[numbers["stick"][cycle] == 1]
     force = float(np.nanmax(np.abs(numbers["tangential_force"][cycle])))
@@ -354,7 +353,7 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
         vectors = in_space(np.einsum("nmc,nm->nc", position.frame[:, 1:], phase_slip))
         scale = np.divide(records.pressure[k], ways[k], out=np.zeros_like(ways[k]), where=ways[k] > 0)
         values.append(scale[:, None, None] * vectors[:, :, None] * vectors[:, None, :])
-        back = in_space(position.pair.placement.back(vectors if pair.punch.dim == 3 else vectors[:, [0, 2]]))
+        back = position.pair.placement.back(vectors)
         squares = scale[:, None, None] * back[:, :, None] * back[:, None, :]
         on_strip += position.pair.wear_projection @ squares.reshape(-1, 9)
     tensors = SlidingTensor(np.sum(values, axis=0)), SlidingTensor(on_strip.reshape(-1, 3, 3))

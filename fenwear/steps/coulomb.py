@@ -42,6 +42,7 @@ from fenwear.steps.stick_setup import (
 )
 from fenwear.steps.stick_state import NO_HEAT, FrettingCycle, PartialSlipState, TimeStepRecords
 from fenwear.surfaces.motion import Motion, make_motion
+from fenwear.surfaces.placement import in_model
 from fenwear.system import (
     Bodies,
     ContactLaw,
@@ -339,7 +340,7 @@ class _Run:
         position = problem.interface.position(step.offset)
         pressed = records.pressure[middle] > 0
         f = np.concatenate([records.pressure[middle], records.traction[middle].T.ravel()])
-        force = position.in_space(f) - records.pressure[middle][:, None] * position.pair.normal
+        force = position.in_space(f) - records.pressure[middle][:, None] * position.frame[:, 0]
         ratio = np.where(pressed[:, None], force, 0.0) / np.where(pressed, records.pressure[middle], 1.0)[:, None]
         loaded = problem.interface.loaded(step.fraction)
         equilibrium = replace(position.rigid, resultant=loaded.resultant)
@@ -526,5 +527,6 @@ class Meter:
         position, pressure = self.problem.interface.position(step.offset), records.pressure[k]
         f = np.concatenate([pressure, records.traction[k].T.ravel()])
         force = self.thickness * position.in_space(f * position.weights)
-        normal = self.thickness * (pressure * position.pair.weights)[:, None] * position.pair.normal
-        return float((force * approach(position.rigid)).sum()), float(np.linalg.norm((force - normal).sum(axis=0)))
+        normal = self.thickness * (pressure * position.pair.weights)[:, None] * position.frame[:, 0]
+        carried = (in_model(force, position.pair.punch.dim) * approach(position.rigid)).sum()
+        return float(carried), float(np.linalg.norm((force - normal).sum(axis=0)))

@@ -255,7 +255,7 @@ class CreepNear:
         if part == BODIES:
             return self._creep.closure * pressure
         position, interface = self._position, self._position.interface
-        force, operator = position.pair.normal * (position.pair.weights * pressure)[:, None], interface.punch
+        force, operator = position.frame[:, 0] * (position.pair.weights * pressure)[:, None], interface.punch
         if part == 1:
             force, operator = -position.reaction(force), interface.strip
         moved = force if self._creep.behind is not None else operator.apply(force)

@@ -203,9 +203,9 @@ class PartialSlipProblem:
         x, field, now = position.pair.punch.x, self.interface.field, step.displacement or 0.0
         if not position.far:
             moved = Screw(HERE, step.way.last).field.velocity(x) - now * field.velocity(x)
-            return np.asarray(in_model(moved, x.shape[1]))
+            return np.asarray(in_model(moved, self.interface.dim))
         on = step.way.field.velocity(x) - (now - (before.displacement or 0.0)) * field.velocity(x)
-        return np.asarray(before.beside + in_model(on, x.shape[1]))
+        return np.asarray(before.beside + in_model(on, self.interface.dim))
 
     def step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state after a time step, and its record; the shape stays; collective."""

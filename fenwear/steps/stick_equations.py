@@ -129,7 +129,7 @@ class Step:
         position = creep.grown(position, imposed.duration)
         self.interface, self.position, self.before, self.imposed = interface, position, before, imposed
         self.mu, self.creep = friction, creep
-        self.n, self.d = position.pair.normal.shape
+        self.n, self.d, _ = position.frame.shape
         self.m = self.d - 1
         self.free_punch = imposed.loaded.on_punch
         self.free_strip = imposed.loaded.on_strip + imposed.strain * interface.bulk

@@ -287,10 +287,10 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | None) -> FinalShape:
 def _of_cycle(problem: PartialSlipProblem, driven: PartialSlipProblem) -> FinalShape:
     """Return the shape whose stick zone is that of the second cycle of a problem, the same or under another force."""
     records, middle = _second_cycle(driven), problem.interface.middle
-    if middle.compliance.on_grid is not None and middle.pair.punch.dim > 2:
+    if middle.compliance.on_grid is not None and problem.interface.dim > 2:
         return _of_grid(problem, records)
     shape = None
-    if middle.pair.punch.dim == 2:
+    if problem.interface.dim == 2:
         slid = records.slip_magnitude.sum(axis=0)
         edges = stick_edges(middle.pair.x, records.stuck, slid, records.touched)
         shape = _of_edges(problem, edges) if len(edges) == 2 else None

@@ -241,6 +241,8 @@ def expansions(
         fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
         picked = free_expansion(elastic, basis.body, fields)
         at_patterns = np.einsum("qN,Ndk->qdk", patterns.T.toarray(), picked)
+        if interface.dim > elastic.dim:  # rings, which heat does not turn
+            at_patterns = np.insert(at_patterns, 1, 0.0, axis=1)
         expansions.append(Functional(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
     return expansions[0], expansions[1]
 

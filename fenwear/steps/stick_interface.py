@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
+from fenwear.bodies.antiplane import turning
 from fenwear.bodies.creep_law import Retardation
 from fenwear.bodies.response import Request, identity
 from fenwear.bodies.surface_operators import SurfaceOperator, operators_for
@@ -25,7 +26,7 @@ from fenwear.surfaces import (
     pair,
     rigid_equilibrium,
 )
-from fenwear.surfaces.placement import HERE, Placement
+from fenwear.surfaces.placement import HERE, Placement, in_model
 from fenwear.surfaces.track import Border
 from fenwear.system import Bodies, Resources, Sliding, setup_resources
 
@@ -66,8 +67,9 @@ class StickInterface:
         self.team.serve(self)
         self.keep, self.fresh = keep, fresh
         self.field = sliding.field
-        self.dim = bodies.punch.dim
-        middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
+        rings = bodies.punch.law.kind == "axisymmetric"
+        self.dim = 3 if rings else bodies.punch.dim
+        middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings, halfway=not moves)
         places = {sliding.placement(phase) for phase in sliding.motion.phases} - {HERE} if moves else set()
         self.whole_strip = middle.strip
         self.border = Border.of_swept([middle, *(pair(middle.punch, middle.strip, there) for there in places)])
@@ -84,7 +86,10 @@ class StickInterface:
         if condensed is None:
             self.needs.check()
             wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
-            self.punch, self.strip = operators_for(wanted, keep=keep, fresh=fresh)
+            operators = operators_for(wanted, keep=keep, fresh=fresh)
+            if rings:
+                operators = [turning(*body) for body in zip(wanted, operators, strict=True)]
+            self.punch, self.strip = operators
         else:
             self.punch, self.strip = condensed
         self.creep = self._creep()
@@ -136,7 +141,7 @@ class StickInterface:
         A solid under stress along x alone gets narrower along y.
         """
         pair = self.middle.pair
-        x = pair.strip.trace if self.moves else pair.transfer @ pair.strip.trace
+        x = in_model(pair.strip.trace if self.moves else pair.transfer @ pair.strip.trace, self.dim)
         displacements = np.zeros_like(x)
         displacements[:, 0] = x[:, 0]
         if self.dim == 3:
@@ -191,7 +196,7 @@ class StickInterface:
 
 def untouched(interface: StickInterface) -> StickState:
     """Return the unloaded bodies before they touch."""
-    n, d = interface.middle.pair.normal.shape
+    n, d, _ = interface.middle.frame.shape
     none = np.zeros((n, d - 1))
     return StickState(
         np.zeros(n),

@@ -103,7 +103,8 @@ class Position:
     def modes(self) -> Array:
         """H (d n, r)."""
         n, d, _ = self.frame.shape
-        return np.einsum("iac,icm->aim", self.frame, self.rigid.motion).reshape(d * n, -1)
+        motion = in_model(np.moveaxis(self.rigid.motion, 2, 0), d)
+        return np.einsum("iac,mic->aim", self.frame, motion).reshape(d * n, -1)
 
     @cached_property
     def weights(self) -> Array:
@@ -165,8 +166,9 @@ def position_of(
         strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
         layer: Closure by unit pressures of what lies between (n,), mm/MPa; 0 of nothing.
     """
-    frame = contact_frame(rigid.pair.normal)
-    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))
+    dim = punch.directions.shape[1]
+    frame = contact_frame(in_model(rigid.pair.normal, dim))
+    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), dim))
     return Position(Interface(rigid, punch, strip, strip_moves, frame=frame, layer=layer), drive.ravel())
 
 
@@ -182,7 +184,7 @@ def along_sliding(position: Position) -> Array:
 
     In the plane along x; where a turning strip does not move, on its axis, along the first tangent.
     """
-    n, d = position.pair.normal.shape
+    n, d, _ = position.frame.shape
     if d == 2:
         return np.ones((n, 1, 1))
     moved = position.drive[n:].reshape(2, n).T
@@ -211,6 +213,7 @@ def surface_gradient(surface: ContactSurface) -> list[csr_array]:
         cells = cells[:, [0, 1, 3, 2]]  # basix' order of corners
     corners = cells.shape[1]
     facets = surface.facets[:, cells].reshape(-1, corners)
+    facets = facets[(surface.number[facets] >= 0).all(axis=1)]  # a node on the axis of rings carries nothing
     element = basix.create_element(basix.ElementFamily.P, basix.CellType[surface.cell], 1)
     table = element.tabulate(1, element.points)[1:, :, :, 0]
     jacobian = np.einsum("dqk,fkc->fqcd", table, surface.trace[facets])
@@ -234,5 +237,8 @@ def surface_strain(position: Position, gradient: list[csr_array], on_strip: Arra
     """
     u = position.pair.placement.vectors(position.reading @ on_strip)
     slopes = np.stack([derivative @ u for derivative in gradient], axis=2)  # (n, d of u, d)
+    if slopes.shape[1] > slopes.shape[2]:  # rings: what changes around the axis are the directions of u_r and u_y
+        turned = np.stack([-u[:, 1], u[:, 0], np.zeros(len(u))], axis=1) / position.pair.punch.x[:, :1]
+        slopes = np.insert(slopes, 1, turned, axis=2)
     ways = directions(position)
     return np.einsum("nac,ncb,nab->na", ways, slopes, ways)

@@ -98,7 +98,7 @@ def _final_shape(system: Tribosystem) -> Values:
     final = cast(FinalShape, steady(system))  # under Coulomb's law
     system, thickness = final.system, final.system.bodies.punch.thickness
     values = _registered(system, cycle_of_final(final))
-    size = "stick_area" if system.pair.punch.dim == 3 else "stick_width"
+    size = "stick_area" if system.law_state.problem.interface.dim == 3 else "stick_width"
     values |= {size: np.array(final.size), "wear": final.worn.punch, "largest_depth": final.worn.punch.max()}
     values["worn_volume"] = np.array(thickness * float(system.pair.weights @ final.worn.punch))
     if system.sliding.strip_wears:

@@ -25,7 +25,7 @@ from fenwear.common.arrays import Array, Nodes
 from fenwear.surfaces.equilibrium import RigidEquilibrium
 from fenwear.surfaces.grid_compliance import GridCompliance, on_one_grid
 from fenwear.surfaces.pair import ContactPair
-from fenwear.surfaces.placement import ZERO
+from fenwear.surfaces.placement import ZERO, in_model
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
@@ -75,7 +75,9 @@ class Interface:
     @cached_property
     def axes(self) -> Array:
         """Along which displacements are asked for (n, a, d)."""
-        return self.pair.normal[:, None] if self.frame is None else self.frame
+        if self.frame is not None:
+            return self.frame
+        return in_model(self.pair.normal, self.punch.directions.shape[1])[:, None]
 
     @cached_property
     def _axes_on_strip(self) -> Array:
@@ -207,14 +209,14 @@ class Interface:
         """g_load (n,), mm."""
         pair, strip = self.pair, self.strip.by_load
         by_load = pair.transfer @ strip if self.strip_moves else strip
-        return np.einsum("id,id->i", pair.normal, self.punch.by_load) - np.einsum(
-            "id,id->i", pair.normal_on_strip, by_load
+        return np.einsum("id,id->i", self.axes[:, 0], self.punch.by_load) - np.einsum(
+            "id,id->i", self._axes_on_strip[:, 0], by_load
         )
 
     @property
     def by_even(self) -> Array:
         """Gap that an even unit pressure opens without friction (n,), mm/MPa."""
-        return self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
+        return self.apply(self.axes[:, 0] * self.pair.weights[:, None])[:, 0]
 
     def compliance(
         self, friction_ratio: Array | float, scale: float = 1.0, known: dict[bytes, Array] | None = None
@@ -226,7 +228,7 @@ class Interface:
             scale: A factor of S.
             known: Tables of convolutions that were made for other phases.
         """
-        traction = scale * (self.pair.normal + friction_ratio)
+        traction = scale * (self.axes[:, 0] + in_model(np.asarray(friction_ratio), self.axes.shape[2]))
         return Compliance(self, traction[:, :, None], {} if known is None else known)
 
     @cached_property
@@ -255,7 +257,7 @@ class Interface:
         rigid = np.zeros(modes.T.shape)  # what modes take up of S, which is symmetric but for the weights
         if rigid.size:
             inverse = np.linalg.pinv(modes)
-            opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
+            opened = self.apply(self.axes[:, 0, :, None] * inverse.T[:, None, :])[:, 0]
             rigid = opened.T * pair.weights
         count, compliance = len(pair.weights), self.compliance(0.0)
         step = 1 if self.in_memory else max(count // SOME, 1)

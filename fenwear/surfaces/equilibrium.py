@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.common.arrays import Array
 from fenwear.surfaces.pair import ContactPair
+from fenwear.surfaces.placement import in_model
 
 
 def is_translation(mode: str) -> bool:
@@ -53,14 +54,14 @@ class RigidEquilibrium:
         """Return the load on each mode (modes, n) that pressure at each node balances.
 
         Args:
-            friction_ratio: tau (n, d); 0.0 for none.
+            friction_ratio: tau (n, d), in the model or in space; 0.0 for none.
         """
-        traction = self.pair.normal + friction_ratio
+        traction = self.pair.normal + in_model(np.asarray(friction_ratio), self.pair.punch.dim)
         return np.einsum("id,idm->mi", traction, self.motion) * self.pair.weights
 
     def of(self, pressure: Array, friction_ratio: Array) -> Array:
         """Return the load on each mode (k, modes) that pressures (k, n) balance, with friction ratios (k, n, d)."""
-        traction = self.pair.normal + friction_ratio
+        traction = self.pair.normal + in_model(friction_ratio, self.pair.punch.dim)
         traction *= (pressure * self.pair.weights)[..., None]
         return np.einsum("kid,idm->km", traction, self.motion)
 

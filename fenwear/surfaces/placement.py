@@ -17,15 +17,15 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 def in_space(vectors: Array) -> Array:
-    """Return vectors (n, d) with all three components (n, 3)."""
-    if vectors.shape[1] == 3:
-        return vectors
-    return np.stack([vectors[:, 0], np.zeros(len(vectors)), vectors[:, 1]], axis=1)
+    """Return vectors (..., d) with all three components (..., 3)."""
+    return in_model(vectors, 3)
 
 
 def in_model(vectors: Array, dim: int) -> Array:
-    """Return the components (n, d) that a model of d dimensions has of vectors (n, 3)."""
-    return vectors if dim == 3 else vectors[:, [0, 2]]
+    """Return the components (..., d) along the axes of a model of d dimensions, of vectors of another or of space."""
+    if vectors.shape[-1:] in ((), (dim,)):  # a number is for all of them
+        return vectors
+    return vectors[..., [0, 2]] if dim == 2 else np.insert(vectors, 1, 0.0, axis=-1)
 
 
 @dataclass(frozen=True)

@@ -60,12 +60,12 @@ def test_no_rates_with_properties_of_the_temperature() -> None:
     assert error.value.problems[0].key == "materials.steel.conductivity"
 
 
-def test_a_share_that_changes_with_a_layer() -> None:
-    """A share of the temperature."""
-    share = "contact.lubrication={asperity_share={expression='min(1, 0.3 + T / 1e4)'}}"
+def test_a_share_that_changes_with_a_layer_and_stick() -> None:
+    """A share of the speed."""
+    share = "contact.lubrication={asperity_share={expression='min(1, 0.3 + v / 1e4)'}}"
     layer = "contact.layer={kind='power', reference='1 um', pressure='100 MPa'}"
     with pytest.raises(CaseError) as error:
-        place_case(load_case(HEAT, ["geometry.parameters.elements_along_contact=8", share, layer])).layers  # noqa: B018
+        assemble(load_case(STICK, [share, layer]))
     assert error.value.problems[0].key == "contact.layer"
 
 

@@ -176,8 +176,8 @@ ELSEWHERE = (
     (MODEL, "`flash` where the strip turns about a point near to the contact",
      "results/test_flash_temperatures.py::test_refused_turning_about_the_contact"),
     (MODEL, "a reduced basis whose temperatures grow of themselves", ""),
-    (PHYSICS, "`contact.lubrication` whose share follows speed or temperature, with stick and a layer that closes by a law: "
-     "nodes that stop keep a film for a while",
+    (PHYSICS, "`contact.lubrication` whose share follows speed or temperature, with stick and a layer that closes by "
+     "a law: nodes that stop keep a film for a while",
      "test_refusals.py::test_a_share_that_changes_with_a_layer_and_stick"),
     (PHYSICS, "an end of partial slip with a threshold, which depends on the way there",
      "steps/test_steady.py::test_pressures_below_the_threshold_have_no_end_of_their_own"),

@@ -301,8 +301,8 @@ changes = ("elements_along_contact=2", "growth=8")
 case = load_case("example1", ["geometry.degree=2", *(f"geometry.parameters.{change}" for change in changes)])
 together, alone = assemble(case), assemble(case, MPI.COMM_SELF)
 cells = together.bodies.punch.body.mesh.topology.index_map(2)
-assert cells.size_global < together.comm.size
-assert 0 in together.comm.allgather(cells.size_local)
+assert cells.size_global < together.bodies.comm.size
+assert 0 in together.bodies.comm.allgather(cells.size_local)
 found, expected = (s.contact((1,)).solve(s.pair.initial_gap).pressure for s in (together, alone))
 assert abs(found - expected).max() <= 1e-9 * expected.max()
 

@@ -63,20 +63,6 @@ def test_missing_library() -> None:
         import nothing_of_ours  # noqa: F401
 
 
-def test_elements_share_their_cells() -> None:
-    """One cell of each kind, whatever the element, as UFL makes it."""
-    import basix.ufl
-    import ufl.cell
-
-    import fenwear.common.compat  # noqa: F401
-
-    for name in ("quadrilateral", "hexahedron"):
-        one, other = basix.ufl.element("Lagrange", name, 2), basix.ufl.element("DG", name, 0, shape=(3,))
-        assert one.cell is other.cell
-        assert one.cell == ufl.cell.Cell(name)
-        assert other.cell.sub_entity_types(1) == ufl.cell.Cell(name).sub_entity_types(1)
-
-
 @pytest.mark.parametrize("linked", stack.LINKED)
 def test_mpi_comes_first(run_python: Run, tmp_path: Path, linked: str) -> None:
     """Whatever is imported first after fenwear finds MPI loaded; fenwear itself loads nothing."""

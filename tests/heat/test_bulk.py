@@ -170,15 +170,7 @@ def test_ten_stops(edited: Edited) -> None:
         tables["run"].pop("half_cycles")
 
     system = assemble(edited("example1-heat", brake, *SMALL))
-    blocks = list(
-        follow_program(
-            system,
-            lambda own, state, leave, span: march_within(
-                own, RunLimits(span.until, leave=leave, loading=span.loading), start=state
-            ),
-            280,
-        )
-    )
+    blocks = list(follow_program(system, march_within, RunLimits(280)))
     assert max(block.heat.balance_error.max() for block in blocks) < 1e-9
     bulks = np.concatenate([block.heat.temperature_bulk for block in blocks])
     rests = bulks.reshape(10, 28)[:, 7:]

@@ -213,7 +213,7 @@ def test_modes_of_a_track_carry_no_heat(count: int) -> None:
     mesh = ring(count)
     mesh.geometry.x[:, 0] += 3.0
     body = conducting(mesh, "solid", groups(3))
-    comm, speed = mesh.bodies.comm, 1.0
+    comm, speed = mesh.comm, 1.0
     step = body.step(speed, 1.0, Surroundings(renewed=True, sliding=TURNING))
     section = section_modes(body, TURNING, speed, 0.1)
     assert len(section.rates) > 2

@@ -20,6 +20,7 @@ from functools import cached_property
 
 import basix
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from fenwear.bodies.contact_surface import ContactSurface
@@ -212,7 +213,7 @@ def surface_gradient(surface: ContactSurface) -> list[csr_array]:
     if surface.cell == "quadrilateral":
         cells = cells[:, [0, 1, 3, 2]]  # basix' order of corners
     corners = cells.shape[1]
-    facets = surface.facets[:, cells].reshape(-1, corners)
+    facets: NDArray[np.int64] = surface.facets[:, cells].reshape(-1, corners)
     facets = facets[(surface.number[facets] >= 0).all(axis=1)]  # a node on the axis of rings carries nothing
     element = basix.create_element(basix.ElementFamily.P, basix.CellType[surface.cell], 1)
     table = element.tabulate(1, element.points)[1:, :, :, 0]

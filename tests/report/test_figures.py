@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fenwear import CaseError, load_case
+from fenwear.common.errors import readable
 from fenwear.report.body_figures import element_edges
 from fenwear.report.figures import all_figures, draw_figures
 from fenwear.report.lines import (
@@ -160,7 +161,11 @@ def test_first_peaks_have_their_size(history: xarray.Dataset) -> None:
         top = pressure_top(data, chosen)
         for ax in lines_figure(data, [fields_of(data)["pressure"]], chosen).axes:
             assert ax.get_ylim()[1] <= top
-            told = [line for line in ax.lines if f"(to {np.max(line.get_ydata()):.3g} MPa)" in str(line.get_label())]
+            told = [
+                line
+                for line in ax.lines
+                if f"(to {readable(np.max(line.get_ydata()), 3)} MPa)" in str(line.get_label())
+            ]
             assert len(told) >= beyond
             assert all(np.max(line.get_ydata()) <= top for line in ax.lines if line not in told)
 

@@ -182,7 +182,7 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
     """A solver that fails after two blocks: history, summary and figures of what was computed, and the error."""
     case = load_case("example1", [*SMALL, "run.half_cycles=1000"])
 
-    def failing(system: Tribosystem, how: str, limits: RunLimits, *_: object, **course: object):  # type: ignore[no-untyped-def]
+    def failing(system: Tribosystem, limits: RunLimits, *_: object, **_how: object):  # type: ignore[no-untyped-def]
         for number, block in enumerate(march(system, limits.half_cycles)):
             if number == 2:
                 raise ConvergenceError("DIVERGED_ON_PURPOSE")

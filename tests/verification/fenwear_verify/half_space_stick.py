@@ -52,7 +52,7 @@ class OppositeBodies(StickInterface):
     def __init__(
         self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
     ) -> None:
-        self.punch, self.strip, self.field = punch, strip, field
+        self.punch, self.strip, self.field, self.dim = punch, strip, field, rigid.pair.punch.dim
         self.team, self.moves, self.moved, self.creep = ALONE, False, None, stiff(punch, strip)
         self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load, punch.by_load, strip.by_load)
         self._positions = {0.0: position_of(rigid, punch, strip, field)}
